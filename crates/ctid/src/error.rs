@@ -98,6 +98,32 @@ impl From<paper_tables::Error> for Error {
     }
 }
 
+impl From<linear_identification::Error> for Error {
+    fn from(error: linear_identification::Error) -> Self {
+        use linear_identification::Error as E;
+        let message = error.to_string();
+        match error {
+            E::Signals(error) => Self::Record(error),
+            E::Estimator(error) => Self::Estimator(error),
+            E::Linear(error) => Self::Linear(error),
+            E::Loop(error) => Self::Loop(error),
+            E::NoStretch(error) => Self::Diagnosis(error),
+            E::StabilityBorder { record }
+            | E::ControllerMismatch { record, .. }
+            | E::MissingReadings { record, .. }
+            | E::InRecord { record, .. }
+            | E::FirstFit { record, .. } => {
+                let what = message.strip_prefix(&format!("{record}: "));
+                Self::File {
+                    what: what.unwrap_or(&message).to_owned(),
+                    file: record,
+                }
+            }
+            _ => Self::Usage(message),
+        }
+    }
+}
+
 impl Error {
     /// Something about a file as a whole.
     pub(crate) fn file(path: &Path, what: impl Into<String>) -> Self {

@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 use missing_effect::Diagnosis;
 use serde::{Deserialize, Serialize};
 
-use crate::identify::Identification;
-use crate::identify::side_by_side::SideBySide;
 use crate::{Error, atomic, report, term_file};
+use linear_identification::{Identification, side_by_side::SideBySide};
 
 /// How much of an existing page is looked at: the mark stands in its head.
 const HEAD: u64 = 4096;

@@ -110,7 +110,7 @@ mod tests {
         for effect in plants::CATALOGUE {
             let (measured, residual) = experiment(effect).unwrap();
             assert_eq!(measured.len(), residual.len());
-            let rms = crate::identify::rms(residual.into_iter());
+            let rms = linear_identification::rms(residual.into_iter());
             println!("{:22} {rms:.4} cm", effect.id);
             assert!(rms > 1e-3, "{}: {rms} cm", effect.id);
         }

@@ -6,16 +6,24 @@ use greybox::{Fit, coloured};
 
 use crate::{
     ControlLoop, Diagnosis, Error, Options, Problem, Verdict,
-    confirm::{BIC_MARGIN, beyond_chance},
-    diagnose::{allow, assemble, effort, floors},
-    diagnosis::Floors,
-    gaps::Mended,
-    node::Node,
-    noise_floor::{NOISE_ORDER, wanders},
-    problem::{STOPPING, base},
-    proposal::singles,
-    remains::{Left, remains},
-    sentences, step,
+    base::{
+        believed::base,
+        gaps::Mended,
+        time_limit::{allow, effort},
+    },
+    diagnostics::{
+        assemble::{assemble, floors},
+        remains::{Left, remains},
+        step,
+    },
+    fit::{
+        criterion::{BIC_MARGIN, beyond_chance},
+        node::{Node, STOPPING},
+        noise_model::{NOISE_ORDER, wanders},
+        proposal::singles,
+    },
+    result::Floors,
+    sentences,
 };
 
 /// Share of a diagnosis' time limit that a comparison has, and of that the shares after which its phases end: further starts, single
@@ -36,6 +44,7 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
         Some(mended) => {
             let mut diagnosis = compare_whole(&mended.problem, options)?;
             mended.report(&mut diagnosis);
+            diagnosis.sentences.extend(sentences::of_gaps(&mended.gaps));
             diagnosis
         }
     };

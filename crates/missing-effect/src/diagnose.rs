@@ -1,29 +1,38 @@
 //! The algorithm, from records to a verdict.
 
-use std::{sync::atomic::Ordering, time::Instant};
+use std::time::Instant;
 
-use ct_signals::{ArModel, Clock};
+use ct_signals::ArModel;
 use greybox::Noise;
 use plants::Placed;
 
 use crate::{
-    Acceptance, ControlLoop, Diagnosis, Effort, Error, GROUP_MARGIN, NoiseFloor, Options,
-    PerOutput, Problem, Progress, Rankings, Score, Shown, Step, Verdict,
-    confirm::BIC_MARGIN,
-    diagnosis::Floors,
-    doubt::doubt,
-    find::{Found, find, shortened},
-    gaps::Mended,
-    judge::{Course, Grade, Judge, PART, WHOLE},
-    node::Node,
-    partial::largest_part,
-    problem::base,
-    remains::remains,
-    rounding::rounded,
-    scores::{price_of_colour, scores},
+    Acceptance, ControlLoop, Diagnosis, Error, Options, PerOutput, Problem, Progress, Verdict,
+    accept::{
+        doubt::doubt,
+        judge::{Course, Grade, Judge, PART, WHOLE},
+        partial::largest_part,
+        rounding::rounded,
+        sticking::sticks,
+    },
+    base::{
+        believed::base,
+        gaps::Mended,
+        time_limit::{allow, effort},
+    },
+    diagnostics::{
+        assemble::{assemble, floors},
+        held_out::share_on_held_out,
+        remains::remains,
+        unknown::{self, unknown},
+    },
+    fit::criterion::BIC_MARGIN,
+    search::{
+        find::{find, shortened},
+        rankings::{ranked, rankings},
+        scores::{price_of_colour, scores},
+    },
     sentences,
-    sticking::sticks,
-    unknown::{self, unknown},
 };
 
 /// Shares of the time limit after which the phases end: further starts of the believed model, the search of sets, then all that follows
@@ -50,6 +59,7 @@ pub fn diagnose(
         Some(mended) => {
             let mut diagnosis = diagnose_whole(&mended.problem, options, progress)?;
             mended.report(&mut diagnosis);
+            diagnosis.sentences.extend(sentences::of_gaps(&mended.gaps));
             diagnosis
         }
     };
@@ -264,160 +274,7 @@ fn ids(added: &[Placed]) -> Vec<String> {
     ids.collect()
 }
 
-/// Lets the fits of a search go on until this share of its time has passed.
-pub(crate) fn allow(node: &Node, share: f64) {
-    if let Some(limit) = &node.setup.time_limit {
-        limit.allow(share);
-    }
-}
-
-/// What the time limit left out of a search.
-pub(crate) fn effort(node: &Node, options: &Options) -> Effort {
-    let limit = node.setup.time_limit.as_ref();
-    let interrupted = options
-        .interrupt
-        .is_some_and(|interrupt| interrupt.load(Ordering::Relaxed));
-    Effort {
-        limit: options.time_limit.map(|limit| limit.as_secs_f64()),
-        left_out: limit.map_or_else(Vec::new, |limit| limit.left_out()),
-        interrupted,
-    }
-}
-
-/// The share of the excess error on held-out records that the last model explains of the first one's.
-fn share_on_held_out(steps: &[Step], floor: &PerOutput) -> Option<f64> {
-    let [first, .., last] = steps else {
-        return None;
-    };
-    // Over the floor of each output, in their mean.
-    let mean_square = |step: &Step| -> Option<f64> {
-        let errors = step.rmse_test_per_output.as_ref()?.values();
-        let squares = errors.zip(floor.values());
-        let sum: f64 = squares.map(|(rmse, floor)| (rmse / floor).powi(2)).sum();
-        Some(sum / floor.0.len() as f64)
-    };
-    let (before, after) = (mean_square(first)?, mean_square(last)?);
-    // An error that is noise has no share to explain.
-    (before > 1.0).then(|| (before - after) / (before - after.min(1.0)))
-}
-
-/// The single effects under both weightings, those that were promising enough for a refit.
-fn rankings(found: &Found, base: &Node) -> Rankings {
-    let first_of_each = |nodes: &[Node]| {
-        let mut ranked: Vec<String> = Vec::new();
-        for placed in nodes.iter().filter_map(|node| node.added.last()) {
-            if !ranked.iter().any(|known| known == placed.effect.id) {
-                ranked.push(placed.effect.id.to_string());
-            }
-        }
-        ranked
-    };
-    let white = found.grown.promising_singles();
-    let Some(grown) = &found.prewhitened else {
-        return Rankings {
-            white: first_of_each(&white),
-            ..Rankings::default()
-        };
-    };
-    let prewhitened = grown.promising_singles();
-    // A best effect of the one weighting that is far behind in the other, or does not pay there.
-    let behind = |best: &[Node], others: &[Node], base: &Node| {
-        let (Some(best), Some(first)) = (best.first(), others.first()) else {
-            return false;
-        };
-        let own = others.iter().find(|other| other.added == best.added);
-        first.gain_over(base) > BIC_MARGIN
-            && own.is_none_or(|own| first.gain_over(own) > GROUP_MARGIN)
-    };
-    Rankings {
-        disagree: behind(&white, &prewhitened, &found.base) && behind(&prewhitened, &white, base),
-        white: first_of_each(&white),
-        prewhitened: first_of_each(&prewhitened),
-    }
-}
-
-/// The single effects best first, each once; `none` first where nothing is missing.
-fn ranked(scores: &[Score], verdict: Verdict) -> Vec<String> {
-    let mut ranked: Vec<String> = Vec::new();
-    if verdict == Verdict::Adequate {
-        ranked.push("none".to_string());
-    }
-    for score in scores {
-        if !ranked.contains(&score.effect) {
-            ranked.push(score.effect.clone());
-        }
-    }
-    ranked
-}
-
-/// The noise floors that a noise model stands for.
-pub(crate) fn floors(problem: &Problem, noise: &Noise, source: &str) -> Floors {
-    let outputs = problem.records[0].outputs.iter().zip(noise.iter());
-    let floors = outputs.map(|(output, noise)| NoiseFloor {
-        output: output.name.clone(),
-        level: noise.stationary_std(),
-        innovation: noise.sigma(),
-        coefficients: noise.coefficients().to_vec(),
-        source: source.to_string(),
-    });
-    Floors(floors.collect())
-}
-
 /// Standard deviation of the innovations at each output.
 fn innovations(noise: &Noise) -> Vec<f64> {
     noise.iter().map(ArModel::sigma).collect()
-}
-
-/// Everything but the findings.
-pub(crate) fn assemble(
-    problem: &Problem,
-    verdict: Verdict,
-    steps: Vec<Step>,
-    noise: Floors,
-) -> Diagnosis {
-    let noise = noise.0;
-    let outputs = &problem.records[0].outputs;
-    Diagnosis {
-        schema: 2,
-        verdict,
-        effects: Vec::new(),
-        groups: Vec::new(),
-        in_doubt: Vec::new(),
-        places: Vec::new(),
-        acceptance: None,
-        rankings: Rankings::default(),
-        effort: Effort::default(),
-        residual_unexplained: false,
-        ranked: Vec::new(),
-        steps,
-        noise_floor: match &noise[..] {
-            [only] => only.level,
-            _ => f64::NAN,
-        },
-        noise,
-        scores: Vec::new(),
-        unknown: None,
-        control_loop: None,
-        sentences: Vec::new(),
-        gaps: None,
-        clock: Clock::of(problem.records.iter().chain(&problem.test)),
-        plant: problem.plant.id().to_string(),
-        known_effects: problem
-            .effects
-            .iter()
-            .map(|placed| placed.effect.id.to_string())
-            .chain(problem.terms.iter().map(|term| term.name.clone()))
-            .collect(),
-        input_unit: problem.records[0].inputs[0].unit.clone(),
-        outputs: outputs.iter().map(|output| output.name.clone()).collect(),
-        output_unit: outputs[0].unit.clone(),
-        output_units: Vec::new(),
-        records: problem
-            .records
-            .iter()
-            .map(|record| Shown::of(record, false))
-            .chain(problem.test.iter().map(|record| Shown::of(record, true)))
-            .collect(),
-        seconds: 0.0,
-    }
 }

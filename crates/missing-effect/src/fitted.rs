@@ -4,10 +4,9 @@ use greybox::{Fit, FitUncertainty, Setup};
 
 use crate::{
     ControlLoop, Error, Options, Problem,
-    closed_loop::other_metric,
+    base::{closed_loop::other_metric, gaps::Mended},
     compare::{Believed, believed},
-    gaps::Mended,
-    noise_floor::NOISE_ORDER,
+    fit::noise_model::NOISE_ORDER,
 };
 
 /// What a fit of the believed model gives.

@@ -2,8 +2,10 @@
 
 use clap::ValueEnum;
 use ct_signals::{Columns, Hold, ReadOptions, Reading};
-use ctid::identify::{DelayChoice, LevelChoice, Method, Order, Request, identify_mended, mend};
 use fcloe::Controller;
+use linear_identification::{
+    DelayChoice, LevelChoice, Method, Order, Request, identify_mended, mend,
+};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
@@ -132,7 +134,7 @@ pub fn identify<'py>(
             records.iter_mut().for_each(|r| r.references.clear());
         }
         let (mended, _) = mend(records, Vec::new(), order, integrator)?;
-        identify_mended(&mended, &request)
+        Ok(identify_mended(&mended, &request)?)
     })?;
     let shown = &found.shown;
     let curves = (

@@ -6,13 +6,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
 use ct_signals::{Columns, Hold, ReadOptions, Reading, Record, quoted, read_csv};
+use linear_identification::{
+    DelayChoice, LevelChoice, Method, Request, identify_mended, mend,
+    side_by_side::{self, Orders},
+};
 use missing_effect::Progress;
 
 use super::{Results, finish};
 use crate::Error;
 use crate::column_errors::of_option;
-use crate::identify::side_by_side::{self, Orders};
-use crate::identify::{self, DelayChoice, LevelChoice, Method, Request, side_by_side_text};
+use crate::identify::{side_by_side_text, text};
 use crate::input::{self, ReadArguments};
 use crate::look::Look;
 use crate::model_file::{ControllerSettings, ModelFile};
@@ -396,14 +399,14 @@ impl Identify {
         let highest = self.order.0.iter().copied().max_by_key(|order| order.n);
         let highest = highest.unwrap_or(self.order.0[0]);
         let fitted = std::iter::once(record).chain(more).collect();
-        let (fitted, test) = identify::mend(fitted, test, highest, self.integrator)?;
+        let (fitted, test) = mend(fitted, test, highest, self.integrator)?;
         let bar = Bar::new();
         if let ([request], [_], []) = (&requests[..], &self.order.0[..], &test[..]) {
             bar.phase("identifying");
-            let found = identify::identify_mended(&fitted, request);
+            let found = identify_mended(&fitted, request);
             bar.clear();
             let found = found?;
-            let mut text = notes + &identify::text::text(&found, look);
+            let mut text = notes + &text::text(&found, look);
             if let Some(transfer) = &transfer {
                 text += &transfer.said(Some((found.order, &found.parameters)), look);
             }

@@ -1,6 +1,7 @@
 //! What `ctid identify` prints of several methods or orders.
 
-use super::side_by_side::{Outcome, Row, SideBySide};
+use linear_identification::side_by_side::{Outcome, Row, SideBySide};
+
 use crate::look::{Look, Side, table};
 use crate::numbers;
 

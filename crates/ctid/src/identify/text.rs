@@ -1,8 +1,8 @@
 //! What `ctid identify` prints.
 
 use fcloe::{Condition, NoisePath, Verdict};
+use linear_identification::{Identification, InLoop, LevelChoice, Order, Refined, deviation};
 
-use super::{Identification, InLoop, LevelChoice, Order, Refined, deviation};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};

@@ -9,11 +9,11 @@ use serde::Serialize;
 use super::controller::OwnController;
 use super::file::OwnModelFile;
 use crate::Error;
-use crate::identify::Order;
 use crate::look::{Look, Side, table};
 use crate::model_file::ControllerSettings;
 use crate::numbers;
 use crate::output::Found;
+use linear_identification::Order;
 
 /// A zero this near to a pole, as a share of its size, cancels it.
 const CANCELS: f64 = 1e-8;

@@ -124,13 +124,7 @@ pub fn diagnosed(
     let words = EffectWords::of(&file.base, &file.candidates);
     let source = "the residual of the last model";
     let mut shown = document(file, records, (&found.steps, &found.noise), source);
-    shown.verdict = match found.verdict {
-        effect_search::Verdict::Effect => Verdict::Effect,
-        effect_search::Verdict::Undecided => Verdict::Undecided,
-        effect_search::Verdict::Partial => Verdict::Partial,
-        effect_search::Verdict::Unexplained => Verdict::Unexplained,
-        effect_search::Verdict::Adequate => Verdict::Adequate,
-    };
+    shown.verdict = found.verdict;
     shown.effects.clone_from(&found.effects);
     shown.groups.clone_from(&found.groups);
     shown.in_doubt = vec![false; found.effects.len()];

@@ -5,8 +5,8 @@ use super::page::{self, NOTICES, Page, figure, large, section};
 use super::tables::table;
 use super::text::{code, escape, significant, unit, with_error};
 use crate::identify::text::{self, condition, drift_verdict, model, time_constant_name};
-use crate::identify::{Identification, OverLevel};
 use crate::numbers::duration;
+use linear_identification::{Identification, OverLevel};
 
 /// The page as a complete HTML file. The same result gives the same bytes.
 pub fn html(found: &Identification) -> String {

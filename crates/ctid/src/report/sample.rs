@@ -13,7 +13,7 @@ use self::signals::{NOISE, PERIOD, input, noise, simulate};
 pub(crate) use self::variants::{
     awkward, comparison, comparison_of, partial, partial_of, rename_outputs,
 };
-use crate::identify::rms;
+use linear_identification::rms;
 
 fn bins(by: &[f64], residual: &[f64], edges: &[f64]) -> Vec<Bin> {
     edges

@@ -4,8 +4,8 @@ use super::figures::{self, Colour, Curve, Figure, Panel};
 use super::page::{self, NOTICES, Page, figure, items, large, section};
 use super::tables::table;
 use super::text::{code, escape, significant, unit, with_error};
-use crate::identify::side_by_side::{Row, SideBySide};
 use crate::identify::side_by_side_text::{ORDERS, largest_error, measure, tests, with_results};
+use linear_identification::side_by_side::{Row, SideBySide};
 
 /// The page as a complete HTML file.
 pub fn html(found: &SideBySide) -> String {

@@ -6,7 +6,7 @@ mod program;
 
 use ct_lti::{Simulator, StateSpace, TransferFunction};
 use ct_signals::{Channel, Hold, Record, excitation, noise};
-use ctid::identify::{Identification, Method, Order, Request, identify};
+use linear_identification::{Identification, Method, Order, Request, identify};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 

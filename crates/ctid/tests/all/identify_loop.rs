@@ -5,8 +5,8 @@
 mod program;
 
 use ct_signals::{Channel, Record, excitation};
-use ctid::identify::{Identification, LevelChoice, Method, Order, Request, identify};
 use fcloe::{Controller, LoopData, Noise, PlantModel, continuous_loop, noise_at_snr};
+use linear_identification::{Identification, LevelChoice, Method, Order, Request, identify};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
 const METHODS: [Method; 4] = [

@@ -4,7 +4,7 @@
 use crate::common::Place;
 use crate::identify::{Plant, SECOND};
 use ct_signals::Record;
-use ctid::identify::{Identification, LevelChoice, Method, Order, Request, identify};
+use linear_identification::{Identification, LevelChoice, Method, Order, Request, identify};
 use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;

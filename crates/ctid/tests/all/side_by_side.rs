@@ -5,8 +5,8 @@
 use crate::common::Place;
 use crate::identify::{FIRST, Plant, SECOND};
 use ct_signals::Record;
-use ctid::identify::side_by_side::{Orders, Row, SideBySide, compare};
-use ctid::identify::{Method, Order, Request, mend};
+use linear_identification::side_by_side::{Orders, Row, SideBySide, compare};
+use linear_identification::{Method, Order, Request, mend};
 
 fn all(record: &Record, test: &[Record], orders: &str) -> SideBySide {
     let orders: Orders = orders.parse().unwrap();

@@ -16,7 +16,7 @@ use super::{
     separation::{Metric, information, linear, misfit_before, noise_free, refitted},
     simulated::{Loop, SimulatedExperiment, simulate_experiment},
 };
-use crate::{Error, Problem, Progress, diagnose::allow, node::Node};
+use crate::{Error, Problem, Progress, base::time_limit::allow, fit::node::Node};
 
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 6;

@@ -8,9 +8,9 @@ mod experiments;
 mod limits;
 mod plan;
 mod second_sensor;
+mod sentences;
 mod separation;
 mod simulated;
-mod words;
 
 #[cfg(test)]
 mod tests;
@@ -25,15 +25,19 @@ pub use plan::{Alternative, Candidate, Design, Reach, SecondSensor, Sequence, Wi
 
 use crate::{
     Error, Options, Problem, Progress,
-    control_loop::slowest_time_constant,
-    diagnose::{allow, effort},
-    gaps::Mended,
-    groups::GROUP_MARGIN,
-    node::{FINE, Node, in_time, refine},
-    noise_floor::colour,
-    problem::base,
-    proposal::place,
-    step,
+    base::{
+        believed::base,
+        control_loop::slowest_time_constant,
+        gaps::Mended,
+        time_limit::{allow, effort},
+    },
+    diagnostics::step,
+    fit::{
+        criterion::GROUP_MARGIN,
+        node::{FINE, Node, in_time, refine},
+        noise_model::colour,
+        proposal::place,
+    },
 };
 use experiments::Search;
 use separation::Metric;
@@ -173,7 +177,7 @@ pub fn design(
         output_unit: problem.records[0].outputs[0].unit.clone(),
         seconds: 0.0,
     };
-    design.sentences = words::of(&design);
+    design.sentences = sentences::of(&design);
     design.seconds = begun.elapsed().as_secs_f64();
     Ok(design)
 }

@@ -5,7 +5,7 @@ use plants::Domain;
 use serde::Serialize;
 
 use super::limits::Bounds;
-use crate::{Effort, Parameter, diagnosis::domain_of};
+use crate::{Effort, Parameter, result::domain_of};
 
 /// One of the two effects that are to be told apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]

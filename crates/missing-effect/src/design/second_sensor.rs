@@ -9,7 +9,7 @@ use super::{
     separation::{Metric, noise_free, priors_of_truth, unlooped, vector},
     simulated::SimulatedExperiment,
 };
-use crate::{Error, node::Node};
+use crate::{Error, fit::node::Node};
 
 /// The vessel that it would stand in: the first one that is not measured; `None` where all are.
 pub(crate) fn place(structure: &Structure) -> Option<usize> {

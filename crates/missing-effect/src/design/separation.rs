@@ -23,7 +23,7 @@ use greybox::{Noise, PriorValue, Setup, Triangle, fit_from, starts_around};
 use super::simulated::SimulatedExperiment;
 use crate::{
     Error,
-    node::{FINE, Node},
+    fit::node::{FINE, Node},
 };
 
 /// Starts around B's fit beside itself.

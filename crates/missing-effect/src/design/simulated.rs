@@ -3,7 +3,7 @@
 use ct_signals::{Hold, Record};
 use plants::{Command, MAX_VESSELS, Simulator, Structure, controller::Controller};
 
-use crate::node::Node;
+use crate::fit::node::Node;
 
 /// What the experiment is applied to.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! The program: what it writes and refuses.
 
 use ct_signals::{ReadOptions, Reading, read_csv};
-use ctid::identify::{Method, Order, Request, identify};
+use linear_identification::{Method, Order, Request, identify};
 
 use super::{FIRST, SECOND, found};
 use crate::common::{Place, bundled};

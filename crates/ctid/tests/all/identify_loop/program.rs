@@ -1,8 +1,8 @@
 //! The program in a loop: what it writes and refuses.
 
 use ct_signals::{Channel, Record, excitation};
-use ctid::identify::{LevelChoice, Order, Request, identify};
 use fcloe::{Noise, PlantModel, sampled_loop};
+use linear_identification::{LevelChoice, Order, Request, identify};
 use serde_json::Value;
 
 use super::{METHODS, PI, controller, first_order, record};

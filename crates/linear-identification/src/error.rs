@@ -1,0 +1,212 @@
+//! What identification refuses: every message names the record and the mend.
+
+use ct_signals::quoted;
+use missing_effect::numbers::significant;
+
+use crate::{MAX_ORDER, Method, Order, warnings::or_lower};
+
+/// Why no model came of it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// No record.
+    #[error("no record is given")]
+    NoRecord,
+    /// A record without an input or an output.
+    #[error("{record}: there is no {kind}; a record needs one input and one output at least")]
+    NoSignal {
+        /// Name of the record.
+        record: String,
+        /// What is not there: `input` or `output`.
+        kind: &'static str,
+    },
+    /// An order that no model has.
+    #[error(
+        "an order is n,m with n from 1 to {MAX_ORDER} and m from 0 to n, as in 2,1; found {order}"
+    )]
+    WrongOrder {
+        /// What was asked for.
+        order: Order,
+    },
+    /// A signal that does not move.
+    #[error(
+        "{record}: \"{signal}\" stands at {value} throughout, so that nothing can be identified; record at least a step up and a step down"
+    )]
+    Constant {
+        /// Name of the record.
+        record: String,
+        /// Name of the signal.
+        signal: String,
+        /// Where it stands, in its unit.
+        value: f64,
+    },
+    /// A setting that has to be above 0.
+    #[error("{option} is {value}, but must be a number of {unit} above 0")]
+    NotPositive {
+        /// As it is typed.
+        option: &'static str,
+        /// Its unit.
+        unit: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// A bandwidth with which the filters pass nothing, or nothing but rounding.
+    #[error(
+        "--bandwidth is {found:e} 1/s, but the filters need one from {low:.1e} to {high:.1e} 1/s for this record; without the option it is found"
+    )]
+    Bandwidth {
+        /// What was given, 1/s.
+        found: f64,
+        /// The least, 1/s.
+        low: f64,
+        /// The largest, 1/s.
+        high: f64,
+    },
+    /// The method has come to no model that can be simulated.
+    #[error("{record}: no model of order {order} came of it: {why}; try {}another method", or_lower(*.order))]
+    NoModel {
+        /// Name of the record.
+        record: String,
+        /// The order.
+        order: Order,
+        /// What the model lacks.
+        why: String,
+    },
+    /// The information of the record is singular.
+    #[error(
+        "the record does not tell the parameters of order {order} apart; try {}a record with more movement in its input",
+        or_lower(*.order)
+    )]
+    Untold {
+        /// The order.
+        order: Order,
+    },
+    /// No row could be used.
+    #[error("no sample could be used; check the record for gaps")]
+    NoSample,
+    /// Too few rows are left for the filters of `ct-rls`.
+    #[error(
+        "{:.0} % of the readings are missing, and only {left} of {rows} rows are far enough behind long gaps for the filters of --method ct-rls; --method srivc and fcloe leave single readings out",
+        100.0 * .missing
+    )]
+    RowsLeft {
+        /// Share of the readings that is missing, 0 to 1.
+        missing: f64,
+        /// Rows that are left.
+        left: usize,
+        /// Rows of the record.
+        rows: usize,
+    },
+    /// The recursion ended at a model that is unstable.
+    #[error(
+        "the estimates at the end are those of an unstable model; try {}--method stabilized-oe, whose model is kept stable",
+        or_lower(*.order)
+    )]
+    Unstable {
+        /// The order.
+        order: Order,
+    },
+    /// Only `fcloe` estimates levels.
+    #[error(
+        "--levels estimated is of --method fcloe; {} takes them from the record: rest, mean or zero",
+        .method.id()
+    )]
+    LevelsEstimated {
+        /// The method that was asked for.
+        method: Method,
+    },
+    /// Every one of several methods has refused.
+    #[error("{reason}")]
+    AllRefused {
+        /// What the first one said.
+        reason: String,
+    },
+    /// The fit ended where the loop would become unstable.
+    #[error(
+        "{record}: the fit ended where the loop would become unstable: the record asks for a plant that this controller does not stabilise; check the controller's sign and units, or the orders"
+    )]
+    StabilityBorder {
+        /// Name of the record.
+        record: String,
+    },
+    /// The controller did not give the command that was measured.
+    #[error(
+        "{record}: the measured command disagrees with the controller of the model file, R/S (r - y), by {} {unit} rms, {:.0} % of what it moves: \
+         check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
+        significant(*.mismatch, 3),
+        100.0 * .mismatch / .size
+    )]
+    ControllerMismatch {
+        /// Name of the record.
+        record: String,
+        /// Measured command less the controller's, root mean square, in `unit`.
+        mismatch: f64,
+        /// What the command moves, root mean square, in `unit`.
+        size: f64,
+        /// Unit of the command.
+        unit: String,
+    },
+    /// Too few rows are left for the filters of a regression.
+    #[error(
+        "{record}: {:.0} % of the readings of \"{}\" are missing, and only {left} of {rows} rows are far enough behind long gaps for the filters of --method {}; --method srivc and fcloe leave single readings out",
+        100.0 * .missing,
+        quoted(.output),
+        .method.id()
+    )]
+    MissingReadings {
+        /// Name of the record.
+        record: String,
+        /// Name of the output.
+        output: String,
+        /// Share of the readings that is missing, 0 to 1.
+        missing: f64,
+        /// Rows that are left.
+        left: usize,
+        /// Rows of the record.
+        rows: usize,
+        /// The method.
+        method: Method,
+    },
+    /// What an estimator refuses, with the record that it is about.
+    #[error("{record}: {what}")]
+    InRecord {
+        /// Name of the record.
+        record: String,
+        /// What is wrong and the mend.
+        what: String,
+    },
+    /// Rows are missing, and the fit that says for how long the input may be held failed.
+    #[error(
+        "{record}: rows or samples of the input are missing, and a first fit that says for how long the input may be held failed: {why}; choose a part with --from and --to, or put the record on a coarser grid with --resample"
+    )]
+    FirstFit {
+        /// Name of the record.
+        record: String,
+        /// Why.
+        why: String,
+    },
+    /// Nothing is left of a record between its gaps.
+    #[error(transparent)]
+    NoStretch(missing_effect::Error),
+    /// A record.
+    #[error(transparent)]
+    Signals(#[from] ct_signals::Error),
+    /// A recursive estimator.
+    #[error(transparent)]
+    Estimator(#[from] stabilized_oe::Error),
+    /// A linear model.
+    #[error(transparent)]
+    Linear(#[from] ct_lti::Error),
+    /// A linear model in a loop.
+    #[error(transparent)]
+    Loop(#[from] fcloe::Error),
+    /// Refined instruments.
+    #[error(transparent)]
+    Instruments(#[from] rivc::Error),
+}
+
+impl From<ct_rls::Error> for Error {
+    fn from(error: ct_rls::Error) -> Self {
+        Self::Estimator(error.into())
+    }
+}

@@ -1,0 +1,201 @@
+//! Records in which rows or samples of the input are missing, as the methods take them.
+//!
+//! As everywhere else ([`ct_signals::Gaps`]) the input is held through a gap of at most a tenth of the plant's fastest time constant, which a first
+//! fit says (SRIVC of the order that is asked for). At a longer gap the record is cut.
+//!
+//! | methods | what they take |
+//! |---|---|
+//! | SRIVC, RIVC | the parts, each from a state of its own, with one offset and one noise |
+//! | all others, which begin at rest or from one state | the whole record: the input is held through the gap, whatever it was, and the readings in the gap and behind it are left out until the plant has forgotten it, down to 1 % by its slowest time constant |
+//!
+//! Missing readings of the output are no gaps: each method leaves them out in its own way.
+
+use ct_signals::Record;
+use missing_effect::{LONGEST_HOLD, MendedGaps};
+
+use crate::{
+    Error, Method, Order, Request,
+    checks::{possible, whole},
+    refined,
+};
+
+/// For the first fit inputs are held for so many sampling intervals.
+const FIRST_HOLD: f64 = 20.0;
+/// What a plant has kept of a gap where it counts as forgotten.
+const FORGOTTEN: f64 = 0.01;
+
+/// A record without gaps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mended {
+    /// On one clock: inputs held through every gap, readings left out behind long ones.
+    pub whole: Record,
+    /// Between long gaps.
+    pub parts: Vec<Record>,
+    /// What was done; nothing where there are no gaps.
+    pub gaps: Option<MendedGaps>,
+}
+
+impl Mended {
+    /// Readings of the parts that the whole lacks.
+    pub(crate) fn readings_left_out(&self) -> usize {
+        let readings = |record: &Record| record.outputs.first().map_or(0, |y| y.present().count());
+        let of_parts: usize = self.parts.iter().map(readings).sum();
+        of_parts.saturating_sub(readings(&self.whole))
+    }
+}
+
+/// Fastest and slowest time constant of a plant, s.
+#[derive(Debug, Clone, Copy)]
+struct TimeConstants {
+    fastest: f64,
+    slowest: f64,
+}
+
+/// Records that are fitted, and others of the same plant, without gaps, for models of at most this order.
+///
+/// # Errors
+/// [`Error::Signals`] and [`Error::NoSignal`] for a record that is none, [`Error::NoStretch`] where nothing is left of a record, [`Error::FirstFit`] where its first fit fails.
+pub fn mend(
+    fitted: Vec<Record>,
+    others: Vec<Record>,
+    order: Order,
+    integrator: bool,
+) -> Result<(Vec<Mended>, Vec<Mended>), Error> {
+    possible(order)?;
+    fitted.iter().chain(&others).try_for_each(whole)?;
+    let has_gaps =
+        |record: &Record| record.has_gaps() || record.references.iter().any(|r| r.missing() > 0);
+    if !fitted.iter().chain(&others).any(has_gaps) {
+        let untouched = |record: Record| Mended {
+            parts: vec![record.clone()],
+            whole: record,
+            gaps: None,
+        };
+        let all = |records: Vec<Record>| records.into_iter().map(untouched).collect();
+        return Ok((all(fitted), all(others)));
+    }
+    let first = fitted
+        .iter()
+        .map(|record| cut(record, FIRST_HOLD * record.sample_interval(), f64::INFINITY))
+        .collect::<Result<Vec<_>, _>>()?;
+    let found = time_constants(&first, order, integrator)?;
+    let limit = LONGEST_HOLD * found.fastest;
+    let all = |records: &[Record]| -> Result<Vec<Mended>, Error> {
+        let each = records.iter().map(|record| {
+            let mut mended = cut(record, limit, found.slowest * -FORGOTTEN.ln())?;
+            if let Some(gaps) = &mut mended.gaps {
+                gaps.time_constant = found.fastest;
+            }
+            Ok(mended)
+        });
+        each.collect()
+    };
+    Ok((all(&fitted)?, all(&others)?))
+}
+
+/// A record with inputs held for at most `limit`; behind longer gaps its whole lacks the readings of `memory` \[s\].
+fn cut(record: &Record, limit: f64, memory: f64) -> Result<Mended, Error> {
+    let (parts, gaps) = record.without_gaps(limit);
+    let (whole, _) = record.without_gaps(f64::INFINITY);
+    let Some(mut whole) = whole.into_iter().next().filter(|_| !parts.is_empty()) else {
+        return Err(Error::NoStretch(missing_effect::Error::NoStretch {
+            record: record.name.clone(),
+            limit,
+        }));
+    };
+    let begin = whole.time.first().copied().unwrap_or(0.0);
+    let known = |t: f64| {
+        parts
+            .iter()
+            .any(|part| match (part.time.first(), part.time.last()) {
+                (Some(first), Some(last)) => {
+                    let from = if *first > begin {
+                        first + memory
+                    } else {
+                        *first
+                    };
+                    (from..=*last).contains(&t)
+                }
+                _ => false,
+            })
+    };
+    let unknown: Vec<bool> = whole.time.iter().map(|t| !known(*t)).collect();
+    for output in &mut whole.outputs {
+        for (value, unknown) in output.values.iter_mut().zip(&unknown) {
+            if *unknown {
+                *value = f64::NAN;
+            }
+        }
+    }
+    Ok(Mended {
+        whole,
+        parts,
+        gaps: Some(MendedGaps {
+            gaps,
+            time_constant: f64::NAN,
+            limit,
+        }),
+    })
+}
+
+/// Of a first fit, by SRIVC, of the highest order that is determined.
+fn time_constants(
+    records: &[Mended],
+    order: Order,
+    integrator: bool,
+) -> Result<TimeConstants, Error> {
+    let mut first_error = None;
+    for n in (1..=order.n).rev() {
+        let request = Request {
+            integrator,
+            ..Request::new(
+                Method::Srivc,
+                Order {
+                    n,
+                    m: order.m.min(n),
+                },
+            )
+        };
+        let found = match refined::plant(records, &request) {
+            Ok((plant, true)) => plant,
+            // The lowest order is better than nothing.
+            Ok((plant, false)) if n == 1 => plant,
+            Ok(_) => continue,
+            Err(error) => {
+                first_error.get_or_insert(error);
+                continue;
+            }
+        };
+        let a = if integrator {
+            &found.a[1..]
+        } else {
+            &found.a[..]
+        };
+        if a.len() < 2 {
+            // An integrator alone forgets nothing, and is as fast as it is filled.
+            let duration = records.iter().map(|mended| mended.whole.duration());
+            return Ok(TimeConstants {
+                fastest: duration.fold(f64::INFINITY, f64::min),
+                slowest: f64::INFINITY,
+            });
+        }
+        let poles = ct_lti::Polynomial::new(a.to_vec())?.roots()?;
+        let of = |size: fn(&ct_lti::Complex64) -> f64| poles.iter().map(move |p| 1.0 / size(p));
+        return Ok(TimeConstants {
+            fastest: of(|p| p.norm()).fold(f64::INFINITY, f64::min),
+            slowest: match integrator {
+                true => f64::INFINITY,
+                false => of(|p| p.re.abs()).fold(0.0, f64::max),
+            },
+        });
+    }
+    let name = records.first().map(|mended| mended.whole.name.clone());
+    let why = first_error.map_or_else(
+        || "it did not converge".to_owned(),
+        |error| error.to_string(),
+    );
+    Err(Error::FirstFit {
+        record: name.unwrap_or_default(),
+        why,
+    })
+}

@@ -1,0 +1,359 @@
+//! The methods that have to do with a loop: regressions, and closed-loop output error, batch and recursive. Without a controller they
+//! identify in open loop.
+
+mod batch;
+mod levels;
+mod recursion;
+mod regression;
+
+use ct_signals::Record;
+use fcloe::{
+    ClosedLoop, Condition, Controller, LoopHealth, LoopRecord, LoopSimulator, Mismatch, NoisePath,
+    Offsets, Orders, PlantModel, Problem, Stop,
+};
+
+use missing_effect::Parameter;
+use serde::Serialize;
+
+use crate::{
+    Error, Identification, Method, Order, Request, Shown, Trajectory,
+    checks::positive,
+    parameters::{names, plant, poles},
+    residual::{deviation, errors, rms},
+    warnings::{doubtful, too_fast},
+};
+pub use levels::LevelChoice;
+
+/// Points of the picture of condition (14).
+const POINTS: usize = 240;
+/// A controller that misses more than this share of the command is said.
+const MISSED: f64 = 0.03;
+/// A command at its limits for more than this share of the rows is said.
+const LIMITED: f64 = 0.01;
+
+/// A simulation error below this share of the output's deviation is not compared with another.
+const SURELY_GOOD: f64 = 0.02;
+/// So many times the simulation error of the batch fit says that the end of a recursion is not the plant of the record.
+const MUCH_WORSE: f64 = 1.5;
+
+/// What a method that has to do with the loop says besides the model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InLoop {
+    /// R of the controller from the constant on, in s; empty in open loop.
+    pub r: Vec<f64>,
+    /// S of the controller.
+    pub s: Vec<f64>,
+    /// What the zero of the signals was taken from.
+    pub levels_from: LevelChoice,
+    /// The levels: of the reference (of the input in open loop), and of the output.
+    pub levels: [f64; 2],
+    /// How far the controller is from the command that was measured, if it is.
+    pub mismatch: Option<Mismatch>,
+    /// Where the fit or the recursion began.
+    pub start: Start,
+    /// Of a batch fit.
+    pub batch: Option<Batch>,
+    /// Memory of a recursion, `1/eta`, s.
+    pub memory: Option<f64>,
+    /// Of a recursion, at its end.
+    pub health: Option<LoopHealth>,
+    /// Condition (14) of a recursion with the filter of the start, if the estimates are the plant; not where it is doubtful that they are.
+    pub convergence: Option<Convergence>,
+}
+
+/// Where an estimate began.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Start {
+    /// What gave it.
+    pub from: &'static str,
+    /// Bandwidth of the filter that it began with, 1/s.
+    pub bandwidth: f64,
+    /// a_1 to a_n, b_0 to b_m.
+    pub theta: Vec<f64>,
+}
+
+/// How a batch fit ended.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Batch {
+    /// Why.
+    pub stop: Stop,
+    /// Steps.
+    pub iterations: usize,
+    /// Starts that were tried.
+    pub starts: usize,
+    /// Where the noise enters, as the residual tells.
+    pub noise: NoisePath,
+    /// Standard errors for a residual that is white, for comparison.
+    pub white_std_errors: Vec<f64>,
+}
+
+/// Condition (14) between P^ of a start and P of an end.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Convergence {
+    /// The answer.
+    #[serde(flatten)]
+    pub condition: Condition,
+    /// `P^/P - 1/2`: frequency in rad/s, real and imaginary part.
+    pub locus: Vec<(f64, f64, f64)>,
+}
+
+/// A record, its loop, and what is asked.
+struct Task<'a> {
+    record: &'a Record,
+    request: &'a Request,
+    controller: Controller,
+    orders: Orders,
+}
+
+/// What a method gives.
+struct Found {
+    plant: PlantModel,
+    std_errors: Vec<Option<f64>>,
+    record: LoopRecord,
+    levels: [f64; 2],
+    levels_from: LevelChoice,
+    start: Start,
+    batch: Option<Batch>,
+    recursion: Option<Run>,
+    warnings: Vec<String>,
+}
+
+/// How a recursion went.
+struct Run {
+    trajectory: Trajectory,
+    health: LoopHealth,
+    memory: f64,
+}
+
+/// Identifies; everything that [`crate::identify()`] refuses, and what `fcloe` refuses.
+pub(super) fn identify(record: &Record, request: &Request) -> Result<Identification, Error> {
+    positive("--memory", "s", request.memory)?;
+    positive("--bandwidth", "1/s", request.bandwidth)?;
+    let Order { n, m } = request.order;
+    let task = Task {
+        record,
+        request,
+        controller: request.controller.clone().unwrap_or_else(Controller::none),
+        orders: Orders { n, m },
+    };
+    task.identify().map_err(|error| task.named(error))
+}
+
+impl Task<'_> {
+    fn identify(&self) -> Result<Identification, Error> {
+        // What is refused is the same for all methods.
+        let centred = self.centred(self.offsets_at_rest()?)?;
+        let problem = Problem::new(
+            std::slice::from_ref(&centred),
+            &self.controller,
+            self.orders,
+        )?;
+        let mismatch = problem.mismatches().first().copied().flatten();
+        let found = match self.request.method {
+            Method::Ls => self.regression(centred, false)?,
+            Method::Iv => self.regression(centred, true)?,
+            Method::RecursiveFcloe => self.recursion(centred)?,
+            _ => self.batch(centred)?,
+        };
+        self.result(found, mismatch)
+    }
+
+    fn centred(&self, offsets: Offsets) -> Result<LoopRecord, Error> {
+        Ok(LoopRecord::from_record(self.record, offsets)?)
+    }
+
+    /// What the loop does with a plant in it.
+    fn simulated(
+        &self,
+        record: &LoopRecord,
+        plant: &PlantModel,
+        [level, y_level]: [f64; 2],
+    ) -> Result<Vec<f64>, Error> {
+        ClosedLoop::new(plant, &self.controller)?.require_stable()?;
+        let (drive, hold) = record.drive(&self.controller)?;
+        let drive: Vec<f64> = drive.iter().map(|v| v - level).collect();
+        let mut model = LoopSimulator::new(plant, &self.controller, hold, record.step)?;
+        let (y, _) = model.outputs_and_inputs(&drive);
+        Ok(y.iter().map(|y| y + y_level).collect())
+    }
+
+    fn result(&self, found: Found, mismatch: Option<Mismatch>) -> Result<Identification, Error> {
+        let (record, order) = (self.record, self.request.order);
+        let simulated = self.simulated(&found.record, &found.plant, found.levels)?;
+        let named = names(order, record).into_iter().zip(found.plant.theta());
+        let parameters: Vec<Parameter> = named
+            .zip(&found.std_errors)
+            .map(|(((name, unit), value), std_error)| Parameter {
+                prior: None,
+                name,
+                unit,
+                value: *value,
+                std_error: *std_error,
+            })
+            .collect();
+        let plant = plant(&parameters, order);
+        let (time_constants, oscillations) = poles(&plant.a)?;
+        let output = &record.outputs[0];
+        let rmse = rms(errors(output, &simulated));
+        let deviation = deviation(output);
+        let mut warnings = found.warnings;
+        if self.request.levels == LevelChoice::Auto && found.levels_from == LevelChoice::Mean {
+            warnings.push(
+                "the record does not begin at rest: its means were taken for the levels, which biases the estimates; --method fcloe estimates the levels, --levels says them"
+                    .to_owned(),
+            );
+        }
+        warnings.extend(mismatch.and_then(|mismatch| missed(&mismatch)));
+        warnings.extend(limited(record, self.request.limits));
+        warnings.extend(doubtful(&parameters, order));
+        warnings.extend(too_fast(&time_constants, record, order));
+        let doubt = found
+            .recursion
+            .as_ref()
+            .and_then(|run| self.astray(&run.health, rmse, deviation, &record.outputs[0].unit));
+        let convergence = match self.request.method {
+            Method::Ls | Method::Iv => None,
+            _ if doubt.is_some() => None,
+            _ => Some(self.convergence(&found.start, &found.plant)?),
+        };
+        warnings.extend(doubt);
+        let memory = found.recursion.as_ref().map(|run| run.memory);
+        let recursion = found.recursion.map(|run| (run.trajectory, run.health));
+        let (trajectory, health) = recursion.unzip();
+        let of = |polynomial: &ct_lti::Polynomial| polynomial.coefficients().to_vec();
+        Ok(Identification {
+            schema: 1,
+            method: self.request.method,
+            order,
+            record: record.name.clone(),
+            settings: None,
+            parameters,
+            time_constants,
+            oscillations,
+            simulation_rmse: rmse,
+            fit_percent: 100.0 * (1.0 - rmse / deviation),
+            warnings,
+            trajectory,
+            in_loop: Some(InLoop {
+                r: of(self.controller.r()),
+                s: of(self.controller.s()),
+                levels_from: found.levels_from,
+                levels: found.levels,
+                mismatch,
+                start: found.start,
+                batch: found.batch,
+                memory,
+                health,
+                convergence,
+            }),
+            refined: None,
+            gaps: None,
+            drift: None,
+            plant,
+            shown: Shown {
+                time: record.time.clone(),
+                input: record.inputs[0].clone(),
+                output: record.outputs[0].clone(),
+                simulated,
+            },
+        })
+    }
+
+    /// Why the end of a recursion is not to be taken for the plant, if there is a reason: its loop was about to become unstable, or one
+    /// model for the whole record simulates it much better.
+    fn astray(&self, health: &LoopHealth, rmse: f64, deviation: f64, unit: &str) -> Option<String> {
+        let untold = "so condition (14) is not told";
+        if health.refused > 0 {
+            return Some(format!(
+                "{} steps were refused, as the loop would not have been stable: the estimates are not to be trusted, {untold}; compare with --method fcloe",
+                health.refused
+            ));
+        }
+        if rmse <= SURELY_GOOD * deviation {
+            return None;
+        }
+        let centred = self.centred(self.offsets_at_rest().ok()?).ok()?;
+        let batch = self.batch(centred).ok()?;
+        let simulated = self
+            .simulated(&batch.record, &batch.plant, batch.levels)
+            .ok()?;
+        let best = rms(errors(&self.record.outputs[0], &simulated));
+        (rmse > MUCH_WORSE * best).then(|| {
+            format!(
+                "--method fcloe simulates the record with an error of {best:.3} {unit} instead of {rmse:.3}: the plant drifts, or the recursion went astray, {untold}"
+            )
+        })
+    }
+
+    /// Condition (14) of a recursion with the filter of the start, if the end is the truth.
+    fn convergence(&self, start: &Start, end: &PlantModel) -> Result<Convergence, Error> {
+        let start = PlantModel::from_theta(self.orders, &start.theta)?;
+        let of = |plant| ClosedLoop::new(plant, &self.controller);
+        let (filter, truth) = (of(&start)?, of(end)?);
+        let (filter, truth) = (filter.characteristic(), truth.characteristic());
+        Ok(Convergence {
+            condition: Condition::new(filter, truth)?,
+            locus: fcloe::locus(filter, truth, POINTS)?,
+        })
+    }
+
+    /// The record's name before what the crate says, which does not always know it.
+    fn named(&self, error: Error) -> Error {
+        match error {
+            Error::Loop(fcloe::Error::ControllerMismatch { mismatch, size, .. }) => {
+                Error::ControllerMismatch {
+                    record: self.record.name.clone(),
+                    mismatch,
+                    size,
+                    unit: self.record.inputs[0].unit.clone(),
+                }
+            }
+            Error::Loop(fcloe::Error::Gaps {
+                missing,
+                left,
+                rows,
+                ..
+            }) => Error::MissingReadings {
+                record: self.record.name.clone(),
+                output: self.record.outputs[0].name.clone(),
+                missing,
+                left,
+                rows,
+                method: self.request.method,
+            },
+            Error::Loop(what) => {
+                let what = what.to_string();
+                let name = format!("{}: ", self.record.name);
+                Error::InRecord {
+                    record: self.record.name.clone(),
+                    what: what.strip_prefix(&name).unwrap_or(&what).to_owned(),
+                }
+            }
+            other => other,
+        }
+    }
+}
+
+/// The controller is a little off.
+fn missed(mismatch: &Mismatch) -> Option<String> {
+    let share = mismatch.systematic / mismatch.size;
+    (share > MISSED).then(|| {
+        format!(
+            "the controller misses {:.0} % of what the measured command does with the reference: its errors go straight into the estimates; check gain and integral_time",
+            100.0 * share
+        )
+    })
+}
+
+/// The command stands at its limits, where the loop is not linear.
+fn limited(record: &Record, (low, high): (f64, f64)) -> Option<String> {
+    let values = &record.inputs[0].values;
+    let at = values.iter().filter(|u| **u <= low || **u >= high).count();
+    let share = at as f64 / values.len().max(1) as f64;
+    (share > LIMITED).then(|| {
+        format!(
+            "the command is at its limits of {low} and {high} in {:.0} % of the rows: there the loop is not linear, and the estimates are biased",
+            100.0 * share
+        )
+    })
+}

@@ -1,0 +1,165 @@
+//! Closed-loop output error, sample by sample.
+
+use ct_rls::RecursiveEstimator;
+use fcloe::{
+    LoopRecord, LoopSample, Offsets, OperatingPoint, PlantModel, Problem, RecursiveFcloe,
+    RecursiveSettings,
+};
+
+use super::levels::chosen;
+use super::{Found, LevelChoice, Run, Start, Task};
+use crate::{Error, Trajectory, residual::rms};
+
+/// The part of the record that a recursion is started from.
+const BEGINNING: f64 = 0.3;
+/// The memory that is not asked for: this part of the record, and so many time constants.
+const MEMORY_PART: f64 = 0.2;
+const MEMORY_TIME_CONSTANTS: f64 = 10.0;
+
+impl Task<'_> {
+    /// Sample by sample, from what the beginning of the record gives.
+    pub(super) fn recursion(&self, record: LoopRecord) -> Result<Found, Error> {
+        let rows = ((BEGINNING * record.len() as f64) as usize).max(1);
+        let part =
+            |signal: &Option<Vec<f64>>| signal.as_ref().map(|v| v[..rows.min(v.len())].to_vec());
+        // Levels that are not to be found are those of the whole record: the means of its beginning are others.
+        let levels_from = chosen(&record);
+        let record = match self.finds_levels(&record) {
+            true => record,
+            false => LoopRecord {
+                offsets: Offsets::Known(record.operating_point()),
+                ..record
+            },
+        };
+        let beginning = LoopRecord {
+            r: part(&record.r),
+            u: part(&record.u),
+            y: record.y[..rows.min(record.len())].to_vec(),
+            ..record.clone()
+        };
+        let mut warnings = Vec::new();
+        let begun = Problem::new(
+            std::slice::from_ref(&beginning),
+            &self.controller,
+            self.orders,
+        )
+        .map_err(Error::from)
+        .and_then(|_| self.begun(beginning));
+        let begun = match begun {
+            Ok(begun) => begun,
+            Err(_) => {
+                warnings.push(
+                    "the first rows do not tell a start: it was taken from the whole record, so the recursion knows what it has not seen yet"
+                        .to_owned(),
+                );
+                self.begun(record.clone())?
+            }
+        };
+        let [drive_level, y_level] = begun.levels;
+        let point = OperatingPoint {
+            r: drive_level,
+            u: drive_level,
+            y: y_level,
+        };
+        let record = LoopRecord {
+            offsets: Offsets::Known(point),
+            ..record
+        };
+        let start = begun.plant;
+        let memory = self.memory(&record, &start);
+        let settings = self.recursive_settings(&record, memory, point)?;
+        let mut estimator = RecursiveFcloe::new(&start, &self.controller, settings)?;
+        let parameters = start.theta().len();
+        let mut trajectory = Trajectory {
+            time: Vec::with_capacity(record.len()),
+            samples: Vec::with_capacity(record.len()),
+            values: vec![Vec::with_capacity(record.len()); parameters],
+            std_errors: vec![Vec::with_capacity(record.len()); parameters],
+        };
+        let (drive, _) = record.drive(&self.controller)?;
+        for (k, (&drive, &y)) in drive.iter().zip(&record.y).enumerate() {
+            estimator.update(&LoopSample { drive, y }, record.step);
+            trajectory.time.push(self.record.time[k]);
+            trajectory.samples.push(k);
+            let (covariance, rms) = (estimator.covariance(), estimator.residual_rms());
+            for (i, theta) in estimator.theta().iter().enumerate() {
+                trajectory.values[i].push(*theta);
+                trajectory.std_errors[i].push(covariance[(i, i)].max(0.0).sqrt() * rms);
+            }
+        }
+        let last = |errors: &Vec<f64>| errors.last().copied().filter(|e| e.is_finite());
+        Ok(Found {
+            plant: estimator.plant()?,
+            std_errors: trajectory.std_errors.iter().map(last).collect(),
+            levels: begun.levels,
+            levels_from: match begun.levels_from {
+                LevelChoice::Estimated => LevelChoice::Estimated,
+                _ => levels_from,
+            },
+            start: Start {
+                theta: start.theta().to_vec(),
+                ..begun.start
+            },
+            batch: None,
+            recursion: Some(Run {
+                trajectory,
+                health: estimator.loop_health()?,
+                memory,
+            }),
+            record,
+            warnings,
+        })
+    }
+
+    /// Whether the levels are to be found with the start.
+    fn finds_levels(&self, record: &LoopRecord) -> bool {
+        record.offsets == Offsets::Means && self.request.levels == LevelChoice::Auto
+    }
+
+    /// What a recursion starts from: the batch fit where it has to find the levels too, else the best regression.
+    fn begun(&self, record: LoopRecord) -> Result<Found, Error> {
+        if self.finds_levels(&record) {
+            let mut found = self.batch(record)?;
+            found.start.from = "output error of the first rows";
+            return Ok(found);
+        }
+        let found = self.regression(record.clone(), true);
+        match found {
+            // Filters do not run through long gaps; the simulation of the output error does.
+            Err(Error::Loop(fcloe::Error::Gaps { .. })) => self.batch(record),
+            found => found,
+        }
+    }
+
+    /// Those of `fcloe`, for the amplitude of this loop.
+    fn recursive_settings(
+        &self,
+        record: &LoopRecord,
+        memory: f64,
+        point: OperatingPoint,
+    ) -> Result<RecursiveSettings, Error> {
+        let (drive, _) = record.drive(&self.controller)?;
+        let mean = drive.iter().sum::<f64>() / drive.len().max(1) as f64;
+        let power = rms(drive.iter().map(|v| v - mean)).powi(2);
+        // They were tried on loops of the first and the second order.
+        let (gain, step_limit) = match self.orders.n {
+            1 => (10.0, 0.05),
+            _ => (1.0, 0.02),
+        };
+        Ok(RecursiveSettings {
+            operating_point: point,
+            ..RecursiveSettings::new(gain / power, 1.0 / memory, f64::INFINITY, step_limit)
+        })
+    }
+
+    /// What was asked for; else a part of the record, and enough of the plant's time constants. It does not fade, as parameters that
+    /// drift are followed by forgetting alone.
+    fn memory(&self, record: &LoopRecord, start: &PlantModel) -> f64 {
+        let n = self.orders.n;
+        let theta = start.theta();
+        let slowest = theta[0].abs().max(theta[n - 1].abs().powf(1.0 / n as f64));
+        let duration = record.step * record.len() as f64;
+        let own = (MEMORY_PART * duration).max(MEMORY_TIME_CONSTANTS * slowest);
+        self.request.memory.unwrap_or(own)
+    }
+}

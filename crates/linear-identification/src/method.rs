@@ -1,0 +1,52 @@
+//! The methods.
+
+use serde::Serialize;
+
+/// How the parameters are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Recursive output error, stabilised by an adaptive error filter that is kept within bounds
+    StabilizedOe,
+    /// Recursive least squares on the filtered equation
+    CtRls,
+    /// Least squares on filtered signals, of the whole record: biased by noise, a start for the others
+    Ls,
+    /// Instruments simulated in the loop, of the whole record
+    Iv,
+    /// Closed-loop output error of the whole record: the loop is simulated from the reference; without a controller output error
+    Fcloe,
+    /// The same, recursively
+    RecursiveFcloe,
+    /// Refined instruments for white noise; where the reference moves those of a loop, whatever its controller (CLSRIVC)
+    Srivc,
+    /// Refined instruments with an autoregressive model of the noise (CLRIVC in a loop)
+    Rivc,
+}
+
+impl Method {
+    /// As it is typed.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::StabilizedOe => "stabilized-oe",
+            Self::CtRls => "ct-rls",
+            Self::Ls => "ls",
+            Self::Iv => "iv",
+            Self::Fcloe => "fcloe",
+            Self::RecursiveFcloe => "recursive-fcloe",
+            Self::Srivc => "srivc",
+            Self::Rivc => "rivc",
+        }
+    }
+
+    /// Whether it has to do with the loop's controller.
+    pub fn is_of_loop(self) -> bool {
+        !matches!(self, Self::StabilizedOe | Self::CtRls) && !self.is_refined()
+    }
+
+    /// Whether it is SRIVC or RIVC: with delays, integrators, a second input, several records.
+    pub fn is_refined(self) -> bool {
+        matches!(self, Self::Srivc | Self::Rivc)
+    }
+}

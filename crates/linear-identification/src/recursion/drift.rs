@@ -1,0 +1,186 @@
+//! Whether the estimates move with the level: near one level any process is linear, so that a model which holds at one level and not at
+//! another says that the process is not linear, or not of this order.
+//!
+//! What the recursion says at a time belongs to the mean of the output as the recursion remembers it,
+//! ```text
+//! level(t) = int y e^{-eta (t - s)} ds / int e^{-eta (t - s)} ds
+//! ```
+//! The way of the level is cut into equal stretches, and the estimates of each are averaged.
+//!
+//! That they stand still says something only where the level has moved: where the memory is a small part of the record, and what it
+//! remembers covers a good part of the output's range. A shorter record cannot tell.
+
+use serde::Serialize;
+
+use super::scaled::Scaled;
+use crate::{Order, Trajectory};
+
+/// Stretches of the level.
+const STRETCHES: usize = 8;
+
+/// The estimates move with the level where the ends of its way are so many standard errors apart.
+const APART: f64 = 3.0;
+
+/// The longest memory, of the record's length, and the least way of the remembered level, of the output's range, with which estimates
+/// that stand still say something. The default memory of a record that is long enough is a fifth of it.
+const LONGEST_MEMORY: f64 = 0.21;
+const LEAST_WAY: f64 = 0.2;
+
+/// Gain and time constant over the level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Drift {
+    /// Mean output that the recursion remembers, in the output's unit, rising.
+    pub level: Vec<f64>,
+    /// Static gain `b_0` there.
+    pub gain: OverLevel,
+    /// `a_1`: the time constant for n = 1, otherwise the sum of the time constants, s.
+    pub time_constant: OverLevel,
+    /// Memory over the length of the record.
+    pub memory_part: f64,
+    /// Way of the level that is remembered, over the output's range.
+    pub level_part: f64,
+}
+
+impl Drift {
+    /// Whether gain or time constant move more than chance would have it.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.gain.moves() || self.time_constant.moves()
+    }
+
+    /// Whether the level has moved enough for estimates that stand still to say that the process is linear.
+    #[must_use]
+    pub fn tells(&self) -> bool {
+        self.memory_part <= LONGEST_MEMORY && self.level_part >= LEAST_WAY
+    }
+}
+
+/// One parameter over the level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OverLevel {
+    /// Its values.
+    pub values: Vec<f64>,
+    /// Their standard errors.
+    pub std_errors: Vec<f64>,
+    /// Difference between the highest and the lowest level, in its standard errors. The two estimates are taken for independent; where
+    /// they share data the difference is known better than that.
+    pub difference: f64,
+}
+
+impl OverLevel {
+    fn new(stretches: &[&Stretch], of: impl Fn(&Stretch) -> (f64, f64)) -> Self {
+        let (values, std_errors): (Vec<f64>, Vec<f64>) = stretches.iter().map(|s| of(s)).unzip();
+        let ends = [0, values.len().saturating_sub(1)].map(|i| (values[i], std_errors[i]));
+        let [(low, low_error), (high, high_error)] = ends;
+        Self {
+            difference: (high - low) / low_error.hypot(high_error),
+            values,
+            std_errors,
+        }
+    }
+
+    /// Whether it moves more than chance would have it.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.difference.abs() > APART
+    }
+
+    /// The values at the lowest and the highest level.
+    #[must_use]
+    pub fn ends(&self) -> Option<[(f64, f64); 2]> {
+        let at = |i: usize| Some((*self.values.get(i)?, *self.std_errors.get(i)?));
+        Some([at(0)?, at(self.values.len().checked_sub(1)?)?])
+    }
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Stretch {
+    count: f64,
+    level: f64,
+    gain: (f64, f64),
+    time_constant: (f64, f64),
+}
+
+impl Stretch {
+    fn add(&mut self, level: f64, gain: (f64, f64), time_constant: (f64, f64)) {
+        self.count += 1.0;
+        let share = 1.0 / self.count;
+        let move_to = |mean: &mut f64, value: f64| *mean += share * (value - *mean);
+        move_to(&mut self.level, level);
+        for (mean, value) in [
+            (&mut self.gain, gain),
+            (&mut self.time_constant, time_constant),
+        ] {
+            move_to(&mut mean.0, value.0);
+            move_to(&mut mean.1, value.1);
+        }
+    }
+}
+
+/// Nothing where the level stands, or where too little has been seen for standard errors.
+pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order) -> Option<Drift> {
+    let levels = remembered(scaled);
+    let at = |i: usize, k: usize| (trajectory.values[i][k], trajectory.std_errors[i][k]);
+    let settled = trajectory.settled();
+    let points: Vec<_> = trajectory
+        .time
+        .iter()
+        .zip(&trajectory.samples)
+        .enumerate()
+        .filter(|(_, (time, _))| **time >= settled)
+        .map(|(k, (_, &sample))| (levels[sample], at(order.n, k), at(0, k)))
+        .filter(|(_, gain, time_constant)| gain.1.is_finite() && time_constant.1.is_finite())
+        .collect();
+    let of = |pick: fn(f64, f64) -> f64, from| points.iter().map(|p| p.0).fold(from, pick);
+    let (low, high) = (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY));
+    // Without points: from infinity down to minus infinity.
+    if high <= low {
+        return None;
+    }
+    let mut stretches = [Stretch::default(); STRETCHES];
+    for (level, gain, time_constant) in points {
+        let place = (STRETCHES as f64 * (level - low) / (high - low)) as usize;
+        stretches[place.min(STRETCHES - 1)].add(level, gain, time_constant);
+    }
+    let range = scaled
+        .y
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
+            (low.min(*y), high.max(*y))
+        });
+    let duration = scaled.time.last().copied().unwrap_or(f64::NAN);
+    let seen: Vec<&Stretch> = stretches.iter().filter(|s| s.count > 0.0).collect();
+    let drift = Drift {
+        level: seen.iter().map(|s| scaled.output(s.level)).collect(),
+        gain: OverLevel::new(&seen, |s| s.gain),
+        time_constant: OverLevel::new(&seen, |s| s.time_constant),
+        memory_part: 1.0 / (scaled.eta * duration),
+        level_part: (high - low) / (range.1 - range.0),
+    };
+    // one stretch alone, or standard errors of 0: nothing to compare
+    let known = [&drift.gain, &drift.time_constant].map(|over| over.difference.is_finite());
+    (known == [true, true]).then_some(drift)
+}
+
+/// The level that is remembered at every sample, scaled.
+fn remembered(scaled: &Scaled) -> Vec<f64> {
+    let (mut level, mut length) = (0.0, 0.0);
+    let mut levels = Vec::with_capacity(scaled.y.len());
+    for (y, step) in scaled.y.iter().zip(scaled.steps()) {
+        if y.is_nan() {
+            levels.push(level);
+            continue;
+        }
+        let faded = (-scaled.eta * step).exp();
+        // in units of the memory: the whole past comes to 1
+        let new = 1.0 - faded;
+        length = faded * length + new;
+        if length > 0.0 {
+            level += new / length * (y - level);
+        } else {
+            level = *y;
+        }
+        levels.push(level);
+    }
+    levels
+}

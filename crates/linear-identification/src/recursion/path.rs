@@ -1,0 +1,105 @@
+//! The way of a recursion over a record.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::scaled::Scaled;
+use crate::{Error, Order};
+
+/// Points of the way that are kept.
+const POINTS: usize = 500;
+
+/// Where the recursion was.
+#[derive(Debug, Clone)]
+pub(super) struct Point {
+    /// Which sample.
+    pub sample: usize,
+    /// In which there were readings, scaled.
+    pub time: f64,
+    pub theta: DVector<f64>,
+    /// `P^-1`
+    pub information: DMatrix<f64>,
+}
+
+/// Its way over the record.
+#[derive(Debug, Clone)]
+pub(super) struct Path {
+    pub order: Order,
+    pub points: Vec<Point>,
+    /// Bounds on the parameters have acted in the second half: the scatter of the estimates says nothing of their errors then.
+    pub held: bool,
+    pub warnings: Vec<String>,
+}
+
+impl Path {
+    pub fn new(order: Order) -> Self {
+        Self {
+            order,
+            points: Vec::new(),
+            held: false,
+            warnings: Vec::new(),
+        }
+    }
+
+    pub fn last(&self) -> Result<&Point, Error> {
+        self.points.last().ok_or(Error::NoSample)
+    }
+
+    pub fn keep(
+        &mut self,
+        (sample, time): (usize, f64),
+        theta: &[f64],
+        covariance: DMatrix<f64>,
+    ) -> Result<(), Error> {
+        let information = covariance
+            .try_inverse()
+            .filter(|information| information.iter().all(|x| x.is_finite()))
+            .ok_or(Error::Untold { order: self.order })?;
+        self.points.push(Point {
+            sample,
+            time,
+            theta: DVector::from_column_slice(theta),
+            information,
+        });
+        Ok(())
+    }
+}
+
+/// Whether the k-th of `count` samples is kept.
+pub(super) fn is_kept(k: usize, count: usize) -> bool {
+    k + 1 == count || k.is_multiple_of(count.div_ceil(POINTS))
+}
+
+/// The time of the rows that were learnt from, and how many these are.
+pub(super) struct Learnt {
+    time: f64,
+    pub rows: usize,
+    /// Whether all readings are there: then the time is the record's own, to the last digit.
+    whole: bool,
+}
+
+impl Learnt {
+    pub fn of(scaled: &Scaled) -> Self {
+        Self {
+            time: 0.0,
+            rows: 0,
+            whole: scaled.y.iter().all(|y| !y.is_nan()),
+        }
+    }
+
+    /// At a sample.
+    pub fn time(&self, k: usize, scaled: &Scaled) -> f64 {
+        if self.whole {
+            scaled.time[k]
+        } else {
+            self.time
+        }
+    }
+
+    /// A row that was held for a time, and whether it was learnt from.
+    pub fn after(&mut self, learnt: bool, held: f64) {
+        if learnt {
+            self.time += held;
+            self.rows += 1;
+        }
+    }
+}

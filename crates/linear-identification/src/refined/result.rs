@@ -1,0 +1,37 @@
+//! What SRIVC and RIVC say besides the model.
+
+use serde::Serialize;
+
+/// What SRIVC and RIVC say besides the model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Refined {
+    /// SRIVC, RIVC, CLSRIVC or CLRIVC.
+    pub name: &'static str,
+    /// Whether `A(0) = 0`.
+    pub integrator: bool,
+    /// Delay of each input, s.
+    pub delays: Vec<f64>,
+    /// Records that were fitted.
+    pub records: Vec<String>,
+    /// Names of the inputs.
+    pub inputs: Vec<String>,
+    /// Noise of each record.
+    pub noise: Vec<RecordNoise>,
+    /// Rows of each record that do not count, as the inputs before the record are not known under the delays.
+    pub left_out: Vec<usize>,
+    /// In a loop: share of the input's power that the reference explains.
+    pub explained: Option<f64>,
+    /// Iterations.
+    pub iterations: usize,
+    /// Whether the estimates have converged.
+    pub converged: bool,
+}
+
+/// The noise of a record, an autoregression counted in samples: of the residual for SRIVC.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecordNoise {
+    /// Its coefficients; none where it is white.
+    pub coefficients: Vec<f64>,
+    /// Standard deviation of what drives it, output unit.
+    pub deviation: f64,
+}

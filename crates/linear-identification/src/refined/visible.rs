@@ -1,0 +1,88 @@
+//! Whether an input, or in a loop the reference, shows in the simulation error.
+
+use ct_signals::{Record, quoted, residual_tests};
+
+use crate::{Error, Shown};
+
+/// Lags of the test that the error has nothing of a signal, at most.
+const MOST_LAGS: usize = 25;
+/// A signal that shows in the error with less than this probability by chance is said.
+const UNLIKELY: f64 = 0.01;
+
+/// The parts of a record, one behind the other.
+#[derive(Default)]
+pub(super) struct Joined {
+    pub shown: Shown,
+    /// Of the signals that must not show in the error, and the error; with rows without a value between the parts.
+    signals: Vec<ct_signals::Channel>,
+    error: Vec<f64>,
+    pub readings: Vec<f64>,
+}
+
+impl Joined {
+    /// In open loop every input is held against the error, in a loop the reference, as the input answers to the noise there.
+    pub fn add(&mut self, record: &Record, in_loop: bool, error: impl Iterator<Item = f64>) {
+        let signals: Vec<&ct_signals::Channel> = match record.references.first().filter(|_| in_loop)
+        {
+            Some(reference) => vec![reference],
+            None => record.inputs.iter().collect(),
+        };
+        let between = match self.signals.is_empty() {
+            true => 0,
+            false => MOST_LAGS,
+        };
+        if self.signals.is_empty() {
+            self.signals = signals.iter().map(|s| s.with_values(Vec::new())).collect();
+            self.shown.input = record.inputs[0].with_values(Vec::new());
+            self.shown.output = record.outputs[0].with_values(Vec::new());
+        }
+        let nothing = || std::iter::repeat_n(f64::NAN, between);
+        for (own, signal) in self.signals.iter_mut().zip(signals) {
+            own.values.extend(nothing());
+            own.values.extend(&signal.values);
+        }
+        self.error.extend(nothing());
+        self.error.extend(error);
+        self.shown.time.extend(&record.time);
+        self.shown.input.values.extend(&record.inputs[0].values);
+        self.shown.output.values.extend(&record.outputs[0].values);
+    }
+}
+
+/// The signal that shows most in the simulation errors.
+#[derive(Default)]
+pub(super) struct Visible {
+    tests: usize,
+    least: Option<(f64, String)>,
+}
+
+impl Visible {
+    pub fn test(&mut self, joined: &Joined) -> Result<(), Error> {
+        let lags = (joined.readings.len() / 10).clamp(2, MOST_LAGS);
+        for signal in &joined.signals {
+            let (_, p) =
+                residual_tests::prewhitened_input_test(&signal.values, &joined.error, lags)?;
+            self.tests += 1;
+            if self.least.as_ref().is_none_or(|(least, _)| p < *least) {
+                self.least = Some((p, signal.name.clone()));
+            }
+        }
+        Ok(())
+    }
+
+    pub fn warning(self, inputs: usize) -> Option<String> {
+        let (p, name) = self.least?;
+        let several = match inputs {
+            1 => "",
+            _ => {
+                " (one A serves all inputs, so that time constants that differ need a higher order)"
+            }
+        };
+        (p * (self.tests as f64) < UNLIKELY).then(|| {
+            format!(
+                "\"{}\" shows in the simulation error: the order is too low{several}, there is a delay (try --delay auto), or the plant is not linear; the standard errors do not hold then",
+                quoted(&name)
+            )
+        })
+    }
+}

@@ -1,0 +1,43 @@
+//! What may be asked for.
+
+use crate::{DelayChoice, LevelChoice, Method, Order};
+
+/// What may be asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// The method.
+    pub method: Method,
+    /// The order.
+    pub order: Order,
+    /// Memory of the recursion, s; found where not given.
+    pub memory: Option<f64>,
+    /// Bandwidth of the state variable filters, 1/s; found where not given.
+    pub bandwidth: Option<f64>,
+    /// The controller of the loop, time in s; for the methods that have to do with it. Without one they work in open loop.
+    pub controller: Option<fcloe::Controller>,
+    /// Where zero is; for the same methods.
+    pub levels: LevelChoice,
+    /// Smallest and largest command, in the input's unit; infinite where there is none.
+    pub limits: (f64, f64),
+    /// Delay of the inputs; none where nothing is said. For SRIVC and RIVC.
+    pub delay: Option<DelayChoice>,
+    /// Whether `A(0) = 0`; for the same methods.
+    pub integrator: bool,
+}
+
+impl Request {
+    /// Everything else found, in open loop.
+    pub fn new(method: Method, order: Order) -> Self {
+        Self {
+            method,
+            order,
+            memory: None,
+            bandwidth: None,
+            controller: None,
+            levels: LevelChoice::Auto,
+            limits: (f64::NEG_INFINITY, f64::INFINITY),
+            delay: None,
+            integrator: false,
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! Sizes of signals and of simulation errors.
+
+use ct_signals::Channel;
+
+/// Measured less simulated, where there are readings.
+pub(crate) fn errors<'a>(
+    output: &'a Channel,
+    simulated: &'a [f64],
+) -> impl Iterator<Item = f64> + 'a {
+    let pairs = output.values.iter().zip(simulated);
+    pairs
+        .filter(|(y, _)| !y.is_nan())
+        .map(|(y, model)| y - model)
+}
+
+/// Root mean square of an output's readings about their mean.
+#[must_use]
+pub fn deviation(output: &Channel) -> f64 {
+    let readings = output.present().count();
+    let mean = output.present().sum::<f64>() / readings.max(1) as f64;
+    rms(output.present().map(|y| y - mean))
+}
+
+/// Root of the mean square.
+pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0_usize), |(sum, count), value| {
+        (sum + value * value, count + 1)
+    });
+    (sum / count.max(1) as f64).sqrt()
+}
+
+/// Smallest and largest of all finite values; 0 and 1 where there are none.
+pub(crate) fn limits(values: &[f64]) -> (f64, f64) {
+    let finite = values.iter().filter(|value| value.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
+        (low.min(value), high.max(value))
+    });
+    if low <= high { (low, high) } else { (0.0, 1.0) }
+}

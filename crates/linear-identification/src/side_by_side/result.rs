@@ -1,0 +1,95 @@
+//! What came of all methods.
+
+use missing_effect::{MendedGaps, Parameter};
+use serde::Serialize;
+
+use crate::{Method, Order, Shown};
+
+/// What came of all methods.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SideBySide {
+    /// Version of this record.
+    pub schema: u32,
+    /// Name of the record.
+    pub record: String,
+    /// The record comes from a loop with a known controller: errors on the measured command do not rank the methods.
+    pub in_loop: bool,
+    /// What was done about missing rows and samples of the input; nothing where there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gaps: Option<MendedGaps>,
+    /// Names of the records that were not fitted.
+    pub test: Vec<String>,
+    /// One for each method, of the order with the least BIC; best simulation first, then those that were refused.
+    pub methods: Vec<Row>,
+    /// All methods with all orders, where there are several orders.
+    pub orders: Vec<Row>,
+    /// The record.
+    #[serde(skip)]
+    pub shown: Shown,
+}
+
+/// A method with an order.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// The method.
+    pub method: Method,
+    /// The order.
+    pub order: Order,
+    /// Wall time beside the others, s.
+    pub seconds: f64,
+    /// What the method assumes.
+    pub assumes: &'static str,
+    /// What it found.
+    pub found: Option<Outcome>,
+    /// Why it found nothing.
+    pub refused: Option<String>,
+}
+
+/// What a method found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outcome {
+    /// a_1 to a_n, b_0 to b_m, and an offset where the method estimates one.
+    pub parameters: Vec<Parameter>,
+    /// Time constants of the real poles, s.
+    pub time_constants: Vec<f64>,
+    /// Simulation error on the record, root mean square, output unit.
+    pub rmse: f64,
+    /// 100 (1 - rmse over the standard deviation of the output), %.
+    pub fit_percent: f64,
+    /// The same on the records that were not fitted, all together.
+    pub test_rmse: Option<f64>,
+    /// %; nothing where the outputs stand still.
+    pub test_fit_percent: Option<f64>,
+    /// Whether all parameters differ significantly from zero, as far as standard errors are known, and no time constant is shorter than a step.
+    pub determined: bool,
+    /// See the module.
+    pub bic: f64,
+    /// See the module.
+    pub yic: Option<f64>,
+    /// p-value of the Ljung-Box test of the simulation error.
+    pub whiteness_p: f64,
+    /// p-value of the test that the simulation error holds nothing of the input.
+    pub input_p: f64,
+    /// Which assumptions the record violates, in words.
+    pub violated: Vec<String>,
+    /// What the method itself says of doubts.
+    pub warnings: Vec<String>,
+    /// The simulated output.
+    #[serde(skip)]
+    pub simulated: Vec<f64>,
+}
+
+impl Row {
+    /// What makes one order better than another: less is better.
+    pub(super) fn key(&self) -> (bool, f64) {
+        let found = self.found.as_ref();
+        found.map_or((true, f64::INFINITY), |found| {
+            (!found.determined, found.bic)
+        })
+    }
+
+    pub(super) fn rmse(&self) -> f64 {
+        let found = self.found.as_ref();
+        found.map_or(f64::INFINITY, |found| found.rmse)
+    }
+}

@@ -1,0 +1,150 @@
+//! What a confirmed set of effects is still held against: the colour of each model's own residual, a jump of the reading, and
+//! any course of time.
+
+use greybox::{Fit, coloured};
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    accept::{
+        groups::NEARLY,
+        jump::{Jump, jump},
+        random_walk::{Walk, beyond_random_walk},
+    },
+    diagnostics::remains::remains,
+    fit::{
+        criterion::{BIC_MARGIN, beyond_chance},
+        node::{FINE, Node, ROUGH, STOPPING, best_first, fitted, refine, without, without_clock},
+        noise_model::NOISE_ORDER,
+    },
+    search::{confirm::confirm, find::Found, growth::by_clock},
+};
+
+/// What a doubt leaves.
+pub(crate) struct Doubted<'a> {
+    pub confirmed: Node<'a>,
+    /// The believed model with the colour of its own residual.
+    pub own_base: Fit,
+    /// The jump that explains more than what was confirmed.
+    pub jumped: Option<Jump>,
+}
+
+/// Takes from what is confirmed what something simpler explains as well; `in_loop`: the records come from a loop that is not simulated.
+pub(crate) fn doubt<'a>(
+    base: &Node<'a>,
+    found: &Found<'a>,
+    in_loop: bool,
+) -> Result<Doubted<'a>, Error> {
+    let noise = &found.noise;
+    let mut confirmed = found.confirmed.clone();
+    // Each model with the colour of its own residual: what a coloured noise explains needs no effect. The richest model has
+    // taken a part of a slow noise for effects, and the colour that it leaves is too fast: chance is counted here too.
+    let own = |node: &Node<'a>| coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING);
+    let (own_base, own_last) = rayon::join(|| own(base), || own(&confirmed));
+    let (own_base, own_last) = (own_base?, own_last?);
+    let in_own = |node: &Node<'a>, fit: &Fit| Node {
+        fit: fit.clone(),
+        ..node.clone()
+    };
+    let (bare, rich) = (in_own(base, &own_base), in_own(&confirmed, &own_last));
+    let needed_in_colour = rich.gain_over(&bare) >= BIC_MARGIN && beyond_chance(&rich, &bare);
+    if !confirmed.added.is_empty() && !needed_in_colour {
+        confirmed = found.base.clone();
+    }
+    // What is claimed has to be better than the simplest course of which no effect is the cause.
+    let jumped = if confirmed.added.is_empty() {
+        None
+    } else {
+        jump(&found.base, noise)?.filter(|jump| jump.bic < confirmed.fit.bic())
+    };
+    if jumped.is_some() {
+        confirmed = found.base.clone();
+    }
+    // Noise that wanders bends to gains and saturations too, as their inputs are slow.
+    let beyond_small_walk = |node: &Node| {
+        Ok::<_, Error>(
+            node.added.is_empty() || beyond_random_walk(node, base, Walk::SMALL_FROM_ZERO)?,
+        )
+    };
+    if !beyond_small_walk(&confirmed)? {
+        confirmed = found.base.clone();
+    }
+    // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
+    // explain as much, and where the other effects of the set are called for without them: what only corrects an imitation is not. Where
+    // white noise is left this is not asked, since an imitation hardly ever leaves white noise.
+    if by_clock(&confirmed) {
+        let others = without_clock(&confirmed, noise)?;
+        let count = others.added.len();
+        let by_walk = !(beyond_random_walk(&confirmed, &others, Walk::ANY)?
+            && beyond_random_walk(&confirmed, &others, Walk::SMALL)?);
+        let white = own_last.noise.order() == 0;
+        let others = confirm(others, noise)?;
+        if by_walk
+            || (others.added.len() < count && !white)
+            || remains(&confirmed, &own_last)?.is_some()
+        {
+            confirmed = others;
+        }
+    }
+    if in_loop {
+        if let Some(position) = confirmed.narrow_stiction() {
+            confirmed = confirm(without(&confirmed, position, noise, FINE)?, noise)?;
+        }
+        if by_clock(&confirmed)
+            && let Some(simpler) = simpler(&confirmed, found)
+        {
+            confirmed = simpler;
+        }
+    }
+    // What was made smaller since is no longer what was held against it.
+    if !beyond_small_walk(&confirmed)? {
+        confirmed = found.base.clone();
+    }
+    Ok(Doubted {
+        confirmed,
+        own_base,
+        jumped,
+    })
+}
+
+/// The best smaller set without effects that follow time alone all of which are called for, and which leaves noise, nearly as little of
+/// it; `None` where there is none.
+///
+/// In a loop the command answers to every disturbance, and the likelihood of a model that runs on the measured command is biased by as
+/// much as a few effects gain. A valve that sticks is then imitated by a pump that saturates and an outlet that changes at the instant of
+/// a slip: chosen instants and limits meet the noise better than what the valve is bound to do.
+fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Option<Node<'a>> {
+    if confirmed
+        .setup
+        .leaves_out("smaller sets in the place of the confirmed one")
+    {
+        return None;
+    }
+    let noise = &found.noise;
+    let nearly = |node: &Node| node.fit.cost < NEARLY * confirmed.fit.cost;
+    let called_for = |node: &Node| {
+        node.gain_over(&found.base) > BIC_MARGIN
+            && beyond_chance(node, &found.base)
+            && confirm(node.clone(), noise).is_ok_and(|kept| kept.added.len() == node.added.len())
+    };
+    let leaves_noise = |node: &Node| {
+        let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING);
+        own.is_ok_and(|own| remains(node, &own).is_ok_and(|left| left.is_none()))
+    };
+    let sizes = 1..confirmed.added.len();
+    let smaller: Vec<Node> = found
+        .sets()
+        .into_par_iter()
+        .filter(|node| sizes.contains(&node.added.len()) && !by_clock(node))
+        .filter_map(|node| fitted(node, noise, ROUGH, &[]).ok())
+        .filter(|node| nearly(node))
+        .filter_map(|node| refine(&node, noise, &[]).ok())
+        .collect();
+    best_first(smaller).into_iter().find(|node| {
+        nearly(node)
+            && node.plausible()
+            && node.narrow_stiction().is_none()
+            && called_for(node)
+            && leaves_noise(node)
+    })
+}

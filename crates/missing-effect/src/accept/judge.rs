@@ -1,0 +1,353 @@
+//! Whether a confirmed set of effects is the answer, beside what it leaves.
+
+use ct_signals::ArModel;
+use greybox::{Fit, Noise, coloured};
+use plants::{EffectInfo, Placed};
+use rayon::prelude::*;
+
+use crate::{
+    Error, Problem, Step,
+    accept::{
+        groups::{Group, groups},
+        trail::trail,
+    },
+    diagnostics::{
+        remains::{Left, Remains, remains},
+        step,
+    },
+    fit::{
+        node::{FINE, Node, STOPPING, refine, without},
+        noise_model::{NOISE_ORDER, longest_memory, residual_colour, slowness},
+    },
+    result::Floors,
+    search::confirm::confirm,
+};
+
+/// Where something remains that is not noise, effects are the whole answer if they explain this share at least of the excess
+/// error: the mean squared simulation error above the noise floor.
+///
+/// The tests that confirm an effect take what remains for noise. Against a disturbance from outside, which is none, their
+/// probabilities do not hold: whatever effect happens to resemble it is "beyond chance". Over records of nine
+/// simulated disturbances such effects imitate up to six sevenths of one as a rule; a true effect beside which something small
+/// remains explains nineteen twentieths and more.
+pub(crate) const WHOLE: f64 = 0.9;
+/// They are a partial answer if they explain this share.
+pub(crate) const PART: f64 = 0.38;
+
+/// A noise floor below this part of the error is none.
+const NOTHING: f64 = 1e-9;
+
+/// How much of an answer a set of effects is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Grade {
+    /// It leaves noise, or explains [`WHOLE`] of the excess error.
+    Whole,
+    /// It explains [`PART`] of it.
+    Part,
+    /// Less.
+    None,
+}
+
+/// What a set is judged by.
+pub(crate) struct Judge<'s, 'a> {
+    pub base: &'s Node<'a>,
+    pub noise: &'s Noise,
+    pub wandering: bool,
+    /// The records come from a loop that is not simulated.
+    pub in_loop: bool,
+    /// Models are compared and shown by their simulation error.
+    pub by_simulation: bool,
+    /// The set was cut to as many effects as may be added.
+    pub stopped: bool,
+    /// What a jump of the reading leaves, where that is what there is.
+    pub jumped: Option<Left>,
+    /// The single effects, in the metric in which they were refitted last.
+    pub singles: &'s [Node<'a>],
+    /// The sets that the search has fitted.
+    pub searched: &'s [&'s Node<'a>],
+}
+
+/// What was found of a set.
+pub(crate) struct Judged<'a> {
+    pub course: Course<'a>,
+    pub grade: Grade,
+    /// The share of the excess error that it explains.
+    pub share: f64,
+    /// Of an answer: what stands in for each of its effects, and where each may act.
+    pub groups: Vec<Group>,
+    /// What was taken out of it.
+    pub dropped: Vec<Placed>,
+}
+
+impl<'a> Judge<'_, 'a> {
+    /// The set, or what stays of it.
+    ///
+    /// Beside something that is not noise, an effect that one of the clock stands in for is no answer: it is some course of time, and
+    /// whatever is left may have made it. That speaks against this effect alone. The others stay where they are called for
+    /// without it, and are the answer where they explain enough without it: what was there to mend an imitation is neither.
+    pub fn judge(&self, mut set: Node<'a>) -> Result<Judged<'a>, Error> {
+        let mut judged = self.as_it_is(&set, None)?;
+        loop {
+            let courses = judged.courses_of_time();
+            // What remains beside a set that was cut is what was cut off, and the result says so.
+            if self.stopped || courses.is_empty() || judged.grade != Grade::Whole {
+                return Ok(judged);
+            }
+            for course in &courses {
+                if let Some(position) = set.added.iter().position(|on| on == course) {
+                    set = without(&set, position, self.noise, FINE)?;
+                }
+            }
+            set = confirm(set, self.noise)?;
+            let others = (!set.added.is_empty()).then(|| self.as_it_is(&set, judged.course.left));
+            match others.transpose()? {
+                Some(others) if others.grade == Grade::Whole => {
+                    let mut dropped = judged.dropped;
+                    dropped.extend(courses);
+                    judged = Judged { dropped, ..others };
+                }
+                // What follows time alone may be a part of the answer, and no more.
+                _ => {
+                    return Ok(Judged {
+                        grade: Grade::Part,
+                        ..judged
+                    });
+                }
+            }
+        }
+    }
+
+    /// `beside`: what remains beside a larger set. A colour that takes it up, with what that set explained, makes no noise of it.
+    fn as_it_is(&self, set: &Node<'a>, beside: Option<Left>) -> Result<Judged<'a>, Error> {
+        let mut course = self.course(set)?;
+        course.left = course.left.or(beside);
+        let (share, grade) = match course.left {
+            Some(left) if !self.stopped && !course.last().added.is_empty() => {
+                let share = explained(self.base, course.last(), &left.above(self.noise))?;
+                let grade = match share {
+                    share if share >= WHOLE => Grade::Whole,
+                    share if share >= PART => Grade::Part,
+                    _ => Grade::None,
+                };
+                (share, grade)
+            }
+            _ => (
+                explained(self.base, course.last(), &stationary(self.noise))?,
+                Grade::Whole,
+            ),
+        };
+        let groups = if grade == Grade::Whole {
+            self.groups(course.last())?
+        } else {
+            Vec::new()
+        };
+        Ok(Judged {
+            course,
+            grade,
+            share,
+            groups,
+            dropped: Vec::new(),
+        })
+    }
+
+    /// The groups of a set's effects.
+    pub fn groups(&self, last: &Node<'a>) -> Result<Vec<Group>, Error> {
+        let white = last.setup.white_noise();
+        let (metric, per_sample) = if self.by_simulation || self.stopped {
+            let residuals = last.setup.disturbance(&last.fit.x)?;
+            let noise = residual_colour(&last.setup, &residuals)?;
+            let limited = noise.with_memory_at_most(longest_memory(&last.setup));
+            (&white, slowness(&limited, last.setup.samples_per_output()))
+        } else {
+            (self.noise, 1.0)
+        };
+        let same_metric = self.by_simulation || !self.stopped || self.noise.order() == 0;
+        let singles = same_metric.then_some(self.singles);
+        groups(
+            &refine(last, metric, &[])?,
+            metric,
+            per_sample,
+            singles,
+            self.searched,
+            self.in_loop,
+        )
+    }
+
+    /// The models on the way to a set.
+    pub fn course(&self, set: &Node<'a>) -> Result<Course<'a>, Error> {
+        let mut nodes = trail(self.base, set, &set.setup.white_noise())?;
+        let last = nodes.pop().unwrap_or_else(|| self.base.clone());
+        let in_noise = if self.by_simulation || self.stopped {
+            last.clone()
+        } else {
+            // The trail is shorter where an effect could not be simulated beside the others.
+            let whole = last.added.len() == set.added.len();
+            let ends: Vec<_> = whole.then(|| last.fit.x.clone()).into_iter().collect();
+            refine(set, self.noise, &ends)?
+        };
+        self.ending(nodes, last, in_noise.fit)
+    }
+
+    /// The course of these models and one more, which is fitted.
+    pub fn longer(&self, nodes: Vec<Node<'a>>, last: Node<'a>) -> Result<Course<'a>, Error> {
+        let fit = last.fit.clone();
+        self.ending(nodes, last, fit)
+    }
+
+    /// `in_noise`: the last model's fit in the metric of the noise.
+    fn ending(
+        &self,
+        mut nodes: Vec<Node<'a>>,
+        mut last: Node<'a>,
+        in_noise: Fit,
+    ) -> Result<Course<'a>, Error> {
+        let own = coloured(&last.setup, in_noise, NOISE_ORDER, STOPPING)?;
+        // That the residual wanders says less than that it jumps.
+        let left = match remains(&last, &own)? {
+            Some(left) if !matches!(left.what, Remains::Slow(..)) => Some(left),
+            left => self.jumped.or(left),
+        };
+        // The last model is shown in the noise's metric, where its parameters are best known; a model that lacks
+        // something is not: a metric that takes what it lacks for noise would let its simulation drift off.
+        if !self.wandering && !self.stopped && left.is_none() {
+            last.fit = own.clone().continuing(&last.fit);
+        }
+        nodes.push(last);
+        Ok(Course { nodes, own, left })
+    }
+}
+
+impl Judged<'_> {
+    /// The effects of an answer that one of the clock stands in for, where something remains beside them.
+    fn courses_of_time(&self) -> Vec<Placed> {
+        if self.grade != Grade::Whole || self.course.left.is_none() {
+            return Vec::new();
+        }
+        let by_clock = |id: &String| EffectInfo::find(id).is_some_and(|effect| effect.by_clock);
+        let added = self.course.last().added.iter().zip(&self.groups);
+        added
+            .filter(|(_, group)| group.members.iter().any(by_clock))
+            .map(|(placed, _)| *placed)
+            .collect()
+    }
+}
+
+/// The models from the believed one to the last, and what the last one leaves.
+pub(crate) struct Course<'a> {
+    /// At least the believed one.
+    pub nodes: Vec<Node<'a>>,
+    /// The last one with the colour of its own residual.
+    pub own: Fit,
+    pub left: Option<Left>,
+}
+
+impl<'a> Course<'a> {
+    pub fn last(&self) -> &Node<'a> {
+        &self.nodes[self.nodes.len() - 1]
+    }
+
+    /// What is reported of each model.
+    pub fn steps(
+        &self,
+        floor: &Floors,
+        problem: &Problem,
+        widen: bool,
+    ) -> Result<Vec<Step>, Error> {
+        let judge = floor.noise()?;
+        self.nodes
+            .par_iter()
+            .enumerate()
+            .map(|(k, node)| {
+                let bic = if k + 1 == self.nodes.len() {
+                    self.own.bic()
+                } else {
+                    coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.bic()
+                };
+                step::report(node, bic, &judge, &problem.test, widen)
+            })
+            .collect()
+    }
+}
+
+/// The share of the excess error, in mean square above the noise floor, that a model explains of its base; of several outputs each error is
+/// taken over the floor of its output.
+pub(crate) fn explained(base: &Node, last: &Node, floor: &[f64]) -> Result<f64, Error> {
+    let series = |node: &Node| node.setup.disturbance(&node.fit.x);
+    let (before, after) = (series(base)?, series(last)?);
+    // A floor of nothing leaves all of the error to be explained.
+    let rms = base.setup.rms_per_output(&before);
+    let least = |(floor, rms): (&f64, &f64)| floor.max(NOTHING * rms).max(f64::MIN_POSITIVE);
+    let scales: Vec<f64> = floor.iter().zip(&rms).map(least).collect();
+    let mean_square = |series: &[Vec<f64>]| base.setup.weighted_rms(series, &scales).powi(2);
+    let (before, after) = (mean_square(&before), mean_square(&after));
+    // A slow noise may be larger in the long run than it was in the record.
+    let floor = after.min(1.0);
+    Ok((before - after) / (before - floor).max(f64::MIN_POSITIVE))
+}
+
+/// Standard deviation of each output's noise.
+fn stationary(noise: &Noise) -> Vec<f64> {
+    noise.iter().map(ArModel::stationary_std).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::{
+        Options,
+        base::believed::base,
+        fit::{
+            noise_model::colour,
+            proposal::{Parent, propose, realise, singles},
+        },
+        simulated,
+    };
+
+    /// A pump that saturates beside a swing of the reading that has no name; what stays of the saturation and a drift of the sensor.
+    fn judged(swing: f64) -> (bool, Vec<&'static str>, Vec<&'static str>) {
+        let read = |t: f64, level: f64| level + swing * (t / 150.0).sin();
+        let problem = simulated::tank(|u| u.min(4.2), read, 0.0, 1);
+        let (base, _) = base(&problem, &Options::default(), 1.0).unwrap();
+        let white = Noise::white(1);
+        let mut set = base.clone();
+        for id in ["pump_saturation", "sensor_drift"] {
+            let placed = Placed {
+                effect: EffectInfo::find(id).unwrap(),
+                vessel: 0,
+            };
+            let proposal = propose(&Parent::new(&set), placed, &white).unwrap();
+            set = realise(proposal, &white, crate::fit::node::FINE).unwrap();
+        }
+        let judged = Judge {
+            base: &base,
+            noise: &colour(&set).unwrap(),
+            wandering: true,
+            in_loop: false,
+            by_simulation: true,
+            stopped: false,
+            jumped: None,
+            singles: &singles(&base, &white),
+            searched: &[],
+        }
+        .judge(set)
+        .unwrap();
+        assert!(judged.course.left.is_some());
+        let ids = |set: &[Placed]| set.iter().map(|placed| placed.effect.id).collect();
+        let kept = ids(&judged.course.last().added);
+        (judged.grade == Grade::Whole, kept, ids(&judged.dropped))
+    }
+
+    #[test]
+    fn a_course_of_time_is_taken_out_alone_where_the_others_explain_enough() {
+        let (fair, kept, dropped) = judged(0.15);
+        assert!(fair);
+        assert_eq!(
+            (kept, dropped),
+            (vec!["pump_saturation"], vec!["sensor_drift"])
+        );
+        // Where the swing is as large as what the saturation makes, the saturation is no answer either.
+        let (fair, ..) = judged(1.0);
+        assert!(!fair);
+    }
+}

@@ -1,0 +1,174 @@
+//! The simplest course of time that no effect describes: from one sample to the next the reading is another.
+//!
+//! A recalibration, a sensor that was moved, a cable that was changed. An outlet that opens at that instant imitates it
+//! in part, and beside it a wide play of the sensor or a leak the rest: down to the noise, with three sizes or four for
+//! what is one. So whatever is claimed has to be better than a jump.
+
+use ct_signals::Record;
+use greybox::{Noise, fit_from};
+use plants::{Fitted, Place, Term, Variable};
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    diagnostics::remains::{Left, Remains},
+    fit::{
+        node::{FINE, Node},
+        noise_model::residual_colour,
+    },
+};
+
+/// Instants that are tried, those where the whitened residual is largest.
+const INSTANTS: usize = 4;
+/// The jump's first size is that of the residual's means over so many samples before and after.
+const AROUND: usize = 8;
+/// A jump has a size and an instant; the fit counts the size.
+const INSTANT: f64 = 1.0;
+
+/// A model with a jump of the reading, fitted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Jump {
+    /// Its criterion.
+    pub bic: f64,
+    /// The last sample before it.
+    before: usize,
+    /// The output that jumps.
+    output: usize,
+}
+
+impl Jump {
+    /// What it leaves to be explained of the record.
+    pub fn left(self, record: &Record) -> Left {
+        Left {
+            what: Remains::Instant(record.time[self.before + 1], 0.0),
+            record: Some(0),
+            output: self.output,
+        }
+    }
+}
+
+/// A node with a jump of the reading where that helps most, in the metric of a noise; `None` where the record is too short, no
+/// fit succeeds, or there are several records.
+pub(crate) fn jump(node: &Node, noise: &Noise) -> Result<Option<Jump>, Error> {
+    let [record] = node.setup.records else {
+        return Ok(None);
+    };
+    let residuals = node.setup.disturbance(&node.fit.x)?;
+    // Beside all else that the model lacks, an instant stands out where the residual's own colour does not foretell it.
+    let noise_of_residual = residual_colour(&node.setup, &residuals)?;
+    let whitened = noise_of_residual.whiten(&residuals);
+    let mut instants: Vec<(f64, usize, usize)> = Vec::new();
+    for (output, whitened) in whitened.iter().enumerate() {
+        let sigma = noise_of_residual.output(output).sigma();
+        let within = AROUND..whitened.len().saturating_sub(AROUND);
+        let present = within.filter(|k| !whitened[*k].is_nan());
+        instants.extend(present.map(|k| (whitened[k].abs() / sigma, k, output)));
+    }
+    instants.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let fitted = |k: usize, output: usize| -> Result<f64, Error> {
+        let residual = &residuals[output];
+        let size = mean(&residual[k..k + AROUND]) - mean(&residual[k - AROUND..k]);
+        let time = &record.time;
+        let structure = node.setup.structure.with_term(Term {
+            name: "jump_of_the_reading".to_string(),
+            place: Place::Sensor,
+            vessel: output,
+            variable: Variable::Time,
+            knots: vec![time[k - 1] - time[0], time[k] - time[0]],
+            ordinates: vec![0.0, size],
+            fitted: Fitted::Scale,
+        })?;
+        let setup = node.setup.with_structure(structure)?;
+        let mut start = node.fit.x.clone();
+        start.insert(node.setup.parameter_count(), 1.0);
+        let fit = fit_from(&setup, &[start], noise, FINE)?;
+        Ok(fit.bic() + INSTANT * (setup.samples() as f64).ln())
+    };
+    Ok(instants
+        .into_par_iter()
+        .take(INSTANTS)
+        .filter_map(|(_, k, output)| {
+            Some(Jump {
+                bic: fitted(k, output).ok()?,
+                before: k - 1,
+                output,
+            })
+        })
+        .min_by(|a, b| a.bic.total_cmp(&b.bic)))
+}
+
+/// The mean of the samples that are there; zero where none is.
+fn mean(series: &[f64]) -> f64 {
+    let present = || series.iter().filter(|value| !value.is_nan());
+    present().sum::<f64>() / present().count().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use plants::{Known, Plant, Scales, Structure};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::{
+        Options, Problem,
+        base::believed::base,
+        simulated::{self, INTERVAL},
+    };
+
+    const SAMPLES: usize = 600;
+    const AT: usize = 320;
+    /// The records do not begin at zero \[s\].
+    const BEGIN: f64 = 100.0;
+
+    /// A linear tank whose reading is another from a sample on.
+    fn problem(by: f64, records: usize, seed: u64) -> Problem {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let plant = Plant::SingleTankLinear;
+        let scales = Scales::from_ranges((3.0, 5.0), (5.0, 20.0), INTERVAL, 1200.0);
+        let structure = Structure::new(plant, Known::default(), scales);
+        let records = (0..records).map(|_| {
+            let theta = [4.0, 90.0, 0.0];
+            let mut record = simulated::record(&structure, &theta, (3.0, 5.0), SAMPLES, &mut rng);
+            record.time.iter_mut().for_each(|t| *t += BEGIN);
+            record.outputs[0].values[AT..]
+                .iter_mut()
+                .for_each(|y| *y += by);
+            record
+        });
+        simulated::problem(plant, Known::default(), records.collect())
+    }
+
+    #[test]
+    fn a_jump_is_found_where_it_is_and_pays_only_there() {
+        let noise = Noise::white(1);
+        for by in [0.3, -0.3, 3.0] {
+            let problem = problem(by, 1, 1);
+            let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
+            let found = jump(&node, &noise).unwrap().unwrap();
+            assert!(found.bic < node.fit.bic() - 100.0);
+            let left = found.left(&problem.records[0]);
+            assert_eq!(
+                left.what,
+                Remains::Instant(BEGIN + INTERVAL * AT as f64, 0.0)
+            );
+        }
+        // Where the reading does not jump, the best of several is less than its two parameters cost.
+        let worth = (1..=10).filter(|seed| {
+            let problem = problem(0.0, 1, *seed);
+            let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
+            let found = jump(&node, &noise).unwrap().unwrap();
+            found.bic < node.fit.bic()
+        });
+        assert_eq!(worth.count(), 0);
+    }
+
+    #[test]
+    fn of_several_records_none_is_sought() {
+        let noise = Noise::white(1);
+        let several = problem(0.3, 2, 1);
+        let (node, _) = base(&several, &Options::default(), 1.0).unwrap();
+        assert!(jump(&node, &noise).unwrap().is_none());
+    }
+}

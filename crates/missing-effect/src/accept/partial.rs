@@ -1,0 +1,306 @@
+//! The largest part of the error that effects explain, where none explains all of it.
+//!
+//! Measured records often hold several causes, and noise that is nearly integrated. That no set of effects leaves noise does not mean
+//! that nothing was found: a set is a partial answer where
+//! - it explains [`PART`](crate::accept::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one with an
+//!   effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::accept::judge::WHOLE) of it,
+//!   alone and beyond what a random walk explains;
+//! - of several effects: they are called for where each model has a noise model of its own, of limited memory;
+//! - it foretells the next sample as well as the model without it does, each beside a noise model of its own;
+//! - what is fitted to one half of the record predicts the other (two-fold cross-validation);
+//! - sizes are inside their bounds, and states are physical;
+//! - a single jump of the reading does not explain more.
+//!
+//! A larger set is taken where it explains half of what each smaller one of its effects leaves.
+
+use greybox::{fit_from, fit_initial_levels};
+use plants::Placed;
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    accept::{
+        judge::{PART, WHOLE, explained},
+        jump::jump,
+        random_walk::{Walk, beyond_random_walk},
+        sticking::sticks,
+    },
+    diagnostics::held_out::held_out_rmse,
+    fit::{
+        criterion::BIC_MARGIN,
+        node::{FINE, Node, ROUGH, STICTION, refine, without_clock},
+        noise_model::in_own_noise,
+    },
+    search::find::Found,
+};
+
+/// Sets of one size that are refitted, those with the least simulation error.
+const REFITTED: usize = 6;
+/// Largest set, but for the confirmed one.
+const MOST: usize = 3;
+/// A larger set leaves at most this part of what the smaller one leaves of the excess error.
+const LEFT: f64 = 0.5;
+
+/// A set explains this part of the mean squared error at least on a half of the record that was not fitted.
+const CARRIED_OVER: f64 = 0.3;
+
+/// The innovations beside a set are at most so many times as large as those beside the base: what imitates a slow course by moves of its
+/// own is rougher than the record.
+const ROUGHER: f64 = 1.05;
+
+/// By how much the logarithm of the mean square with a jump has to lie below that of a set.
+const JUMP_CLEARLY: f64 = 0.1;
+
+/// Stiction that the shape of the record shows is a partial answer from this share on.
+const PART_BY_SHAPE: f64 = 0.15;
+
+/// Why a narrow band of stiction is refused.
+const NARROW_BAND: &str = "in a loop that is not simulated a disturbance that comes back through the command looks like a narrow band";
+
+/// A set that was tested, and with what result.
+pub(crate) struct Tested<'a> {
+    /// The set, fitted to the simulation error.
+    pub node: Node<'a>,
+    /// The share of the excess error that it explains.
+    pub share: f64,
+    /// Fall of the criterion, each model under its own noise model.
+    pub bic_fall: f64,
+    /// The record has the shape of a valve that sticks, and the set is that.
+    pub shape: bool,
+    /// Why it is refused; empty where it is accepted.
+    pub reasons: Vec<String>,
+}
+
+/// The set that explains the largest part of the excess error, accepted or, where none is, the best that was refused.
+///
+/// `floor`: standard deviation of each output's noise \[output unit\]; `in_loop`: the records come from a loop that is not simulated.
+pub(crate) fn largest_part<'a>(
+    base: &Node<'a>,
+    found: &Found<'a>,
+    singles: &[Node<'a>],
+    floor: &[f64],
+    in_loop: bool,
+) -> Result<Option<Tested<'a>>, Error> {
+    let white = base.setup.white_noise();
+    let own_base = in_own_noise(base)?;
+    let jump = jump(base, &white)?.map_or(f64::INFINITY, |jump| jump.bic);
+    let sticks = in_loop && sticks(base.setup.records);
+    let mut best: Option<Tested<'a>> = None;
+    let mut smaller: Vec<(Vec<Placed>, f64)> = Vec::new();
+    for size in 1..=MOST.max(found.confirmed.added.len()) {
+        if size > 1 && base.setup.out_of_time() {
+            break;
+        }
+        let of_size = |nodes: &[Node<'a>]| -> Vec<Node<'a>> {
+            let mut nodes: Vec<Node> = nodes
+                .iter()
+                .filter(|node| node.added.len() == size && node.plausible())
+                .cloned()
+                .collect();
+            nodes.sort_by(|a, b| a.fit.mean_rmse().total_cmp(&b.fit.mean_rmse()));
+            nodes.truncate(REFITTED);
+            nodes
+        };
+        let grown = found.grown.sizes.get(size).filter(|_| size <= MOST);
+        let mut sets = of_size(grown.map_or(&[], Vec::as_slice));
+        if size == 1 {
+            sets.extend(of_size(singles));
+            let sticking = |node: &&Node| {
+                sticks && node.added.iter().any(|placed| placed.effect.id == STICTION)
+            };
+            sets.extend(singles.iter().filter(sticking).cloned());
+        }
+        sets.extend(of_size(std::slice::from_ref(&found.confirmed)));
+        if size <= MOST {
+            sets.extend(of_size(std::slice::from_ref(&found.richest)));
+        }
+        let tested = sets
+            .into_par_iter()
+            .filter_map(|set| refine(&set, &white, &[]).ok())
+            .map(|node| {
+                let mut tested = test(base, &own_base, node, floor, jump)?;
+                if in_loop && tested.node.narrow_stiction().is_some() {
+                    tested.reasons.push(NARROW_BAND.to_string());
+                }
+                // The shape says more than an error that cannot fall far.
+                let alone = tested
+                    .node
+                    .added
+                    .iter()
+                    .all(|placed| placed.effect.id == STICTION);
+                tested.shape = sticks && alone && tested.share >= PART_BY_SHAPE;
+                if tested.shape {
+                    tested.reasons.clear();
+                }
+                Ok::<_, Error>(tested)
+            })
+            // A set that cannot be fitted beside a noise model of its own, or to a half of the record, is no answer.
+            .filter(|tested| {
+                !matches!(
+                    tested,
+                    Err(Error::Fit(greybox::Error::Estimation(
+                        greybox::NoFit::NoFiniteStart { .. }
+                    )))
+                )
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let more: Vec<Tested> = tested
+            .into_iter()
+            .filter(|one| says_more(one, &smaller))
+            .collect();
+        smaller.extend(more.iter().map(|one| (one.node.added.clone(), one.share)));
+        let accepted = more.into_iter().max_by(|a, b| {
+            key(a)
+                .partial_cmp(&key(b))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        });
+        best = match (best, accepted) {
+            (None, found) => found,
+            (Some(best), Some(larger))
+                if (key(&larger).0, key(&larger).1) > (key(&best).0, key(&best).1)
+                    || (larger.reasons.is_empty()
+                        && !best.shape
+                        && 1.0 - larger.share <= LEFT * (1.0 - best.share)) =>
+            {
+                Some(larger)
+            }
+            (best, _) => best,
+        };
+    }
+    Ok(best)
+}
+
+/// The part of the mean squared error that a set explains on one half of a record when it was fitted to the other, both ways
+/// (two-fold cross-validation); initial states as on held-out records. Negative where it does harm; of several records the longest.
+///
+/// A noise model that is nearly integrated looks at changes from sample to sample alone, and takes any slow effect for noise. Physics
+/// that is real helps on data that were not fitted; what imitates a slow disturbance does not.
+fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
+    let white = base.setup.white_noise();
+    let records = base.setup.records.iter();
+    let Some(record) = records.max_by_key(|record| record.len()) else {
+        return Ok(0.0);
+    };
+    let half = record.len() / 2;
+    let halves = [record.rows(0..half), record.rows(half..record.len())];
+    let error = |node: &Node, fitted: usize| -> Result<Vec<f64>, Error> {
+        let own = node
+            .setup
+            .with_records(std::slice::from_ref(&halves[fitted]))?
+            .with_priors(&node.setup.prior_values())?;
+        let begun = fit_initial_levels(&own, &node.fit.x[..own.parameter_count()], ROUGH)?;
+        let fit = fit_from(&own, &[begun], &white, FINE)?;
+        let half = Node {
+            setup: own,
+            fit,
+            added: node.added.clone(),
+        };
+        let other = std::slice::from_ref(&halves[1 - fitted]);
+        held_out_rmse(&half, other)
+    };
+    // Outputs count by what the base leaves of them.
+    let both = |node: &Node| Ok::<_, Error>((error(node, 0)?, error(node, 1)?));
+    let (of_base, of_node) = (both(base)?, both(node)?);
+    let scales: Vec<f64> = of_base
+        .0
+        .iter()
+        .zip(&of_base.1)
+        .map(|(a, b)| a.hypot(*b))
+        .collect();
+    let mean = |half: &[f64]| -> f64 {
+        let outputs = half.iter().zip(&scales);
+        // An output that one half lacks says nothing.
+        let outputs = outputs.filter(|(_, scale)| **scale > 0.0);
+        outputs.map(|(rms, scale)| (rms / scale).powi(2)).sum()
+    };
+    let of_both = |(first, second): &(Vec<f64>, Vec<f64>)| mean(first) + mean(second);
+    Ok(1.0 - of_both(&of_node) / of_both(&of_base))
+}
+
+/// Whether a set leaves at most [`LEFT`] of what each smaller one of its effects leaves, accepted or refused.
+fn says_more(one: &Tested, smaller: &[(Vec<Placed>, f64)]) -> bool {
+    let added = &one.node.added;
+    smaller.iter().all(|(subset, share)| {
+        let within =
+            subset.len() < added.len() && subset.iter().all(|placed| added.contains(placed));
+        !within || 1.0 - one.share <= LEFT * (1.0 - share)
+    })
+}
+
+/// Accepted sets before refused ones, those that the shape of the record shows before others, then by what they explain.
+fn key(tested: &Tested) -> (bool, bool, f64) {
+    (tested.reasons.is_empty(), tested.shape, tested.share)
+}
+
+fn test<'a>(
+    base: &Node<'a>,
+    own_base: &Node<'a>,
+    node: Node<'a>,
+    floor: &[f64],
+    jump: f64,
+) -> Result<Tested<'a>, Error> {
+    let share = explained(base, &node, floor)?;
+    let required = if node.added.iter().any(|placed| placed.effect.by_clock) {
+        WHOLE
+    } else {
+        PART
+    };
+    let mut reasons = Vec::new();
+    let mut bic_fall = node.gain_over(base);
+    if share < required {
+        reasons.push(format!(
+            "explains {:.0} % of the excess error, {:.0} % required{}",
+            100.0 * share,
+            100.0 * required,
+            if required > PART {
+                " of an effect that follows time alone"
+            } else {
+                ""
+            }
+        ));
+    } else {
+        let own = in_own_noise(&node)?;
+        bic_fall = own.gain_over(own_base);
+        if node.added.len() > 1 && bic_fall <= BIC_MARGIN {
+            reasons.push(
+                "several effects bend to much, and each with a noise model of its own the model without them is as probable"
+                    .to_string(),
+            );
+        }
+        let outputs = own.fit.noise.iter().zip(own_base.fit.noise.iter());
+        let mut rougher = outputs.map(|(own, base)| own.sigma() > ROUGHER * base.sigma());
+        if rougher.any(|rougher| rougher) {
+            reasons.push("from sample to sample the record does not go as this has it".to_string());
+        }
+        // A share that is no number is none.
+        if carried_over(base, &node)?.max(0.0) < CARRIED_OVER {
+            reasons.push(
+                "what is fitted to one half of the record does not predict the other".to_string(),
+            );
+        }
+    }
+    let timeless = without_clock(&node, &node.setup.white_noise())?;
+    if required > PART && node.added.len() > 1 {
+        reasons.push(
+            "with an effect that follows time alone a set bends to any disturbance".to_string(),
+        );
+    }
+    if required > PART && !beyond_random_walk(&node, &timeless, Walk::ANY)? {
+        reasons.push("a random walk explains as much".to_string());
+    }
+    if !node.plausible() {
+        reasons.push("a size stands at a bound, or a state is not physical".to_string());
+    }
+    // A jump at a free instant imitates much where set points step: it has to explain clearly more.
+    let clearly = JUMP_CLEARLY * node.setup.samples() as f64;
+    if jump + clearly < node.fit.bic() {
+        reasons.push("a single jump of the reading explains more".to_string());
+    }
+    Ok(Tested {
+        node,
+        share,
+        bic_fall,
+        shape: false,
+        reasons,
+    })
+}

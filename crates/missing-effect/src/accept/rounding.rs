@@ -1,0 +1,145 @@
+//! Readings that a converter has rounded with their noise.
+//!
+//! The readings themselves are the evidence: nearly all are multiples of one number `D`, which needs no fit and no criterion. The criterion
+//! hardly falls: the noise that is rounded with the level (dither) makes the mean reading nearly linear in the level, and rounding acts as a
+//! further noise of variance `D^2/12`.
+//!
+//! **Reference**: B. Widrow, I. Kollar, Quantization Noise, Cambridge 2008, ch. 4 and 19.
+
+use std::ops::RangeInclusive;
+
+use greybox::{exact_reading_step, fit_from};
+use plants::{EffectInfo, Placed};
+
+use crate::{
+    Error,
+    accept::groups::Group,
+    fit::{
+        hidden_step::EFFECT,
+        node::{FINE, Node, position_of, transfer},
+    },
+};
+
+/// Rounding is named where its variance is this part of the mean squared error that is left. Where it is clearly more than that error, the
+/// level rests, or the grid is not that of a converter.
+const SHARE: RangeInclusive<f64> = 1.0 / 3.0..=1.1;
+
+/// A model with rounding, and what rounding makes of the error.
+pub(crate) struct Rounded<'a> {
+    /// The model with rounding at the first of the outputs.
+    pub node: Node<'a>,
+    /// What is named with it.
+    pub group: Group,
+    /// The outputs whose readings are rounded, at least one: that first of whose error rounding makes most.
+    pub outputs: Vec<RoundedOutput>,
+}
+
+/// An output whose readings are rounded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RoundedOutput {
+    /// The output.
+    pub output: usize,
+    /// The number that readings are multiples of \[output unit\].
+    pub step: f64,
+    /// Share of rounding alone in the mean squared error of the model without it.
+    pub share: f64,
+}
+
+/// The model with rounding, where the readings are multiples of a number and rounding makes a good part
+/// of the error; `None` where it has it already.
+pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error> {
+    let Some(effect) = EffectInfo::find(EFFECT) else {
+        return Ok(None);
+    };
+    let structure = &node.setup.structure;
+    if structure.effects().iter().any(|on| on.effect.id == EFFECT) {
+        return Ok(None);
+    }
+    let outputs = rounded_outputs(node);
+    let Some(&RoundedOutput { output, step, .. }) = outputs.first() else {
+        return Ok(None);
+    };
+    let placed = Placed {
+        effect,
+        vessel: output,
+    };
+    let error = node.fit.rmse[output].powi(2);
+    let rounding = step.powi(2) / 12.0;
+    // The readings give the step to all their digits; a fit adds nothing.
+    let mut setup = node.setup.clone();
+    setup.fixed.insert(format!("{EFFECT}.step"), step);
+    let setup = setup.with_structure(structure.with(placed)?)?;
+    let begun = transfer(node, &setup);
+    let noise = (error - rounding).max(0.0).sqrt();
+    let starts = [0.0, noise, 0.5 * step].map(|noise| {
+        let mut start = begun.clone();
+        if let Some(at) = position_of(&setup, placed, "noise") {
+            start[at] = noise;
+        }
+        start
+    });
+    let fit = fit_from(&setup, &starts, &setup.white_noise(), FINE)?.continuing(&node.fit);
+    let mut added = node.added.clone();
+    added.push(placed);
+    let group = Group {
+        members: vec![EFFECT.to_string()],
+        places: Vec::new(),
+    };
+    Ok(Some(Rounded {
+        node: Node { setup, fit, added },
+        group,
+        outputs,
+    }))
+}
+
+/// The outputs whose readings are rounded, that first of whose error rounding makes most.
+fn rounded_outputs(node: &Node) -> Vec<RoundedOutput> {
+    let rounds = |output: usize| {
+        let step = exact_reading_step(node.setup.records, output)?;
+        let share = step.powi(2) / 12.0 / node.fit.rmse[output].powi(2);
+        SHARE.contains(&share).then_some(RoundedOutput {
+            output,
+            step,
+            share,
+        })
+    };
+    let mut outputs: Vec<RoundedOutput> = (0..node.setup.outputs()).filter_map(rounds).collect();
+    outputs.sort_by(|a, b| b.share.total_cmp(&a.share));
+    outputs
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::{Options, base::believed::base, sentences::of_rounding, simulated};
+
+    #[test]
+    fn every_output_that_is_rounded_is_said() {
+        let mut problem = simulated::two_levels(4);
+        for (output, step) in problem.records[0].outputs.iter_mut().zip([0.8, 0.3]) {
+            for y in &mut output.values {
+                *y = (*y / step).round() * step;
+            }
+        }
+        let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
+        let found = rounded(&node).unwrap().unwrap();
+        let steps: Vec<(usize, f64)> = found.outputs.iter().map(|o| (o.output, o.step)).collect();
+        // The quieter one first: more of its error is rounding.
+        assert!(
+            steps[0].0 == 1 && (steps[0].1 - 0.3).abs() < 1e-9,
+            "{steps:?}"
+        );
+        assert!(
+            steps[1].0 == 0 && (steps[1].1 - 0.8).abs() < 1e-9,
+            "{steps:?}"
+        );
+        assert_eq!(found.node.added.last().unwrap().vessel, 1);
+        let said = of_rounding(&found.outputs, &problem.records[0].outputs);
+        assert!(
+            said.contains("of lower are multiples of 0.300 cm")
+                && said.contains("of upper are multiples of 0.800 cm"),
+            "{said}"
+        );
+    }
+}

@@ -1,0 +1,70 @@
+//! The trail: the believed model, then one effect after the other, so that the error can be watched falling.
+
+use greybox::Noise;
+use plants::Placed;
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    fit::{
+        minima::around,
+        node::{Node, ROUGH, refine},
+        proposal::place,
+    },
+};
+
+/// Further starts of every step, because its minimum must not hang on where the search came from: so many, ...
+const STARTS_AROUND: usize = 6;
+/// ... and as many again and again while it was not found twice, in so many rounds at most on the way and at its end. The model that
+/// names the effects is held to the same as the believed one.
+const ROUNDS: (u64, u64) = (2, 4);
+
+/// The believed model, then one effect after the other, first what lowers the error most.
+pub(crate) fn trail<'a>(
+    base: &Node<'a>,
+    last: &Node<'a>,
+    noise: &Noise,
+) -> Result<Vec<Node<'a>>, Error> {
+    let mut trail = vec![refine(base, noise, &[])?];
+    trail[0].fit = trail[0].fit.clone().continuing(&base.fit);
+    for k in 0..last.added.len() {
+        let parent = &trail[k];
+        let remaining = last.added.iter().filter(|on| !parent.added.contains(on));
+        let nodes: Vec<Node> = remaining
+            .copied()
+            .collect::<Vec<Placed>>()
+            .into_par_iter()
+            .filter_map(|placed| place(parent, placed, last, noise, ROUGH))
+            .collect();
+        let least = |a: &Node, b: &Node| a.fit.mean_rmse().total_cmp(&b.fit.mean_rmse());
+        let Some(first) = nodes.into_iter().min_by(least) else {
+            break;
+        };
+        let mut node = refine(&first, noise, &[])?;
+        // The end of the search has no vote: how often its minimum is found is counted over the starts around it.
+        (node.fit.starts, node.fit.agree) = (0, 0);
+        let rounds = if k + 1 == last.added.len() {
+            ROUNDS.1
+        } else {
+            ROUNDS.0
+        };
+        for round in 0..rounds {
+            if node.fit.agree < 2 && !node.setup.leaves_out("further starts of the final models") {
+                around(&mut node, STARTS_AROUND, noise, 100 * k as u64 + round)?;
+            }
+        }
+        trail.push(node);
+    }
+    // Out of time the models on the way may have ended above the set that they lead to.
+    if let Some(end) = trail.last_mut()
+        && end.added.len() == last.added.len()
+        && end.added.iter().all(|placed| last.added.contains(placed))
+    {
+        let known = refine(last, noise, &[])?;
+        if known.fit.cost < end.fit.cost {
+            end.fit = known.fit.continuing(&end.fit);
+            end.setup = known.setup;
+        }
+    }
+    Ok(trail)
+}

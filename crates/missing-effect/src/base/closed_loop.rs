@@ -1,0 +1,176 @@
+//! Records from a closed loop: the loop simulated from its reference where its controller is known, and what is said where
+//! it cannot be.
+//!
+//! The noise comes back through the command. A model that runs on the measured command is then wrong in a way that
+//! depends on the colour of the noise (`greybox`, `feedback.rs`); one whose loop runs on the reference is not.
+
+use greybox::{Replay, Setup, coloured, fit_from};
+use plants::Variable;
+
+use crate::{
+    ControlLoop, Error, Options, Problem,
+    base::{control_loop::check_stable, feedback_test},
+    fit::{
+        node::{Node, STOPPING},
+        noise_model::NOISE_ORDER,
+    },
+};
+
+/// Feedback is said to be there below this p-value.
+const FEEDBACK: f64 = 1e-4;
+/// A controller whose command differs from the measured one by more than this part of what that moves is another one.
+/// What it differs by less is known, and simulated with the loop.
+const OTHER_CONTROLLER: f64 = 0.05;
+
+/// What follows where a model runs on the measured command of a loop.
+const MEASURED: &str = "The model runs on the measured command, which holds the noise: where the noise has another colour than the one that was found, estimates and scores are biased, and the standard errors are made wider for it.";
+
+/// Closes the loop around a fitted node where that is possible, and says what is known of the loop.
+pub(crate) fn enclose<'a>(
+    problem: &Problem,
+    options: &Options,
+    node: Node<'a>,
+) -> Result<(Node<'a>, Option<ControlLoop>), Error> {
+    let Some(controller) = &problem.controller else {
+        // A term in time that was kept from this record has followed its noise, what came later too: the residual beside it says
+        // nothing of what the command answers to.
+        let timed = problem
+            .terms
+            .iter()
+            .any(|term| term.variable == Variable::Time);
+        if timed {
+            return Ok((node, None));
+        }
+        return Ok(match feedback_p(&node)? {
+            p if p < FEEDBACK => {
+                let said = format!(
+                    "Feedback detected: the command depends on the last {} residuals (F test beside the command's own past, p {}), and no [controller] is in the model file; give it, and the reference, and the loop is simulated. {MEASURED}",
+                    feedback_test::LAGS,
+                    chance(p)
+                );
+                (node, Some(ControlLoop::measured(Some(p), None, said)))
+            }
+            _ => (node, None),
+        });
+    };
+    check_stable(&node, controller)?;
+    if !options.simulate_loop {
+        return Ok((node, Some(not_simulated("as was asked for", None))));
+    }
+    let lacking = problem.records.iter().find(|r| {
+        let read = r.outputs.get(controller.output());
+        read.is_some_and(|output| output.missing() > 0)
+    });
+    if let Some(record) = lacking {
+        let why = format!(
+            "readings are missing in {}, so the controller cannot be checked against its commands",
+            record.name
+        );
+        return Ok((node, Some(not_simulated(&why, None))));
+    }
+    let (setup, x) = match node.setup.in_loop(controller, &node.fit.x) {
+        Ok(closed) => closed,
+        Err(
+            why @ (greybox::Error::NoReference { .. }
+            | greybox::Error::ConstantReference { .. }
+            | greybox::Error::CommandNotHeld { .. }),
+        ) => return Ok((node, Some(not_simulated(&why.to_string(), None)))),
+        Err(error) => return Err(error.into()),
+    };
+    let (mismatch, part) = disagreement(setup.replays());
+    if part > OTHER_CONTROLLER {
+        let why = format!(
+            "the measured command disagrees with the controller of the model file, R/S (r - y), by {mismatch:.3} {} rms, {:.0} % of what it moves: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
+            problem.records[0].inputs[0].unit,
+            100.0 * part
+        );
+        return Ok((node, Some(not_simulated(&why, Some(mismatch)))));
+    }
+    let fit = fit_from(&setup, &[x], &node.fit.noise, STOPPING)?.continuing(&node.fit);
+    let said = format!(
+        "The loop is simulated from its reference: no noise that came back through the command is in the model. The measured command agrees with the controller's to {mismatch:.4} {} rms.",
+        problem.records[0].inputs[0].unit
+    );
+    let enclosed = Node { setup, fit, ..node };
+    Ok((
+        enclosed,
+        Some(ControlLoop {
+            simulated: true,
+            feedback_p: None,
+            mismatch: Some(mismatch),
+            said: vec![said],
+        }),
+    ))
+}
+
+fn not_simulated(why: &str, mismatch: Option<f64>) -> ControlLoop {
+    let said = format!("The loop is not simulated: {why}. {MEASURED}");
+    ControlLoop::measured(None, mismatch, said)
+}
+
+fn chance(p: f64) -> String {
+    if p < 1e-9 {
+        "< 1e-9".to_string()
+    } else {
+        format!("= {p:.0e}")
+    }
+}
+
+/// How far the measured commands are from the controller's own, and which part that is of what they move; the worst
+/// record's.
+fn disagreement(replays: &[Replay]) -> (f64, f64) {
+    replays
+        .iter()
+        .map(|replay| (replay.rms, replay.rms / replay.moves.max(f64::MIN_POSITIVE)))
+        .fold(
+            (0.0, 0.0),
+            |worst, own| if own.1 >= worst.1 { own } else { worst },
+        )
+}
+
+/// p-value of the test that the command does not depend on past residuals; of several records the smallest, corrected for
+/// having taken it.
+fn feedback_p(node: &Node) -> Result<f64, Error> {
+    let residuals = node.setup.residuals(&node.fit.x)?;
+    let outputs = node.setup.outputs();
+    let least = residuals
+        .iter()
+        .enumerate()
+        .map(|(i, residual)| {
+            let record = &node.setup.records[i / outputs];
+            // The first parameter of every plant is its gain.
+            let gain = record.references.is_empty().then_some(node.fit.x[0]);
+            // What was not read moved no controller.
+            let read: Vec<f64> = residual
+                .iter()
+                .map(|e| if e.is_nan() { 0.0 } else { *e })
+                .collect();
+            feedback_test::feedback_p(&record.inputs[0].values, &read, gain)
+        })
+        .fold(1.0, f64::min);
+    Ok((least * residuals.len() as f64).min(1.0))
+}
+
+/// Standard errors that allow for a bias from feedback: the fits in the metric of white noise and of the noise that was
+/// found are both right where no noise comes back, and differ by about the bias where it does.
+pub(crate) fn widened(
+    node: &Node,
+    std_errors: Vec<Option<f64>>,
+) -> Result<Vec<Option<f64>>, Error> {
+    let other = other_metric(&node.setup, node)?;
+    Ok(std_errors
+        .into_iter()
+        .zip(node.fit.x.iter().zip(&other))
+        .map(|(error, (own, other))| error.map(|error| error.hypot(own - other)))
+        .collect())
+}
+
+/// Where the fit in another metric ends: white noise for one with a noise model, and the other way round.
+pub(crate) fn other_metric(setup: &Setup, node: &Node) -> Result<Vec<f64>, Error> {
+    Ok(if node.fit.noise.order() == 0 {
+        coloured(setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.x
+    } else {
+        let white = setup.white_noise();
+        fit_from(setup, std::slice::from_ref(&node.fit.x), &white, STOPPING)?.x
+    })
+}

@@ -1,0 +1,148 @@
+//! Records that take part in no fit and no choice: their initial states are fitted on the first samples, the rest is scored.
+
+use ct_signals::{Channel, Record};
+use greybox::{Stopping, fit_initial_levels};
+
+use crate::{Error, HeldOutError, PerOutput, Step, fit::node::Node};
+
+/// Samples of a held-out record on which its initial levels are fitted, and which are not scored.
+const HEAD: usize = 5;
+
+/// Held-out records as a model simulates them.
+pub(crate) struct HeldOut {
+    /// A series for each record and output.
+    pub series: Vec<Vec<f64>>,
+    /// Of each output: samples that are scored, their root mean square error, and its parts.
+    pub outputs: Vec<(usize, f64, HeldOutError)>,
+}
+
+/// Rows until so many samples of an output are there: the initial levels follow from them.
+fn head(output: &Channel) -> usize {
+    let present = output.values.iter().enumerate();
+    present
+        .filter(|(_, value)| !value.is_nan())
+        .nth(HEAD - 1)
+        .map_or(output.values.len(), |(last, _)| last + 1)
+}
+
+/// A record up to where the last of its outputs has so many samples, without what the others have beyond theirs.
+fn beginning(record: &Record) -> Record {
+    let rows = record.outputs.iter().map(head).max().unwrap_or(0);
+    let mut begun = Record {
+        references: Vec::new(),
+        ..record.rows(0..rows)
+    };
+    for (output, whole) in begun.outputs.iter_mut().zip(&record.outputs) {
+        output.values[head(whole)..].fill(f64::NAN);
+    }
+    begun
+}
+
+/// Initial levels from the first [`HEAD`] samples with everything else frozen; scored on the rest.
+pub(crate) fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
+    if test.is_empty() {
+        return Ok(None);
+    }
+    let parameters = &node.fit.x[..node.setup.parameter_count()];
+    let heads: Vec<Record> = test.iter().map(beginning).collect();
+    let mut begun = node.setup.with_records(&heads)?;
+    // A few samples take no time, and an error from wrong levels would be no error of the model.
+    (begun.time_limit, begun.interrupt) = (None, None);
+    let x = fit_initial_levels(
+        &begun,
+        parameters,
+        Stopping {
+            evaluations: 60,
+            cost: 1e-10,
+        },
+    )?;
+    let series = node.setup.with_records(test)?.simulate(&x)?.output;
+    let outputs = node.setup.outputs();
+    let of_output = |o: usize| {
+        let mut parts = [0.0; 4];
+        let mut count = 0;
+        for (record, models) in test.iter().zip(series.chunks_exact(outputs)) {
+            let measured = record.outputs[o].values.iter().copied();
+            let pairs: Vec<(f64, f64)> = measured
+                .zip(models[o].iter().copied())
+                .skip(head(&record.outputs[o]))
+                .filter(|(measured, _)| !measured.is_nan())
+                .collect();
+            for (sum, part) in parts.iter_mut().zip(error_parts(&pairs)) {
+                *sum += part;
+            }
+            count += pairs.len();
+        }
+        // NaN of an output of which nothing is left to be scored.
+        let [rmse, offset, gain, shape] = parts.map(|sum| (sum / count as f64).sqrt());
+        let error = HeldOutError {
+            offset,
+            gain,
+            shape,
+        };
+        (count, rmse, error)
+    };
+    let outputs = (0..outputs).map(of_output).collect();
+    Ok(Some(HeldOut { series, outputs }))
+}
+
+/// The error on held-out records at each output \[output unit\].
+pub(crate) fn held_out_rmse(node: &Node, test: &[Record]) -> Result<Vec<f64>, Error> {
+    let held_out = hold_out(node, test)?.map_or_else(Vec::new, |held_out| held_out.outputs);
+    Ok(held_out.into_iter().map(|(_, rmse, _)| rmse).collect())
+}
+
+/// Sums of squares of measured minus model: all of it, what its mean explains, what a factor on the model's deviations from
+/// their mean explains beside it, and what is left.
+fn error_parts(pairs: &[(f64, f64)]) -> [f64; 4] {
+    let n = pairs.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
+    let (error, model) = (mean(&|(y, m)| y - m), mean(&|(_, m)| *m));
+    let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+        pairs.iter().map(|(y, m)| of(y - m, m - model)).sum()
+    };
+    let all = sum(&|e, _| e * e);
+    let offset = n * error * error;
+    let (cross, power) = (sum(&|e, m| e * m), sum(&|_, m| m * m));
+    let gain = if power > 0.0 {
+        cross * cross / power
+    } else {
+        0.0
+    };
+    [all, offset, gain, (all - offset - gain).max(0.0)]
+}
+
+/// The share of the excess error on held-out records that the last model explains of the first one's.
+pub(crate) fn share_on_held_out(steps: &[Step], floor: &PerOutput) -> Option<f64> {
+    let [first, .., last] = steps else {
+        return None;
+    };
+    // Over the floor of each output, in their mean.
+    let mean_square = |step: &Step| -> Option<f64> {
+        let errors = step.rmse_test_per_output.as_ref()?.values();
+        let squares = errors.zip(floor.values());
+        let sum: f64 = squares.map(|(rmse, floor)| (rmse / floor).powi(2)).sum();
+        Some(sum / floor.0.len() as f64)
+    };
+    let (before, after) = (mean_square(first)?, mean_square(last)?);
+    // An error that is noise has no share to explain.
+    (before > 1.0).then(|| (before - after) / (before - after.min(1.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_held_out_error_is_split_into_offset_gain_and_shape() {
+        // Measured: the model's deviations from 5, half as large again, 2 above, and a wave that is neither.
+        let model = |k: usize| if k % 4 < 2 { 6.0 } else { 4.0 };
+        let wave = |k: usize| if k.is_multiple_of(2) { 0.3 } else { -0.3 };
+        let pairs: Vec<(f64, f64)> = (0..400)
+            .map(|k| (7.0 + 1.5 * (model(k) - 5.0) + wave(k), model(k)))
+            .collect();
+        let [all, offset, gain, shape] = error_parts(&pairs).map(|sum| (sum / 400.0).sqrt());
+        assert!((offset - 2.0).abs() < 1e-12 && (gain - 0.5).abs() < 1e-12);
+        assert!((shape - 0.3).abs() < 1e-12 && (all * all - 4.34).abs() < 1e-9);
+    }
+}

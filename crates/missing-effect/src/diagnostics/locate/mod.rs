@@ -1,0 +1,237 @@
+//! Where a model fails: the residual by time window, level, flow, direction of change and frequency.
+//!
+//!
+//! A bin fails where its mean square is clearly above what the noise would show there (`expected.rs`).
+
+mod expected;
+mod sentences;
+
+use ct_signals::{ArModel, Clock};
+use plants::Domain;
+
+use self::expected::{Expected, FACTOR_OF_A_BAND, beyond_chance, transform};
+use crate::{Bin, Failures};
+
+/// Windows and bins of one kind.
+const BINS: usize = 12;
+/// Bins with fewer samples are not judged.
+const FEWEST: usize = 8;
+
+/// One record as a model sees it; all series are as long as `time`.
+#[derive(Debug, Clone, Copy)]
+pub struct Series<'a> {
+    /// The record's name.
+    pub name: &'a str,
+    /// Sampling instants, rising \[s\].
+    pub time: &'a [f64],
+    /// The input that the residual is shown against \[`input_unit`\]; empty where the model has none.
+    pub input: &'a [f64],
+    /// What the model gives \[`output_unit`\].
+    pub model: &'a [f64],
+    /// Measured minus model, NaN where nothing was measured \[`output_unit`\].
+    pub residual: &'a [f64],
+}
+
+/// What is judged, against which noise, in which units.
+#[derive(Debug, Clone, Copy)]
+pub struct Located<'a> {
+    /// At least one record.
+    pub series: &'a [Series<'a>],
+    /// The noise of the output.
+    pub noise: &'a ArModel,
+    /// Unit of the output.
+    pub output_unit: &'a str,
+    /// Unit of the input.
+    pub input_unit: &'a str,
+    /// How times are said.
+    pub clock: &'a Clock,
+    /// What things are called.
+    pub domain: Domain,
+}
+
+fn bin(from: f64, to: f64, values: impl Iterator<Item = f64>, expected: &Expected) -> Bin {
+    let (mut count, mut sum, mut squares) = (0, 0.0, 0.0);
+    for value in values.filter(|value| !value.is_nan()) {
+        count += 1;
+        sum += value;
+        squares += value * value;
+    }
+    let n = count.max(1) as f64;
+    let mean_square = squares / n;
+    Bin {
+        record: None,
+        from,
+        to,
+        count,
+        mean: sum / n,
+        rms: mean_square.sqrt(),
+        fails: count >= FEWEST && expected.exceeded(mean_square, count),
+    }
+}
+
+/// Bins of equal width of the residual by another signal.
+fn by(signal: &[f64], residual: &[f64], expected: &Expected) -> Vec<Bin> {
+    let (low, high) = signal
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+            (l.min(*x), h.max(*x))
+        });
+    if high <= low {
+        return vec![bin(low, high, residual.iter().copied(), expected)];
+    }
+    let edge = |i: usize| low + (high - low) * i as f64 / BINS as f64;
+    (0..BINS)
+        .map(|i| {
+            let last = i + 1 == BINS;
+            let inside = signal
+                .iter()
+                .zip(residual)
+                .filter(move |(x, _)| **x >= edge(i) && (**x < edge(i + 1) || last))
+                .map(|(_, r)| *r);
+            bin(edge(i), edge(i + 1), inside, expected)
+        })
+        .collect()
+}
+
+fn rates(series: &Series) -> impl Iterator<Item = f64> {
+    let n = series.model.len();
+    (0..n).map(move |k| {
+        let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+        (series.model[b] - series.model[a]) / (series.time[b] - series.time[a])
+    })
+}
+
+fn by_direction(rate: &[f64], residual: &[f64], expected: &Expected) -> Vec<Bin> {
+    let typical = (rate.iter().map(|r| r * r).sum::<f64>() / rate.len() as f64).sqrt();
+    let (low, high) = rate
+        .iter()
+        .fold((0.0_f64, 0.0_f64), |(l, h), x| (l.min(*x), h.max(*x)));
+    let steady = 0.3 * typical;
+    let within = |from: f64, to: f64| {
+        let inside = rate
+            .iter()
+            .zip(residual)
+            .filter(move |(x, _)| **x >= from && **x < to)
+            .map(|(_, r)| *r);
+        bin(from, to, inside, expected)
+    };
+    vec![
+        within(low, -steady),
+        within(-steady, steady),
+        within(steady, high * (1.0 + 1e-9) + f64::MIN_POSITIVE),
+    ]
+}
+
+/// Octave bands of the residual's periodogram, the root mean square in each; the longest record sets the bands, and
+/// each counts by its samples.
+fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
+    /// One line of one record: its frequency, its part of the mean square, and the noise's.
+    struct Line(f64, f64, f64);
+    let present = |one: &Series| one.residual.iter().filter(|e| !e.is_nan()).count();
+    let samples: usize = series.iter().map(present).sum();
+    let mut lines: Vec<Line> = Vec::new();
+    let mut lowest = f64::INFINITY;
+    for (one, expected) in series.iter().zip(expected) {
+        let n = one.residual.len();
+        let interval = (one.time[n - 1] - one.time[0]) / (n - 1) as f64;
+        let step = 1.0 / (interval * n as f64);
+        lowest = lowest.min(step);
+        // Both signs of a frequency count.
+        let part = 2.0 / samples as f64;
+        // A missing sample shows no line, and what is there stands for it.
+        let present = present(one);
+        let zeroed: Vec<f64> = one
+            .residual
+            .iter()
+            .map(|e| if e.is_nan() { 0.0 } else { *e })
+            .collect();
+        for (k, (line, noise)) in transform(&zeroed)
+            .iter()
+            .zip(&expected.lines)
+            .enumerate()
+            .skip(1)
+        {
+            let own = line.norm_sqr() / present.max(1) as f64;
+            lines.push(Line(k as f64 * step, part * own, part * noise));
+        }
+    }
+    let highest = lines.iter().map(|line| line.0).fold(0.0, f64::max);
+    let mut bands = Vec::new();
+    let mut from = 1.0;
+    // The edges lie between lines of the longest record.
+    while (from - 0.5) * lowest < highest {
+        let (above, below) = ((from - 0.5) * lowest, (2.0 * from - 0.5) * lowest);
+        let (mut count, mut square, mut noise, mut spread) = (0, 0.0, 0.0, 0.0);
+        for line in lines
+            .iter()
+            .filter(|line| line.0 >= above && line.0 < below)
+        {
+            count += 1;
+            square += line.1;
+            noise += line.2;
+            spread += line.2 * line.2;
+        }
+        let ratio = square / noise.max(f64::MIN_POSITIVE);
+        bands.push(Bin {
+            record: None,
+            from: from * lowest,
+            to: (2.0 * from * lowest).min(highest + lowest),
+            count,
+            mean: 0.0,
+            rms: square.sqrt(),
+            fails: ratio > FACTOR_OF_A_BAND
+                && beyond_chance(ratio, 2.0 * noise * noise / spread.max(f64::MIN_POSITIVE)),
+        });
+        from *= 2.0;
+    }
+    bands
+}
+
+/// Where the model fails: windows record by record, the rest over all records together.
+#[must_use]
+pub fn locate(located: &Located) -> Failures {
+    let Located { series, noise, .. } = *located;
+    let expected: Vec<Expected> = series
+        .iter()
+        .map(|one| Expected::of(noise, one.residual.len()))
+        .collect();
+    let mut by_time = Vec::new();
+    for (k, (one, expected)) in series.iter().zip(&expected).enumerate() {
+        by_time.extend(
+            by(one.time, one.residual, expected)
+                .into_iter()
+                .map(|bin| Bin {
+                    record: Some(k),
+                    ..bin
+                }),
+        );
+    }
+    // Where samples of several records come together, those of the longest are tied the most.
+    let Some(longest) = expected.iter().max_by_key(|expected| expected.lines.len()) else {
+        return Failures::default();
+    };
+    let of_all =
+        |signal: fn(&Series) -> Vec<f64>| series.iter().flat_map(signal).collect::<Vec<f64>>();
+    let residual = of_all(|one| one.residual.to_vec());
+    let by_level = by(&of_all(|one| one.model.to_vec()), &residual, longest);
+    let input = of_all(|one| one.input.to_vec());
+    let by_flow = if input.is_empty() {
+        Vec::new()
+    } else {
+        by(&input, &residual, longest)
+    };
+    let by_direction = by_direction(&of_all(|one| rates(one).collect()), &residual, longest);
+    let mut failures = Failures {
+        by_time,
+        by_level,
+        by_flow,
+        by_direction,
+        by_frequency: by_frequency(series, &expected),
+        sentences: Vec::new(),
+    };
+    failures.sentences = sentences::sentences(located, &residual, &failures);
+    failures
+}
+
+#[cfg(test)]
+mod tests;

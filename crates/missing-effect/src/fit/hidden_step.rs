@@ -1,0 +1,177 @@
+//! The step of a coarse sensor under noise: what a model does not explain is a sawtooth of what it reads.
+//!
+//! `D round(y/D) - y` turns once from one multiple of `D` to the next. A fit follows a step only while the highest reading
+//! is as many steps as it really is: one more or less is the minimum of another sawtooth. So the steps are looked
+//! through one by one.
+
+use ct_signals::ArModel;
+use greybox::Setup;
+use plants::Picked;
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    fit::{node::Node, noise_model::NOISE_ORDER},
+};
+
+/// The effect whose step it is.
+pub(crate) const EFFECT: &str = "coarse_quantisation";
+const STEP: &str = "coarse_quantisation.step";
+
+/// The highest reading turns by this part from one step that is looked at to the next.
+const TURN: f64 = 0.25;
+/// Finer steps that are looked at between two, around the best.
+const FINER: usize = 16;
+/// The fewest and the most steps between the lowest and the highest reading.
+const STEPS: (f64, f64) = (2.0, 300.0);
+/// Steps that are looked at times samples, at most. Readings far from zero turn often from one step to the next, and long records
+/// take long: then only coarse steps are looked for.
+const LOOKED_AT: f64 = 3e8;
+
+/// Where the step of a sensor stands in the vector.
+pub(crate) fn step_of(setup: &Setup) -> Option<usize> {
+    setup.names().iter().position(|name| name == STEP)
+}
+
+/// The step of an output's sensor that takes most out of what a node does not explain, the model run on the measured command: there
+/// the level is known best.
+pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, Error> {
+    let outputs = node.setup.outputs();
+    let of_output = |series: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+        series.into_iter().skip(output).step_by(outputs).collect()
+    };
+    let models = of_output(node.setup.simulate(&node.fit.x)?.output);
+    let residuals = of_output(node.setup.residuals(&node.fit.x)?);
+    let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+    let noise = ArModel::fit(&segments, NOISE_ORDER)?;
+    let samples = node.setup.samples_per_output()[output];
+    let (low, high) = models
+        .iter()
+        .flatten()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
+            (low.min(y), high.max(y))
+        });
+    let (span, reach) = (high - low, low.abs().max(high.abs()));
+    let grid = TURN / reach;
+    let affordable = STEPS.0 + LOOKED_AT / samples as f64 * grid * span;
+    // A step below the noise is a noise too.
+    let most = (span / noise.sigma()).min(STEPS.1).min(affordable);
+    if !(span > 0.0 && reach.is_finite() && most > STEPS.0) {
+        return Ok(None);
+    }
+    let left = |turns: f64| -> f64 {
+        let one = |(model, residual): (&Vec<f64>, &Vec<f64>)| {
+            innovations(&without_sawtooth(model, residual, turns), &noise)
+        };
+        models.iter().zip(&residuals).map(one).sum()
+    };
+    let looks = ((most - STEPS.0) / span / grid) as usize + 1;
+    let best_of = |from: f64, grid: f64, count: usize| {
+        (0..count)
+            .into_par_iter()
+            .map(|k| from + grid * k as f64)
+            .map(|turns| (left(turns), turns))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let Some((_, near)) = best_of(STEPS.0 / span, grid, looks) else {
+        return Ok(None);
+    };
+    let finer = grid / FINER as f64;
+    let best = best_of(near - grid, finer, 2 * FINER + 1);
+    // No coarser than a fit may take it: the start that was picked is known by its value (`Structure::ways`).
+    let structure = &node.setup.structure;
+    let visited = structure.scales.level[structure.scales.outputs[output].vessel];
+    let coarsest = 0.5 * (visited.1 - visited.0);
+    Ok(best.map(|(_, turns)| Picked {
+        value: (1.0 / turns).min(coarsest),
+        of: looks as f64,
+    }))
+}
+
+/// What is left of a residual beside the sawtooth of a step, which is so many turns for a unit of the level.
+fn without_sawtooth(model: &[f64], residual: &[f64], turns: f64) -> Vec<f64> {
+    // Added and taken off again, it leaves the nearest whole number; `f64::round` is a call for every sample.
+    const WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
+    let step = 1.0 / turns;
+    model
+        .iter()
+        .zip(residual)
+        .map(|(y, r)| r - (((y * turns + WHOLE) - WHOLE) * step - y))
+        .collect()
+}
+
+/// Sum of squares of what a noise's past does not foretell, from where it has a whole past.
+fn innovations(series: &[f64], noise: &ArModel) -> f64 {
+    if series.iter().any(|value| value.is_nan()) {
+        let whitened = noise.whiten(series);
+        let present = whitened.iter().filter(|value| !value.is_nan());
+        return present.map(|value| value * value).sum();
+    }
+    let mut new = series.to_vec();
+    for (lag, coefficient) in (1..).zip(noise.coefficients()) {
+        for (new, past) in new.iter_mut().skip(lag).zip(series) {
+            *new -= coefficient * past;
+        }
+    }
+    new.iter().skip(noise.order()).map(|e| e * e).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use plants::{EffectInfo, Placed};
+
+    use super::*;
+    use crate::{
+        Options, Problem,
+        base::believed::base,
+        fit::proposal::{Parent, singles},
+        simulated::{self, NOISE},
+    };
+
+    fn problem(step: f64, colour: f64, seed: u64) -> Problem {
+        let read = |_, level: f64| (level / step).round() * step;
+        simulated::tank(|u| u, read, colour, seed)
+    }
+
+    #[test]
+    fn a_step_is_found_under_noise_of_its_own_size() {
+        // Structural errors of 0.5, 1 and 3 times the noise.
+        for (seed, (part, colour)) in [(1.73, 0.0), (3.46, 0.0), (3.46, 0.8), (10.4, 0.8)]
+            .into_iter()
+            .enumerate()
+        {
+            let step = part * NOISE;
+            let problem = problem(step, colour, seed as u64);
+            let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
+            let found = hidden_step(&node, 0).unwrap().unwrap();
+            // Over the range of the readings, of 8 at most, it counts right to less than one. What is below that range is not
+            // seen: at half the noise the whole count may be one off.
+            let counted = |step: f64| 8.0 / step;
+            assert!(
+                (counted(found.value) - counted(step)).abs() < 0.75,
+                "{} for {step}",
+                found.value
+            );
+            // It is what a fit needs to name it.
+            let noise = node.setup.white_noise();
+            assert_eq!(singles(&node, &noise)[0].added[0].effect.id, EFFECT);
+        }
+    }
+
+    #[test]
+    fn the_steps_that_were_looked_at_are_paid_for() {
+        let problem = simulated::tank(|u| u, |_, level| level, 0.0, 7);
+        let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
+        let found = hidden_step(&node, 0).unwrap().unwrap();
+        // From two to as many as the noise leaves room for, over the range of the readings.
+        assert!(found.of > 100.0);
+        let placed = Placed {
+            effect: EffectInfo::find(EFFECT).unwrap(),
+            vessel: 0,
+        };
+        let setup = Parent::new(&node).with(placed).unwrap();
+        // The step itself, begun with and without noise before the rounding.
+        assert_eq!(setup.structure.ways(placed), 2.0 + found.of);
+    }
+}

@@ -1,0 +1,172 @@
+//! A set of effects with its fit, and the fits of what it is changed to.
+
+use greybox::{Fit, Noise, Setup, Start, Stopping, fit_from, fit_onward, random_starts};
+use plants::{ParameterInfo, Placed};
+
+use crate::Error;
+
+/// Where the fit of a believed model stops.
+pub(crate) const STOPPING: Stopping = Stopping {
+    evaluations: 120,
+    cost: 1e-9,
+};
+
+/// A first fit needs no more than this: its rank is sought, not its digits.
+pub(crate) const ROUGH: Stopping = Stopping {
+    evaluations: 20,
+    cost: 1e-3,
+};
+/// Which of many are worth a first fit.
+pub(crate) const QUICK: Stopping = Stopping {
+    evaluations: 5,
+    cost: 1e-3,
+};
+/// What a fit is taken to once its structure has a name.
+pub(crate) const FINE: Stopping = Stopping {
+    evaluations: 80,
+    cost: 1e-8,
+};
+/// Random starts of a set without one of its effects, where it cannot be simulated with the parameters that it had.
+const OTHER_STARTS: usize = 12;
+/// What a valve does that sticks, and the width of its band, as a part of what the command moves over, below which a loop imitates it.
+pub(crate) const STICTION: &str = "stiction_backlash";
+const NARROW: f64 = 0.25;
+
+/// A structure with its fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Node<'a> {
+    pub setup: Setup<'a>,
+    pub fit: Fit,
+    /// What was added to the base, in order.
+    pub added: Vec<Placed>,
+}
+
+impl Node<'_> {
+    /// Fall of the criterion against another node in the same metric.
+    pub fn gain_over(&self, other: &Node) -> f64 {
+        other.fit.bic() - self.fit.bic()
+    }
+
+    /// The leading parameter of an added effect, its size, and where that stands in the vector.
+    pub fn size_of(&self, placed: Placed) -> Option<(ParameterInfo, usize)> {
+        let parameters = self.setup.structure.effect_parameters(placed);
+        let leading = parameters.into_iter().next()?;
+        let at = position_of(&self.setup, placed, leading.name)?;
+        Some((leading, at))
+    }
+
+    /// The added stiction, where its band is narrower than [`NARROW`] of what the command moves over.
+    ///
+    /// In a loop that is not simulated, a disturbance comes back through the command with a delay, as if the valve had play: the model
+    /// that runs on that command takes such a phase for a narrow band. A band that holds the valve over a wide part of the command's
+    /// moves is no such thing.
+    pub fn narrow_stiction(&self) -> Option<usize> {
+        let position = self
+            .added
+            .iter()
+            .position(|placed| placed.effect.id == STICTION)?;
+        let (_, at) = self.size_of(self.added[position])?;
+        let (low, high) = self.setup.structure.site(self.added[position]).input();
+        (self.fit.x[at] < NARROW * (high - low)).then_some(position)
+    }
+}
+
+/// Where a parameter of an effect stands in the vector.
+pub(crate) fn position_of(setup: &Setup, placed: Placed, parameter: &str) -> Option<usize> {
+    let name = format!("{}.{parameter}", placed.effect.id);
+    setup.names().iter().position(|known| *known == name)
+}
+
+/// The parent's vector in the child's order; what the parent does not have is zero.
+pub(crate) fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
+    child
+        .names()
+        .iter()
+        .map(|name| {
+            parent
+                .setup
+                .names()
+                .iter()
+                .position(|known| known == name)
+                .map_or(0.0, |at| parent.fit.x[at])
+        })
+        .collect()
+}
+
+/// Fits a node's structure anew to the end, from where it is and from the given further starts.
+pub(crate) fn refine<'a>(
+    node: &Node<'a>,
+    noise: &Noise,
+    more: &[Vec<f64>],
+) -> Result<Node<'a>, Error> {
+    fitted(node, noise, FINE, more)
+}
+
+pub(crate) fn fitted<'a>(
+    node: &Node<'a>,
+    noise: &Noise,
+    stopping: Stopping,
+    more: &[Vec<f64>],
+) -> Result<Node<'a>, Error> {
+    let mut starts = vec![Start::at_end(&node.fit, noise)];
+    starts.extend(more.iter().cloned().map(Start::from));
+    let fit = fit_onward(&node.setup, starts, noise, stopping)?;
+    Ok(Node {
+        setup: node.setup.clone(),
+        fit,
+        added: node.added.clone(),
+    })
+}
+
+/// The node without one of its effects, refitted from where it was.
+pub(crate) fn without<'a>(
+    node: &Node<'a>,
+    position: usize,
+    noise: &Noise,
+    stopping: Stopping,
+) -> Result<Node<'a>, Error> {
+    let setup = node
+        .setup
+        .with_structure(node.setup.structure.without(node.added[position].effect))?;
+    let start = transfer(node, &setup);
+    let fit = match fit_from(&setup, &[start], noise, stopping) {
+        // Some parameters hold beside the effect alone.
+        Err(greybox::Error::Estimation(greybox::NoFit::NoFiniteStart { .. })) => {
+            let others = random_starts(&setup, OTHER_STARTS, 1);
+            fit_from(&setup, &others, noise, stopping)?
+        }
+        fit => fit?,
+    };
+    let mut added = node.added.clone();
+    added.remove(position);
+    Ok(Node { setup, fit, added })
+}
+
+/// The node without its effects that follow the clock alone, refitted from where it was.
+pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
+    let mut node = node.clone();
+    while let Some(position) = node.added.iter().position(|placed| placed.effect.by_clock) {
+        node = without(&node, position, noise, FINE)?;
+    }
+    Ok(node)
+}
+
+/// By the criterion.
+pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
+    nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
+    nodes
+}
+
+/// Values of series that follow each other as the outputs of records do, without those whose sample is missing: record by record, in the
+/// order of time, each times the weight of its output.
+pub(crate) fn in_time(setup: &Setup, series: &[Vec<f64>], weights: &[f64]) -> Vec<f64> {
+    let (outputs, mut all) = (setup.outputs(), Vec::with_capacity(setup.samples()));
+    for (record, series) in setup.records.iter().zip(series.chunks_exact(outputs)) {
+        for k in 0..record.len() {
+            let at_once = record.outputs.iter().zip(series).zip(weights);
+            let present = at_once.filter(|((output, _), _)| !output.values[k].is_nan());
+            all.extend(present.map(|((_, series), weight)| weight * series[k]));
+        }
+    }
+    all
+}

@@ -1,0 +1,101 @@
+//! The noise floor: the colour of the residual of the richest model in play.
+
+use ct_signals::ArModel;
+use greybox::{Noise, Setup, noise_of, prewhitened};
+
+use crate::{
+    Error,
+    fit::node::{Node, STOPPING},
+};
+
+/// Largest order of the noise model.
+pub(crate) const NOISE_ORDER: usize = 6;
+
+/// The noise model of a node's residual, without the bias that fitting leaves in it.
+pub(crate) fn colour(node: &Node) -> Result<Noise, Error> {
+    Ok(noise_of(&node.setup, &node.fit, NOISE_ORDER)?)
+}
+
+/// The memory of a noise model in whose weighting effects are searched is at most this part of the longest record.
+///
+/// A root near one takes every slow effect for noise, and lets the simulation drift off. Noise whose memory is longer than
+/// this has left fewer than some ten independent samples in the record: nothing says that it is noise.
+const LONGEST_MEMORY: f64 = 1.0 / 15.0;
+
+/// The longest memory of a noise model \[samples\].
+pub(crate) fn longest_memory(setup: &Setup) -> f64 {
+    let lengths = setup.records.iter().map(|record| record.len());
+    LONGEST_MEMORY * lengths.max().unwrap_or(1) as f64
+}
+
+/// A node fitted with the noise model of its own residual, whose memory is limited.
+pub(crate) fn in_own_noise<'a>(node: &Node<'a>) -> Result<Node<'a>, Error> {
+    let memory = Some(longest_memory(&node.setup));
+    Ok(Node {
+        fit: prewhitened(&node.setup, node.fit.clone(), NOISE_ORDER, memory, STOPPING)?,
+        ..node.clone()
+    })
+}
+
+/// The noise model of residuals as they are, without what the fit has taken from the noise.
+pub(crate) fn residual_colour(setup: &Setup, residuals: &[Vec<f64>]) -> Result<Noise, Error> {
+    let noise = Noise::fit(residuals, setup.outputs(), NOISE_ORDER);
+    Ok(noise.map_err(greybox::Error::from)?)
+}
+
+/// The criterion of a node as it is fitted, its residual whitened by an autoregressive model of its own: that of the fit in
+/// that metric is a little lower.
+pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
+    let residuals = node.setup.disturbance(&node.fit.x)?;
+    let noise = residual_colour(&node.setup, &residuals)?;
+    let mut costs = vec![0.0; noise.outputs()];
+    let mut log_det = 0.0;
+    for (i, (segment, whitened)) in residuals.iter().zip(noise.whiten(&residuals)).enumerate() {
+        let present = whitened.iter().filter(|w| !w.is_nan());
+        costs[i % noise.outputs()] += present.map(|w| w * w).sum::<f64>();
+        let model = noise.of_series(i);
+        log_det += model.log_det_of(segment.iter().map(|e| !e.is_nan()));
+    }
+    let outputs = costs.iter().zip(node.setup.samples_per_output());
+    let deviance: f64 = outputs
+        .map(|(cost, &n)| n as f64 * (cost / n as f64).max(f64::MIN_POSITIVE).ln())
+        .sum();
+    Ok(deviance + log_det + node.setup.price(noise.order()))
+}
+
+/// The noise's spectrum at frequency zero over its mean: by how much slow parameters are less certain than under
+/// white noise of the same size.
+pub(crate) fn slowness_of(noise: &ArModel) -> f64 {
+    let sum: f64 = noise.coefficients().iter().sum();
+    ((noise.sigma() / (1.0 - sum)).powi(2) / noise.stationary_std().powi(2)).max(1.0)
+}
+
+/// The same of several outputs together: samples over independent samples.
+pub(crate) fn slowness(noise: &Noise, samples: &[usize]) -> f64 {
+    if let [only] = samples {
+        return if *only > 0 {
+            slowness_of(noise.output(0))
+        } else {
+            1.0
+        };
+    }
+    let independent = noise.iter().zip(samples);
+    let independent: f64 = independent
+        .map(|(noise, &samples)| samples as f64 / slowness_of(noise))
+        .sum();
+    samples.iter().sum::<usize>() as f64 / independent.max(f64::MIN_POSITIVE)
+}
+
+/// Independent samples that a parameter should have for a fit in the noise's metric.
+const SAMPLES_PER_PARAMETER: f64 = 10.0;
+
+/// Whether the residual of the richest model wanders so slowly that hardly any independent samples are left.
+///
+/// A fit in the metric of such a "noise" looks at fast changes alone and lets the simulation drift off; more often than
+/// not it is structure that the catalogue does not hold. Then effects are still confirmed in that metric, which is the
+/// careful one, but the models that are shown are fitted to the simulation error.
+pub(crate) fn wanders(node: &Node, noise: &Noise) -> bool {
+    let independent =
+        node.setup.samples() as f64 / slowness(noise, node.setup.samples_per_output());
+    noise.order() > 0 && independent < SAMPLES_PER_PARAMETER * node.setup.free().len() as f64
+}

@@ -1,0 +1,34 @@
+//! The control loop that the records come from.
+
+use serde::{Deserialize, Serialize};
+
+/// The loop that the records come from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ControlLoop {
+    /// The loop was simulated from its reference; otherwise the model ran on the measured command.
+    pub simulated: bool,
+    /// p-value of the test that the noise does not show in the command; `None` where a controller is known.
+    pub feedback_p: Option<f64>,
+    /// Measured command less the one that the controller gives on the measured reading, root mean square, in the input's
+    /// unit; `None` where that was not looked at.
+    pub mismatch: Option<f64>,
+    /// What the user should know of it, in words.
+    pub said: Vec<String>,
+}
+
+impl ControlLoop {
+    /// A loop whose model ran on the measured command, and what that means.
+    pub(crate) fn measured(feedback_p: Option<f64>, mismatch: Option<f64>, said: String) -> Self {
+        Self {
+            simulated: false,
+            feedback_p,
+            mismatch,
+            said: vec![said],
+        }
+    }
+
+    /// Standard errors have to allow for what feedback does.
+    pub(crate) fn widens(known: Option<&Self>) -> bool {
+        known.is_some_and(|known| !known.simulated)
+    }
+}

@@ -1,0 +1,150 @@
+//! The result of a diagnosis: plain structs, written as JSON as they stand; everything that is
+//! printed or plotted is derived from them.
+
+mod control_loop;
+mod gaps;
+mod noise_floor;
+mod parameter;
+mod per_output;
+mod read;
+mod record;
+mod scores;
+mod step;
+mod unknown;
+
+use ct_signals::Clock;
+pub use effect_search::Verdict;
+use plants::{Domain, Plant};
+use serde::{Deserialize, Serialize};
+
+pub use self::{
+    control_loop::ControlLoop,
+    gaps::{LONGEST_HOLD, MendedGaps},
+    noise_floor::NoiseFloor,
+    parameter::Parameter,
+    per_output::PerOutput,
+    record::{Shown, ShownInput},
+    scores::{Acceptance, PlaceScore, Rankings, Score},
+    step::{Bin, Failures, HeldOutError, OutputStep, ResidualTests, Step},
+    unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window},
+};
+pub(crate) use self::{
+    noise_floor::Floors,
+    read::{no_number, none, number, numbers},
+    unknown::SHAPES,
+};
+
+/// How times are said where no calendar is known.
+fn plain_clock() -> Clock {
+    Clock::of([])
+}
+
+/// What was spent, and what the limit on the time left out.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Effort {
+    /// Limit on the search \[s\]; `None`: no limit.
+    pub limit: Option<f64>,
+    /// Steps of the search that were cut short or left out; empty where all were done.
+    pub left_out: Vec<String>,
+    /// The user ended the search, and this is the best so far.
+    pub interrupted: bool,
+}
+
+/// What a diagnosis found. Read again from JSON it has all that is written there; records, simulated series and the clock are not.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// Version of this layout.
+    pub schema: u32,
+    /// The finding; after a comparison, which searches nothing, `Unexplained` where the model lacks something.
+    pub verdict: Verdict,
+    /// How the times of the records are said.
+    #[serde(skip, default = "plain_clock")]
+    pub clock: Clock,
+    /// What was done about rows and samples of inputs that are missing; `None` where none are.
+    pub gaps: Option<MendedGaps>,
+    /// The effects that were added, in order.
+    pub effects: Vec<String>,
+    /// For each of them itself, then all that cannot be told apart from it on these data, best first.
+    pub groups: Vec<Vec<String>>,
+    /// For each of them whether it is in doubt: its size ends at the edge of what is plausible, so that it describes the data
+    /// rather than explains them.
+    pub in_doubt: Vec<bool>,
+    /// For each of them the places where it may act, most likely first; one where there is no choice.
+    pub places: Vec<Vec<PlaceScore>>,
+    /// The acceptance test; `None` after a comparison, which searches nothing, and where the model is adequate.
+    pub acceptance: Option<Acceptance>,
+    /// What the last model leaves is more than noise: something is missing still, or a disturbance acts.
+    pub residual_unexplained: bool,
+    /// The single effects, best first, at the first step; `none` first when the model is adequate.
+    pub ranked: Vec<String>,
+    /// The base model and every model after it.
+    pub steps: Vec<Step>,
+    /// Standard deviation of the noise, in the output's unit; NaN, and not written, of several outputs.
+    #[serde(
+        skip_serializing_if = "crate::result::none",
+        default = "crate::result::no_number"
+    )]
+    #[serde(deserialize_with = "crate::result::number")]
+    pub noise_floor: f64,
+    /// The noise floor of each output, and how it was found.
+    pub noise: Vec<NoiseFloor>,
+    /// The single effects under both weightings.
+    pub rankings: Rankings,
+    /// The limit on the time, and what it left out.
+    pub effort: Effort,
+    /// The scores of the single effects at the first step, best first.
+    pub scores: Vec<Score>,
+    /// What is missing where the catalogue does not explain it.
+    pub unknown: Option<Unknown>,
+    /// The loop that the records come from, where there is one.
+    pub control_loop: Option<ControlLoop>,
+    /// The findings in words.
+    pub sentences: Vec<String>,
+    /// The plant, as the model file names it.
+    pub plant: String,
+    /// The effects and the terms that the model file already had.
+    pub known_effects: Vec<String>,
+    /// Unit of the input.
+    pub input_unit: String,
+    /// Names of the outputs.
+    pub outputs: Vec<String>,
+    /// Unit of the outputs.
+    pub output_unit: String,
+    /// Unit of each output where they differ; else empty.
+    #[serde(skip)]
+    pub output_units: Vec<String>,
+    /// The records, fitted ones first.
+    #[serde(skip)]
+    pub records: Vec<Shown>,
+    /// How long it took \[s\].
+    #[serde(deserialize_with = "crate::result::number")]
+    pub seconds: f64,
+}
+
+impl Diagnosis {
+    /// The domain of the model, which says what things are called.
+    #[must_use]
+    pub fn domain(&self) -> Domain {
+        domain_of(&self.plant, &self.output_unit)
+    }
+
+    /// The unit of an output, by its position.
+    #[must_use]
+    pub fn unit_of(&self, output: usize) -> &str {
+        self.output_units.get(output).unwrap_or(&self.output_unit)
+    }
+
+    /// Adds what is known of the loop, and what there is to say of it.
+    pub(crate) fn speak_of_the_loop(&mut self, known: Option<ControlLoop>) {
+        if let Some(known) = &known {
+            self.sentences.extend_from_slice(&known.said);
+        }
+        self.control_loop = known;
+    }
+}
+
+/// The domain of a plant by its name and of its output's unit.
+pub(crate) fn domain_of(plant: &str, output_unit: &str) -> Domain {
+    let plant: Result<Plant, _> = plant.parse();
+    plant.map_or(Domain::Hydraulic, |plant| Domain::of(plant, output_unit))
+}

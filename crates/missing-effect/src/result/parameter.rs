@@ -1,0 +1,49 @@
+//! A fitted parameter with its standard error and what was known of it before.
+
+use greybox::PriorValue;
+use serde::{Deserialize, Serialize};
+
+use crate::numbers::value_and_error;
+
+/// A fitted parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// Its name, `alpha` or `overflow.rim`; initial states are `level(0)` and the like.
+    pub name: String,
+    /// The estimate, in `unit`.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub value: f64,
+    /// Its standard error, in `unit`; `None` where the data do not determine it or it sits at a bound.
+    pub std_error: Option<f64>,
+    /// Unit, for example `cm^2.5/s`.
+    pub unit: String,
+    /// What is known of it beside the records, where the model says so; the estimate has it in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PriorValue>,
+}
+
+/// Records that are further from a prior than so many standard errors of the two together disagree with it.
+const DISAGREES: f64 = 3.0;
+
+impl Parameter {
+    /// Its prior in words, and how far it is from there where the two disagree.
+    #[must_use]
+    pub fn prior_words(&self) -> Option<String> {
+        let prior = self.prior?;
+        let (value, error) = value_and_error(prior.value, Some(prior.std_error));
+        // The estimate has the prior in it: their difference is the less uncertain the better the prior is beside the records.
+        let own = self.std_error.map_or(0.0, |error| error * error);
+        let variance = prior.std_error * prior.std_error - own;
+        let scale = if variance > 0.0 {
+            variance.sqrt()
+        } else {
+            prior.std_error
+        };
+        let away = (self.value - prior.value).abs() / scale;
+        let mut words = format!("prior {value} ± {}", error.unwrap_or_default());
+        if away > DISAGREES {
+            words += &format!("; the records disagree with it by {away:.1} standard errors");
+        }
+        Some(words)
+    }
+}

@@ -1,0 +1,24 @@
+//! Numbers that may not be finite: JSON writes them as `null`, or leaves them out.
+
+use serde::{Deserialize, Deserializer};
+
+/// There is no such number.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+pub(crate) fn none(value: &f64) -> bool {
+    value.is_nan()
+}
+
+/// Reads a number that may not be finite, which JSON writes as `null`.
+pub(crate) fn number<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+/// The same of several.
+pub(crate) fn numbers<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+    let all = Vec::<Option<f64>>::deserialize(from)?;
+    Ok(all.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect())
+}
+
+pub(crate) fn no_number() -> f64 {
+    f64::NAN
+}

@@ -1,0 +1,66 @@
+//! A record as the report shows it.
+
+use ct_signals::Record;
+use serde::{Deserialize, Serialize};
+
+/// A record as the report shows it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Shown {
+    /// Name.
+    pub name: String,
+    /// It took no part in any fit or choice.
+    pub held_out: bool,
+    /// Sampling instants \[s\].
+    #[serde(deserialize_with = "crate::result::numbers")]
+    pub time: Vec<f64>,
+    /// The inputs that the model runs on; of a plant the command first.
+    pub inputs: Vec<ShownInput>,
+    /// Readings, a series for each output.
+    pub outputs: Vec<Vec<f64>>,
+}
+
+/// An input of a record as the report shows it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShownInput {
+    /// How it is called: `input`, `input 2`, or its own name.
+    pub name: String,
+    /// Its unit; empty where none is known.
+    pub unit: String,
+    /// Its samples \[unit\].
+    #[serde(deserialize_with = "crate::result::numbers")]
+    pub values: Vec<f64>,
+}
+
+impl Shown {
+    /// A record; `held_out`: it takes no part in any fit or choice.
+    #[must_use]
+    pub fn of(record: &Record, held_out: bool) -> Self {
+        Self {
+            name: record.name.clone(),
+            held_out,
+            time: record.time.clone(),
+            inputs: record
+                .inputs
+                .iter()
+                .enumerate()
+                .map(|(k, input)| ShownInput {
+                    name: if record.inputs.len() > 1 {
+                        format!("input {}", k + 1)
+                    } else {
+                        "input".to_string()
+                    },
+                    unit: input.unit.clone(),
+                    values: input.values.clone(),
+                })
+                .collect(),
+            outputs: record.outputs.iter().map(|y| y.values.clone()).collect(),
+        }
+    }
+
+    /// Readings that are there, of all outputs.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        let readings = self.outputs.iter().flatten();
+        readings.filter(|y| !y.is_nan()).count()
+    }
+}

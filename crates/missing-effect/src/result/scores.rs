@@ -1,0 +1,87 @@
+//! Scores of the single effects, and the acceptance test of those that are reported.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Parameter, PerOutput};
+
+/// One candidate of the catalogue at the first step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// The effect.
+    pub effect: String,
+    /// The vessel or pump it acts in, where the plant has more than one.
+    pub place: Option<String>,
+    /// Fall of the Bayesian information criterion when it is added and everything is refitted; larger is better.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub bic_gain: f64,
+    /// Simulation error after the refit, in the output's unit; NaN, and not written, of several outputs.
+    #[serde(
+        skip_serializing_if = "crate::result::none",
+        default = "crate::result::no_number"
+    )]
+    #[serde(deserialize_with = "crate::result::number")]
+    pub rmse: f64,
+    /// The same of all outputs, each divided by the noise floor of its output.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub weighted_rmse: f64,
+    /// `|p|/|j|`: the part of the effect's signature that the fitted parameters cannot imitate.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub visibility: f64,
+    /// The size that was found: the effect's leading parameter.
+    pub size: Option<Parameter>,
+    /// The smallest size that these data would show, in the unit of `size`; `None` where the effect has no signature while it is absent, or
+    /// the fitted parameters imitate all of it.
+    pub smallest_visible: Option<f64>,
+}
+
+/// The acceptance test of the effects that are reported or, where none is, of the best that were refused: one test for all
+/// verdicts.
+///
+/// An effect is the answer (`effect`, `undecided`) where it leaves noise, or explains `required` of the excess error; it is a
+/// part of the answer (`partial`) where it explains `required_partial`; else nothing explains the record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Acceptance {
+    /// The effects that were tested; empty where no candidate lowers the error.
+    pub effects: Vec<String>,
+    /// Part of the excess error that they explain on the fitted records: the fall of the mean squared simulation error over
+    /// its excess above `floor` squared, at most 1; of several outputs errors are divided by `floor` first.
+    pub share: Option<f64>,
+    /// The same on the held-out records; it takes no part in the verdict.
+    pub share_test: Option<f64>,
+    /// Least `share` of an answer that leaves more than noise.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub required: f64,
+    /// Least `share` of a partial answer.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub required_partial: f64,
+    /// Standard deviation of the noise that is no excess, by output \[output unit\].
+    pub floor: PerOutput,
+    /// Fall of the criterion (BIC), each model under the noise model of its own residual.
+    pub bic_fall: Option<f64>,
+    /// What it has to exceed.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub required_bic_fall: f64,
+    /// Why the effects were refused, or are a part of the answer only; empty where they are the answer.
+    pub reasons: Vec<String>,
+}
+
+/// Where an effect may act, and how likely each place is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlaceScore {
+    /// The vessel or pump.
+    pub place: String,
+    /// Likelihood relative to the best place, 0 to 1, everything else refitted.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub relative_likelihood: f64,
+}
+
+/// The single effects ranked under two weightings of the residual.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rankings {
+    /// By the simulation error (white noise), best first.
+    pub white: Vec<String>,
+    /// Prewhitened by the noise model (GLS), best first; empty where the noise is white.
+    pub prewhitened: Vec<String>,
+    /// The best effects differ beyond what data of this kind tell apart.
+    pub disagree: bool,
+}

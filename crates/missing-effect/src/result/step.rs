@@ -1,0 +1,143 @@
+//! One model on the way from the base to the last set of effects: its errors, its parameters, its residual tests and where it fails.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Parameter, PerOutput};
+
+/// Residual tests of one fit, of its first record but for `input_p`; the bounds are for 95 %.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResidualTests {
+    /// Autocorrelation of the simulation residual at lags 0, 1, ...
+    #[serde(deserialize_with = "crate::result::numbers")]
+    pub autocorrelation: Vec<f64>,
+    /// Cross-correlation of the whitened input with the whitened residual at lags 0, 1, ...
+    #[serde(deserialize_with = "crate::result::numbers")]
+    pub cross_correlation: Vec<f64>,
+    /// Half-width of the 95 % band of the autocorrelation.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub autocorrelation_bound: f64,
+    /// Half-width of the 95 % band of the cross-correlation.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub cross_correlation_bound: f64,
+    /// p-value of the Ljung-Box test: whiteness of the simulation residual.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub whiteness_p: f64,
+    /// p-value of the portmanteau test of the cross-correlation with the input (in a simulated loop the reference), of all records.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub input_p: f64,
+}
+
+/// The residual in one bin of something: a time window, a range of level, of flow, ...
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Bin {
+    /// Position of the record that a window lies in, fitted ones first; `None` where all fitted records are counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub record: Option<usize>,
+    /// Lower edge.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub from: f64,
+    /// Upper edge.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub to: f64,
+    /// Samples in it; of frequencies the lines of the spectrum.
+    pub count: usize,
+    /// Mean residual (measured minus model), in the output's unit; zero of frequencies.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub mean: f64,
+    /// Root mean square of the residual, in the output's unit.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub rms: f64,
+    /// It fails: its mean square is clearly above what the noise would show there.
+    pub fails: bool,
+}
+
+/// Where a model fails, in all records that it was fitted to.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Failures {
+    /// By time \[s\], record by record.
+    pub by_time: Vec<Bin>,
+    /// By the model's level, in the output's unit.
+    pub by_level: Vec<Bin>,
+    /// By the command to the actuator (the flow into the process), in the input's unit.
+    pub by_flow: Vec<Bin>,
+    /// By direction of change of the model's level: falling, steady, rising (the edges are rates per second).
+    pub by_direction: Vec<Bin>,
+    /// By frequency \[Hz\]: the root mean square of the residual in octave bands.
+    pub by_frequency: Vec<Bin>,
+    /// The same in words, the worst first.
+    pub sentences: Vec<String>,
+}
+
+/// One model on the way: the base, or the base and the effects added so far.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// The effect that this step added; `None` for the base.
+    pub added: Option<String>,
+    /// The vessel or pump it acts in, where the plant has more than one: `upper` or `lower` of two tanks.
+    pub place: Option<String>,
+    /// Root mean square of the simulation error on the fitted records, in the output's unit; NaN, and not written, of several outputs.
+    #[serde(
+        skip_serializing_if = "crate::result::none",
+        default = "crate::result::no_number"
+    )]
+    #[serde(deserialize_with = "crate::result::number")]
+    pub rmse: f64,
+    /// The same on the held-out record, whose first five samples set its initial states and are not scored.
+    pub rmse_test: Option<f64>,
+    /// `rmse` of each output by its name.
+    pub rmse_per_output: PerOutput,
+    /// `rmse_test` of each output by its name.
+    pub rmse_test_per_output: Option<PerOutput>,
+    /// Root mean square of the simulation errors of all outputs, each divided by the noise floor of its output: one is the noise.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub weighted_rmse: f64,
+    /// The same on the held-out record.
+    pub weighted_rmse_test: Option<f64>,
+    /// Bayesian information criterion with this model's own noise colour; smaller is better.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub bic: f64,
+    /// Parameters in chain order, initial states last.
+    pub parameters: Vec<Parameter>,
+    /// How many starts were tried.
+    pub starts: usize,
+    /// How many of them ended in the best minimum.
+    pub starts_agree: usize,
+    /// What it shows at each output, in order.
+    pub outputs: Vec<OutputStep>,
+    /// The model's simulated outputs, one series per fitted record and, within it, output, then those of the held-out records.
+    #[serde(skip)]
+    pub simulated: Vec<Vec<f64>>,
+}
+
+/// What one model shows at one output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OutputStep {
+    /// Its name.
+    pub name: String,
+    /// Root mean square of the simulation error on the fitted records, in the output's unit.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub rmse: f64,
+    /// The same on the held-out records.
+    pub rmse_test: Option<f64>,
+    /// The parts of `rmse_test`; `None` without held-out records.
+    pub held_out_error: Option<HeldOutError>,
+    /// Residual tests.
+    pub tests: ResidualTests,
+    /// Where it fails.
+    pub failures: Failures,
+}
+
+/// The mean squared error on held-out records, split into what an offset, a gain and neither of them explains, as root mean
+/// squares \[output unit\].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeldOutError {
+    /// Mean of measured minus model, record by record.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub offset: f64,
+    /// What a factor on the model's deviations from its mean explains beside the offset.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub gain: f64,
+    /// What is left: the shape.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub shape: f64,
+}

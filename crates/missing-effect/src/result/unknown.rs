@@ -1,0 +1,156 @@
+//! What is missing where the catalogue does not explain it.
+
+use plants::{EffectInfo, Variable};
+use serde::{Deserialize, Serialize};
+
+/// A name that the program has: of a type of its own, as serde would borrow a plain reference from what is read.
+pub(crate) type Name = &'static str;
+
+/// The names of simple shapes.
+pub(crate) const SHAPES: [Name; 8] = [
+    "constant",
+    "line",
+    "square root",
+    "parabola",
+    "threshold",
+    "end of a range",
+    "step",
+    "swing",
+];
+
+/// How likely the missing term acts at a place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlaceLikelihood {
+    /// `actuator`, `vessel` (`upper` or `lower` of two) or `sensor` (`sensor upper` of several).
+    pub place: String,
+    /// Restricted log-likelihood below that of the best place.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub below_best: f64,
+}
+
+/// How much of the missing term a variable predicts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Share {
+    /// The place.
+    pub place: String,
+    /// `level`, `rate` or `input`.
+    #[serde(deserialize_with = "variable_name")]
+    pub variable: Name,
+    /// Share of the fall of the squared error that is reached on parts of the data that were not fitted; one is all of it.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub share: f64,
+    /// Its standard error, from the scatter between the parts.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub std_error: f64,
+}
+
+/// Reads the name of a variable.
+fn variable_name<'de, D: serde::Deserializer<'de>>(from: D) -> Result<&'static str, D::Error> {
+    let name = String::deserialize(from)?;
+    let all = [
+        Variable::Level,
+        Variable::Rate,
+        Variable::Input,
+        Variable::Time,
+    ];
+    let known = all
+        .iter()
+        .map(|variable| variable.name())
+        .find(|known| *known == name);
+    known.ok_or_else(|| serde::de::Error::custom(format_args!("no variable is called `{name}`")))
+}
+
+/// A stretch of time in which the missing term is clearly not zero.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Window {
+    /// Its beginning, in the record's time \[s\].
+    #[serde(deserialize_with = "crate::result::number")]
+    pub from: f64,
+    /// Its end \[s\].
+    #[serde(deserialize_with = "crate::result::number")]
+    pub to: f64,
+    /// Mean of the missing term in it, in the term's unit.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub mean: f64,
+}
+
+/// What is missing where the catalogue does not explain it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Unknown {
+    /// Where it acts: `actuator`, `vessel` (of several by its name, `upper` or `T1`) or `sensor`.
+    pub place: String,
+    /// Unit of the term: of the command, of a flow, or of the reading.
+    pub unit: String,
+    /// Every place, the most likely first.
+    pub places: Vec<PlaceLikelihood>,
+    /// The first record's time, in its own count \[s\].
+    #[serde(deserialize_with = "crate::result::numbers")]
+    pub time: Vec<f64>,
+    /// The missing term beside the fitted model.
+    #[serde(deserialize_with = "crate::result::numbers")]
+    pub value: Vec<f64>,
+    /// Its standard error.
+    #[serde(deserialize_with = "crate::result::numbers")]
+    pub std_error: Vec<f64>,
+    /// The random walk's standard deviation after one second, in the term's unit.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub intensity: f64,
+    /// Standard deviation of the measurement noise beside it, in the output's unit; of several outputs relative to the weighted mean.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub noise: f64,
+    /// Where it is clearly not zero, the strongest first.
+    pub windows: Vec<Window>,
+    /// Root mean square of the residual that it leaves, in the output's unit.
+    #[serde(deserialize_with = "crate::result::number")]
+    pub rmse: f64,
+    /// Every variable, the best first.
+    pub shares: Vec<Share>,
+    /// What it depends on: `level`, `rate`, `input`, or `time` where none of them predicts it.
+    #[serde(deserialize_with = "variable_name")]
+    pub variable: Name,
+    /// Unit of the variable.
+    pub variable_unit: String,
+    /// Knots of the shape, in the variable's unit; time since the record began.
+    #[serde(deserialize_with = "crate::result::numbers")]
+    pub knots: Vec<f64>,
+    /// The shape at the knots, without what the plant's own parameters imitate.
+    #[serde(deserialize_with = "crate::result::numbers")]
+    pub ordinates: Vec<f64>,
+    /// Standard errors of the ordinates.
+    #[serde(deserialize_with = "crate::result::numbers")]
+    pub ordinate_errors: Vec<f64>,
+    /// The nearest simple shape, where one comes near.
+    pub primitive: Option<Primitive>,
+}
+
+/// A simple shape.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Primitive {
+    /// `constant`, `line`, `square root`, `parabola`, `threshold`, `end of a range`, `step` or `swing`.
+    #[serde(deserialize_with = "family_name")]
+    pub name: Name,
+    /// Where a threshold or a step lies, or the period of a swing, in the variable's unit.
+    pub at: Option<f64>,
+    /// Effects of the catalogue that leave such a shape.
+    #[serde(deserialize_with = "effect_names")]
+    pub effects: Vec<&'static str>,
+}
+
+/// Reads the name of a shape.
+fn family_name<'de, D: serde::Deserializer<'de>>(from: D) -> Result<&'static str, D::Error> {
+    let name = String::deserialize(from)?;
+    let known = SHAPES.iter().find(|shape| **shape == name);
+    known
+        .copied()
+        .ok_or_else(|| serde::de::Error::custom(format_args!("no shape is called `{name}`")))
+}
+
+/// Reads identifiers of effects.
+fn effect_names<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<&'static str>, D::Error> {
+    let names = Vec::<String>::deserialize(from)?;
+    let known = names.iter().map(|name| {
+        let known = EffectInfo::find(name).map(|effect| effect.id);
+        known.ok_or_else(|| serde::de::Error::custom(format_args!("no effect is called `{name}`")))
+    });
+    known.collect()
+}

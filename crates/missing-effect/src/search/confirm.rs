@@ -1,0 +1,95 @@
+//! Confirmation: which effects of a set stay when the noise may explain what they explain.
+
+use greybox::Noise;
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    fit::{
+        criterion::{BIC_MARGIN, beyond_chance},
+        node::{FINE, Node, best_first, without},
+    },
+    search::exchange::{NEAR, exchanges},
+};
+
+/// Of the exchanges that come near so many are followed, the best; ...
+const EXCHANGES: usize = 6;
+/// ... one of as many effects is taken where the criterion falls by this.
+const CLEARLY: f64 = 1.0;
+
+/// Takes out, one by one, what the noise explains as well, first what is worth least.
+pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
+    loop {
+        // Each has its own share of the risk: that the one which is worth least is beyond chance says nothing of the others.
+        let lacking = each_lacking(&node, noise)?.into_iter();
+        let doubtful = lacking.filter(|lacking| {
+            node.gain_over(lacking) <= BIC_MARGIN || !beyond_chance(&node, lacking)
+        });
+        let Some(least) = least_bic(doubtful) else {
+            return Ok(node);
+        };
+        node = least;
+    }
+}
+
+/// Exchanges effects for others while that makes another one superfluous, or the whole better.
+///
+/// Of sets that take the same out of a residual the search follows one, and a stand-in that is nearly right calls for a
+/// further effect that mends it: on the emulated rig of a closed loop a raised outlet stood for the pump's dead zone, and a bent
+/// pump for the difference. With the dead zone in its place the bend is not needed.
+pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
+    // Every round ends with fewer effects, or with a lower criterion of as many.
+    while node.added.len() > 1 {
+        let mut others: Vec<Node<'a>> = (0..node.added.len())
+            .into_par_iter()
+            .map(|position| exchanges(&node, position, noise, None))
+            .collect::<Result<Vec<_>, _>>()?
+            .concat();
+        others.retain(|other| other.gain_over(&node) > -NEAR && other.plausible());
+        let mut others = best_first(others);
+        others.truncate(EXCHANGES);
+        let others = others
+            .into_par_iter()
+            .map(|other| confirm(other, noise))
+            .collect::<Result<Vec<_>, _>>()?;
+        let better = |other: &Node| {
+            let margin = if other.added.len() < node.added.len() {
+                BIC_MARGIN
+            } else {
+                -CLEARLY
+            };
+            other.fit.bic() - node.fit.bic() < margin
+        };
+        let Some(best) = others
+            .into_iter()
+            .filter(|other| other.added.len() <= node.added.len() && better(other))
+            .min_by(|a, b| {
+                let key = |node: &Node| (node.added.len(), node.fit.bic());
+                key(a)
+                    .partial_cmp(&key(b))
+                    .unwrap_or(std::cmp::Ordering::Equal)
+            })
+        else {
+            break;
+        };
+        node = best;
+    }
+    Ok(node)
+}
+
+/// The node without the effect whose loss costs least; `None` where it has none.
+pub(crate) fn least_useful<'a>(node: &Node<'a>, noise: &Noise) -> Result<Option<Node<'a>>, Error> {
+    Ok(least_bic(each_lacking(node, noise)?.into_iter()))
+}
+
+/// The node without each of its effects.
+fn each_lacking<'a>(node: &Node<'a>, noise: &Noise) -> Result<Vec<Node<'a>>, Error> {
+    (0..node.added.len())
+        .into_par_iter()
+        .map(|position| without(node, position, noise, FINE))
+        .collect()
+}
+
+fn least_bic<'a>(nodes: impl Iterator<Item = Node<'a>>) -> Option<Node<'a>> {
+    nodes.min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()))
+}

@@ -1,0 +1,138 @@
+//! Sets in which one effect stands in the place of another.
+
+use greybox::Noise;
+use plants::{Placed, Unit};
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    fit::{
+        node::{FINE, Node, QUICK, ROUGH, best_first, fitted, refine, transfer, without},
+        proposal::{Parent, Proposal, candidates, promising, propose, realise},
+    },
+};
+
+/// A rough fit this near in the criterion may come within a group's margin.
+pub(crate) const NEAR: f64 = 25.0;
+/// Stand-ins that are refitted for each effect: so many that a promise favours, and so many that a few steps favour.
+const EXCHANGED: usize = 12;
+/// In a set of more than so many effects half as many, and a few steps for so many: a fit costs several times as much.
+const LARGE: usize = 2;
+const QUICKLY: usize = 16;
+/// What is behind by more than this part of an effect's own gain after a few steps does not catch up.
+const OUT_OF_REACH: f64 = 0.5;
+
+/// The node with one of its effects exchanged for each other candidate, refitted, best first.
+///
+/// `singles`: what [`singles`](crate::fit::proposal::singles) gives in the same metric. It holds the exchanges of an only effect.
+pub(crate) fn exchanges<'a>(
+    node: &Node<'a>,
+    position: usize,
+    noise: &Noise,
+    singles: Option<&[Node<'a>]>,
+) -> Result<Vec<Node<'a>>, Error> {
+    if node.setup.leaves_out("the exchange of confirmed effects") {
+        return Ok(Vec::new());
+    }
+    let lacking = without(node, position, noise, FINE)?;
+    let own = node.added[position];
+    let reach = (4.0 * NEAR).max(OUT_OF_REACH * lacking.gain_over(node).abs());
+    let begun = match singles {
+        Some(singles) if node.added.len() == 1 => singles
+            .iter()
+            .filter(|single| single.added.last() != Some(&own))
+            .cloned()
+            .collect(),
+        _ => begin_exchanges(&lacking, node, own, noise),
+    };
+    let nodes = begun
+        .into_par_iter()
+        .filter_map(|begun| {
+            let carried = carried(node, own, &begun);
+            let near = carried.is_some() || node.gain_over(&begun) < reach;
+            near.then(|| fitted(&begun, noise, ROUGH, carried.as_slice()).ok())?
+        })
+        .map(|rough| {
+            // Who comes near is fitted to the end: a group's edge is finer than a rough fit.
+            if rough.fit.bic() - node.fit.bic() < NEAR {
+                refine(&rough, noise, &[]).unwrap_or(rough)
+            } else {
+                rough
+            }
+        })
+        .collect();
+    Ok(best_first(nodes))
+}
+
+/// A start of a stand-in whose size is of the same kind as that of the effect it stands for: the same size.
+///
+/// What a lag of the pump is to the sensor's, a time constant that the data determine: from a grid of starts, with two more in
+/// the tanks to get out of its way, a fit creeps towards it.
+fn carried(node: &Node, own: Placed, stand_in: &Node) -> Option<Vec<f64>> {
+    let added = *stand_in.added.last()?;
+    let (from, at) = node.size_of(own)?;
+    let (to, into) = stand_in.size_of(added)?;
+    if from.unit != to.unit || from.unit == Unit::ONE {
+        return None;
+    }
+    let mut x = transfer(node, &stand_in.setup);
+    x[into] = node.fit.x[at].clamp(to.lower, to.upper);
+    // What else the stand-in has is where it is.
+    for (name, (value, fitted)) in stand_in
+        .setup
+        .names()
+        .iter()
+        .zip(x.iter_mut().zip(&stand_in.fit.x))
+    {
+        if !node.setup.names().contains(name) && *value == 0.0 {
+            *value = *fitted;
+        }
+    }
+    Some(x)
+}
+
+/// First fits of what may stand in the place of an effect; `lacking` is the node without it.
+fn begin_exchanges<'a>(
+    lacking: &Node<'a>,
+    node: &Node<'a>,
+    own: Placed,
+    noise: &Noise,
+) -> Vec<Node<'a>> {
+    let from = Parent::new(lacking);
+    let mut proposals: Vec<Proposal> = candidates(lacking)
+        .into_par_iter()
+        .filter(|placed| *placed != own)
+        .filter_map(|placed| {
+            let mut proposal = propose(&from, placed, noise)?;
+            proposal.starts.truncate(1);
+            // The model that lacks the effect has bent the other parameters to imitate it, and may have lost its way back.
+            // Beside a true stand-in they are where they are beside the effect itself.
+            if let Some((promise, starts)) = promising(node, &proposal.setup, placed, noise) {
+                proposal.starts.extend(starts.into_iter().take(1));
+                proposal.promise = proposal.promise.min(promise);
+            }
+            Some(proposal)
+        })
+        .collect();
+    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    let refitted = if lacking.added.len() < LARGE {
+        EXCHANGED
+    } else {
+        proposals.truncate(QUICKLY);
+        EXCHANGED / 2
+    };
+    // A promise is that of a straight line: where a time constant or a threshold bends it, only a few steps show what it is
+    // worth. A few steps are too few where parameters nearly imitate each other, and there the promise holds.
+    let mut begun: Vec<(usize, Node)> = proposals
+        .into_par_iter()
+        .enumerate()
+        .filter_map(|(promised, proposal)| Some((promised, realise(proposal, noise, QUICK)?)))
+        .collect();
+    begun.sort_by(|a, b| a.1.fit.bic().total_cmp(&b.1.fit.bic()));
+    begun
+        .into_iter()
+        .enumerate()
+        .filter(|(quick, (promised, _))| *quick < refitted || *promised < refitted)
+        .map(|(_, (_, begun))| begun)
+        .collect()
+}

@@ -1,0 +1,221 @@
+//! The search: a set of effects, and the noise in whose metric it is confirmed.
+
+use greybox::Noise;
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    fit::{
+        criterion::BIC_MARGIN,
+        minima::begun_again,
+        node::{Node, refine},
+        noise_model::{bic_in_colour, colour, longest_memory, wanders},
+    },
+    search::{
+        confirm::{confirm, improve, least_useful},
+        exhausted::{Rest, rest},
+        floating::follow,
+        growth::{Breadth, Grown, grow},
+    },
+};
+
+/// Sets grown side by side, and refits of a size.
+const BEAM: usize = 3;
+const REFITS: usize = 12;
+/// Sets are grown side by side up to so many effects, ...
+const SIDE_BY_SIDE: usize = 3;
+/// ... and one by one to so many where they pay.
+const RICHEST: usize = 6;
+/// In the metric of a noise that wanders they are grown to so many.
+const WANDERING: usize = 2;
+
+/// What the search found.
+pub(crate) struct Found<'a> {
+    /// The richest model in play, by simulation error; its residual gives the noise.
+    pub richest: Node<'a>,
+    /// The noise model in whose weighting effects are confirmed; its memory is limited.
+    pub noise: Noise,
+    /// The memory of the residual's own noise model was longer, so that it may hold slow physics.
+    pub limited: bool,
+    /// The base, and what is confirmed, in the metric of the noise.
+    pub base: Node<'a>,
+    pub confirmed: Node<'a>,
+    /// The sets that were grown by simulation error.
+    pub grown: Grown<'a>,
+    /// Those that were grown in the weighting of the noise, where it is not white.
+    pub prewhitened: Option<Grown<'a>>,
+    /// Whether the noise wanders.
+    pub wandering: bool,
+    /// Whether it does and something is confirmed: then models are compared and shown by their simulation error.
+    pub by_simulation: bool,
+}
+
+impl<'a> Found<'a> {
+    /// All sets that were grown, in either weighting.
+    pub fn sets(&self) -> Vec<&Node<'a>> {
+        let grown = std::iter::once(&self.grown).chain(&self.prewhitened);
+        grown.flat_map(|grown| &grown.sizes).flatten().collect()
+    }
+}
+
+/// Searches sets of effects of at most `most`, or more where the noise needs them.
+pub(crate) fn find<'a>(
+    base: &Node<'a>,
+    most: usize,
+    tell: &(dyn Fn(&'static str, usize, usize) + Sync),
+) -> Result<Found<'a>, Error> {
+    let breadth = Breadth {
+        beam: BEAM,
+        refits: REFITS,
+        // What may be added does not bound what is tried: only the richest model shows what is noise.
+        most: most.max(RICHEST),
+    };
+    let pays = |before: &Node, after: &[Node]| {
+        let best = after.first();
+        best.is_some_and(|best| best.gain_over(before) > BIC_MARGIN)
+    };
+    // While the colour is not known, a coloured noise would pay for one effect after the other: what counts is what remains of
+    // the gain where each model has the colour of its own residual. Any set of a size may show it: the one with the least
+    // simulation error may be rough from sample to sample.
+    let pays_in_colour = |before: &Node, after: &[Node]| {
+        let least = || {
+            let all = after.par_iter().map(bic_in_colour);
+            let all = all.collect::<Result<Vec<f64>, Error>>()?;
+            Ok::<_, Error>(all.into_iter().fold(f64::INFINITY, f64::min))
+        };
+        let fall = || Ok::<_, Error>(bic_in_colour(before)? - least()?);
+        pays(before, after) && fall().is_ok_and(|fall| fall > BIC_MARGIN)
+    };
+    let white = base.setup.white_noise();
+    let mut grown = grow(
+        base,
+        &white,
+        Breadth {
+            most: SIDE_BY_SIDE,
+            ..breadth
+        },
+        pays_in_colour,
+        rest,
+        &|done, total| tell("searching sets of effects", done, total),
+    )?;
+    if grown.goes_on(SIDE_BY_SIDE) {
+        follow(base, &mut grown, &white, breadth.most)?;
+    }
+    let mut richest = refine(&chosen(&grown.sizes, base), &white, &[])?;
+    if richest.added.len() > 1 {
+        let effects = richest.added.clone();
+        begun_again(&mut richest, &effects, &white)?;
+    }
+    let whole = colour(&richest)?;
+    let noise = whole.with_memory_at_most(longest_memory(&base.setup));
+    let limited = noise != whole;
+
+    // Confirm in the metric of the noise.
+    tell("confirming", 0, 3);
+    let (base, confirmed) = rayon::join(
+        || refine(base, &noise, &[]),
+        || confirm(refine(&richest, &noise, &[])?, &noise),
+    );
+    let (base, mut confirmed) = (base?, confirmed?);
+    let wandering = wanders(&richest, &noise);
+    let by_simulation = wandering && !confirmed.added.is_empty();
+    let mut prewhitened = None;
+    if noise.order() > 0
+        && !base
+            .setup
+            .leaves_out("the search in the weighting of the noise")
+    {
+        // The noise's colour is known now: the search is repeated in its metric. Where the residual wanders this is no less
+        // called for: to the simulation error a slow noise looks like many effects, and the true one may not be among the
+        // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken; and of many
+        // effects it tells little.
+        let breadth = Breadth {
+            most: if by_simulation {
+                WANDERING
+            } else {
+                breadth.most
+            },
+            ..breadth
+        };
+        let coloured = grow(
+            &base,
+            &noise,
+            breadth,
+            pays,
+            // It was exhausted in this colour, which is that of its own residual, and its pairs were looked at there.
+            |node| {
+                if grown.exhausted_by(node) {
+                    Ok(Rest::Noise)
+                } else {
+                    rest(node)
+                }
+            },
+            &|done, total| tell("searching in the noise's metric", done, total),
+        )?;
+        let best = chosen(&coloured.sizes, &base);
+        let other = confirm(refine(&best, &noise, &[])?, &noise)?;
+        if other.fit.bic() < confirmed.fit.bic()
+            && !(by_simulation && drifts_off(&confirmed, &other)?)
+        {
+            confirmed = other;
+        }
+        prewhitened = Some(coloured);
+    }
+    if !by_simulation && !base.setup.leaves_out("the exchange of confirmed effects") {
+        confirmed = improve(confirmed, &noise)?;
+    }
+    Ok(Found {
+        richest,
+        noise,
+        limited,
+        base,
+        confirmed,
+        grown,
+        prewhitened,
+        wandering,
+        by_simulation,
+    })
+}
+
+/// The best of all sizes: a larger set must pay for itself against every smaller one.
+fn chosen<'a>(sizes: &[Vec<Node<'a>>], base: &Node<'a>) -> Node<'a> {
+    sizes
+        .iter()
+        .skip(1)
+        .filter_map(|nodes| nodes.first())
+        .fold(base.clone(), |best, node| {
+            if node.gain_over(&best) > BIC_MARGIN {
+                node.clone()
+            } else {
+                best
+            }
+        })
+}
+
+/// Whether a set simulates clearly worse than another, by the criterion.
+fn drifts_off(before: &Node, after: &Node) -> Result<bool, Error> {
+    let white = before.setup.white_noise();
+    Ok(refine(before, &white, &[])?.gain_over(&refine(after, &white, &[])?) > BIC_MARGIN)
+}
+
+/// The best set of at most so many effects: of a set that is too large, or of those that were grown.
+pub(crate) fn shortened<'a>(
+    mut node: Node<'a>,
+    sizes: &[Vec<Node<'a>>],
+    most: usize,
+    noise: &Noise,
+) -> Result<Node<'a>, Error> {
+    while node.added.len() > most {
+        let Some(lacking) = least_useful(&node, noise)? else {
+            break;
+        };
+        node = lacking;
+    }
+    if let Some(grown) = sizes.get(most).and_then(|nodes| nodes.first()) {
+        let grown = refine(grown, noise, &[])?;
+        if grown.fit.bic() < node.fit.bic() {
+            node = grown;
+        }
+    }
+    Ok(node)
+}

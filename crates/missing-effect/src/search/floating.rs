@@ -1,0 +1,139 @@
+//! Sets of many effects: one effect at a time, from several small sets, and exchanges within the best (floating search).
+//!
+//! **Reference**: P. Pudil, J. Novovicova, J. Kittler, Floating search methods in feature selection, Pattern Recognition Letters 15 (1994)
+//! 1119-1125.
+
+use greybox::Noise;
+use plants::Placed;
+use rayon::prelude::*;
+
+use crate::{
+    Error,
+    fit::{
+        criterion::BIC_MARGIN,
+        node::{FINE, Node, ROUGH, best_first, refine, without},
+        proposal::realise_all,
+    },
+    search::growth::{Grown, PAIR, by_clock, extensions},
+};
+
+/// Sets of two effects, and of three, from each of which one is grown.
+const SEEDS: usize = 3;
+/// Effects that are refitted for each more, the most promising.
+const FOLLOWED: usize = 10;
+
+/// Larger sets, grown one effect at a time from each of the best small ones, the best of them improved by exchanges.
+///
+/// Of small sets that take nearly the same out of a residual, the one that is right is not the best as long as much is missing: each is
+/// followed for itself. On the measured Cascaded Tanks data a leak of the lower tank stands for the pump's dead zone, until the end of
+/// the sensor's range is in the set. As long as much is missing a size may also be driven to a bound: what is left of a set without such
+/// effects is extended and exchanged again, within all bounds.
+pub(crate) fn follow<'a>(
+    base: &Node<'a>,
+    grown: &mut Grown<'a>,
+    noise: &Noise,
+    most: usize,
+) -> Result<(), Error> {
+    let seeds: Vec<Node<'a>> = (PAIR..grown.sizes.len())
+        .flat_map(|size| {
+            let timeless = grown.sizes[size].iter().filter(|node| !by_clock(node));
+            timeless.take(SEEDS).cloned()
+        })
+        .collect();
+    let loose = Floating {
+        base,
+        noise,
+        most,
+        accepted: |node| node.possible(),
+    };
+    let strict = Floating {
+        accepted: |node| node.plausible(),
+        ..loose
+    };
+    let mut ends = seeds
+        .into_par_iter()
+        .map(|seed| loose.one_at_a_time(seed))
+        .collect::<Result<Vec<_>, _>>()?;
+    if let Some(end) = best_first(ends.clone()).into_iter().next() {
+        ends.push(loose.exchanged(end)?);
+    }
+    let ends = ends
+        .into_par_iter()
+        .map(|end| within_bounds(&end, noise))
+        .collect::<Result<Vec<_>, _>>()?;
+    if let Some(end) = best_first(ends).into_iter().next() {
+        let end = strict.exchanged(strict.one_at_a_time(end)?)?;
+        grown.take_in(within_bounds(&end, noise)?);
+    }
+    Ok(())
+}
+
+/// A set, fitted to the end, without the effects whose sizes end at a bound.
+fn within_bounds<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
+    let mut node = refine(node, noise, &[])?;
+    let at_the_edge = |node: &Node| node.added.iter().position(|on| node.at_the_edge(*on));
+    while let Some(position) = at_the_edge(&node) {
+        node = without(&node, position, noise, FINE)?;
+    }
+    Ok(node)
+}
+
+/// What sets are grown from, and which are accepted.
+#[derive(Clone, Copy)]
+struct Floating<'n, 'a> {
+    base: &'n Node<'a>,
+    noise: &'n Noise,
+    /// Largest number of effects.
+    most: usize,
+    accepted: fn(&Node<'a>) -> bool,
+}
+
+impl<'a> Floating<'_, 'a> {
+    /// A set with one effect more, and one more, as long as the criterion falls.
+    fn one_at_a_time(&self, mut node: Node<'a>) -> Result<Node<'a>, Error> {
+        while node.added.len() < self.most && !node.setup.leaves_out("larger sets of effects") {
+            match better_than(&node, self.extended(&node, None)?) {
+                Some(best) => node = best,
+                None => break,
+            }
+        }
+        Ok(node)
+    }
+
+    /// Exchanges an effect of a set for another, and goes on one at a time, as long as the criterion falls.
+    fn exchanged(&self, mut node: Node<'a>) -> Result<Node<'a>, Error> {
+        while !node.setup.leaves_out("exchanges within sets of effects") {
+            let others = (0..node.added.len())
+                .into_par_iter()
+                .map(|position| {
+                    let lacking = without(&node, position, self.noise, ROUGH)?;
+                    self.extended(&lacking, Some(node.added[position]))
+                })
+                .collect::<Result<Vec<_>, Error>>()?;
+            match better_than(&node, others.concat()) {
+                Some(best) => node = self.one_at_a_time(best)?,
+                None => break,
+            }
+        }
+        Ok(node)
+    }
+
+    /// A set with one effect more, each of the most promising that does not follow time alone, but not the one that was taken out.
+    fn extended(&self, node: &Node<'a>, taken_out: Option<Placed>) -> Result<Vec<Node<'a>>, Error> {
+        let mut proposals = extensions(self.base, std::slice::from_ref(node), 1, self.noise)?;
+        proposals.retain(|proposal| {
+            let added = proposal.added.last();
+            added.is_some_and(|placed| Some(*placed) != taken_out && !placed.effect.by_clock)
+        });
+        proposals.truncate(FOLLOWED);
+        let mut found = realise_all(proposals, self.noise, ROUGH);
+        found.retain(self.accepted);
+        Ok(found)
+    }
+}
+
+/// The best of the sets, where its criterion lies clearly below a node's.
+fn better_than<'a>(node: &Node, sets: Vec<Node<'a>>) -> Option<Node<'a>> {
+    let best = best_first(sets).into_iter().next();
+    best.filter(|best| best.gain_over(node) > BIC_MARGIN)
+}

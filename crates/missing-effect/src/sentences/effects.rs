@@ -1,0 +1,117 @@
+//! The effects of an answer: group, place, size, acceptance.
+
+use plants::{Domain, EffectInfo};
+
+use super::{list, with_error};
+use crate::{Acceptance, Diagnosis, Step, Verdict};
+
+/// What an effect is outside hydraulics; `None` within, where its name says it, and for a term of the user's own.
+pub(super) fn in_general(effect: &str, domain: Domain) -> Option<&'static str> {
+    let effect = EffectInfo::find(effect).filter(|_| domain == Domain::General)?;
+    effect.general
+}
+
+/// A sentence for each effect of the answer: its group, its place and its size.
+pub(super) fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
+    let domain = diagnosis.domain();
+    let added = diagnosis.effects.iter().zip(&diagnosis.groups);
+    added
+        .zip(diagnosis.steps.iter().skip(1))
+        .enumerate()
+        .map(|(k, ((effect, group), step))| {
+            let it_is = if diagnosis.verdict == Verdict::Partial && k == 0 {
+                "It is mostly"
+            } else {
+                "It is"
+            };
+            let size = size_of(effect, last);
+            let place = match diagnosis.places.get(k).map(Vec::as_slice) {
+                Some([best, other, ..]) if other.relative_likelihood > SAME_PLACE_LIKELIHOOD => {
+                    format!(
+                        " ({} or the {} one: the place cannot be told)",
+                        domain.place_words(effect, &best.place),
+                        domain.vessel_words(&other.place).0
+                    )
+                }
+                _ => step
+                    .place
+                    .as_ref()
+                    .map_or(String::new(), |place| {
+                        format!(" {}", domain.place_words(effect, place))
+                    }),
+            };
+            let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
+                " In doubt: its size stands at a bound of what is plausible, so it describes the data rather than explains them."
+            } else {
+                ""
+            };
+            let named = |effect: &String| match in_general(effect, domain) {
+                Some(clause) => format!("{effect} ({clause})"),
+                None => effect.clone(),
+            };
+            if group.len() > 1 {
+                let group_named: Vec<String> = group.iter().map(named).collect();
+                format!(
+                    "{it_is} {}: these data cannot tell them apart; {effect}{place}{size} fits best.{doubt}{}",
+                    list(&group_named, "or"),
+                    next_experiment(group, diagnosis.effects.len())
+                )
+            } else {
+                let clause = in_general(effect, domain);
+                let clause = clause.map_or(String::new(), |clause| format!(": {clause}"));
+                format!("{it_is} {effect}{place}{size}{clause}.{doubt}")
+            }
+        })
+        .collect()
+}
+
+/// Another place is said to be possible from this relative likelihood on.
+pub(super) const SAME_PLACE_LIKELIHOOD: f64 = 0.05;
+
+/// The parameters of an effect with their standard errors, in brackets.
+pub(super) fn size_of(effect: &str, step: &Step) -> String {
+    let prefix = format!("{effect}.");
+    let sizes: Vec<String> = step
+        .parameters
+        .iter()
+        .filter_map(|p| Some((p, p.name.strip_prefix(&prefix)?)))
+        // Where a lag stood before the record says nothing of the effect.
+        .filter(|(_, name)| !name.starts_with("before"))
+        .enumerate()
+        .filter(|(k, (p, _))| *k == 0 || p.std_error.is_some())
+        .map(|(_, (p, name))| format!("{name} = {}", with_error(p)))
+        .collect();
+    if sizes.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", sizes.join(", "))
+    }
+}
+
+/// How much of the excess error the effects of a partial answer explain.
+pub(super) fn of_acceptance(acceptance: &Acceptance) -> Option<String> {
+    let share = acceptance.share?;
+    let held_out = acceptance.share_test.map_or(String::new(), |share| {
+        format!(", {:.0} % on held-out data", 100.0 * share)
+    });
+    Some(format!(
+        "That is {:.0} % of the squared error above the noise floor{held_out}; {:.0} % would make it the whole answer.",
+        100.0 * share,
+        100.0 * acceptance.required
+    ))
+}
+
+/// The command that proposes what would tell the first two of a group apart.
+pub(super) fn next_experiment(group: &[String], added: usize) -> String {
+    let [a, b, ..] = group else {
+        return String::new();
+    };
+    let others = if added > 1 {
+        ", once the other effects are in the model file,"
+    } else {
+        ""
+    };
+    format!(
+        " `ctid design ... --between {a} {b}`{others} says whether an experiment would, and which."
+    )
+}

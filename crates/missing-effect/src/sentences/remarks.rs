@@ -1,0 +1,128 @@
+//! What there is to say beside the verdict.
+
+use ct_signals::Channel;
+use plants::Placed;
+
+use super::{list, rms};
+use crate::{
+    Diagnosis, PerOutput, Problem, Rankings, accept::rounding::RoundedOutput, fit::node::Node,
+    numbers::significant,
+};
+
+/// That more effects were found than may be added.
+pub(crate) fn of_a_stop(most: usize, needed: usize) -> String {
+    format!(
+        "The search was stopped at {most} {}: the data call for {needed}.",
+        if most == 1 { "effect" } else { "effects" }
+    )
+}
+
+/// The best that the catalogue has where it is not the answer.
+pub(crate) fn of_a_part(last: &Node) -> String {
+    let outputs = &last.setup.records[0].outputs;
+    let names: Vec<String> = last
+        .added
+        .iter()
+        .map(|placed| placed.effect.id.to_string())
+        .collect();
+    format!(
+        "What comes nearest by more than chance, a course of time aside, is {}, which leaves {}: too much would be left that is not noise, so it is not taken for the answer.",
+        list(&names, "and"),
+        rms(&PerOutput::of(outputs, &last.fit.rmse), &outputs[0].unit)
+    )
+}
+
+/// What readings say of their converters, a sentence for each output whose readings are rounded.
+pub(crate) fn of_rounding(rounded: &[RoundedOutput], outputs: &[Channel]) -> String {
+    let of_output = |rounded: &RoundedOutput| {
+        let output = &outputs[rounded.output];
+        let (step, unit) = (rounded.step, &output.unit);
+        let of = if outputs.len() > 1 {
+            format!(" of {}", output.name)
+        } else {
+            String::new()
+        };
+        format!(
+            "Nearly all readings{of} are multiples of {} {unit}: rounding alone makes an error of {} {unit} rms, {:.0} % of the mean squared error of the model without it.",
+            significant(step, 3),
+            significant(step / 12.0_f64.sqrt(), 2),
+            100.0 * rounded.share.min(1.0)
+        )
+    };
+    let all: Vec<String> = rounded.iter().map(of_output).collect();
+    all.join(" ")
+}
+
+/// That the two weightings of the residual rank different effects first.
+pub(crate) fn of_rankings(rankings: &Rankings) -> Option<String> {
+    let (white, prewhitened) = (rankings.white.first()?, rankings.prewhitened.first()?);
+    rankings.disagree.then(|| {
+        format!(
+            "The weightings disagree: by the simulation error {white} is the best single effect, prewhitened by the noise model {prewhitened}; the second one looks at fast changes more."
+        )
+    })
+}
+
+/// The effects that were taken out because any course of time would do in their place; `None` where there are none.
+pub(crate) fn of_courses(dropped: &[Placed]) -> Option<String> {
+    let names: Vec<String> = dropped
+        .iter()
+        .map(|placed| placed.effect.id.to_string())
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} would explain more, but so would some course of time, and something is left that is not noise: not taken for an answer.",
+            list(&names, "and")
+        )
+    })
+}
+
+/// That the minimum of the last model was not found twice.
+pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
+    let step = diagnosis.steps.last()?;
+    (step.starts_agree < 2 && step.starts > 0).then(|| {
+        format!(
+            "Of {} starts {} the minimum that is shown: there may be a better one, and other values of the parameters.",
+            step.starts,
+            if step.starts_agree == 0 {
+                "around it none came as low as"
+            } else {
+                "one alone ended in"
+            }
+        )
+    })
+}
+
+/// The held-out error is this many times the fitted one where what was fitted does not carry over.
+const CARRIES_OVER: f64 = 2.0;
+
+/// Whether what was fitted holds on another record.
+pub(crate) fn of_held_out(diagnosis: &Diagnosis) -> Option<String> {
+    let step = diagnosis.steps.last()?;
+    let times = step.weighted_rmse_test? / step.weighted_rmse;
+    (times > CARRIES_OVER).then(|| {
+        format!(
+            "On held-out data the simulation error is {} times as large: what was fitted does not carry over to that record.",
+            significant(times, 2)
+        )
+    })
+}
+
+/// What the standard errors do not hold beside a term of the user's own.
+pub(crate) fn of_terms(problem: &Problem) -> Option<String> {
+    let names: Vec<_> = problem.terms.iter().map(|term| term.name.clone()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "Beside {} the standard errors are too small: the shape of a term is taken as known, and may hold a part of what the plant's own parameters explain.",
+            list(&names, "and")
+        )
+    })
+}
+
+/// What the colour of the noise costs, where it costs something.
+pub(crate) fn of_the_colour(price: f64) -> Option<String> {
+    (price >= 1.2).then(|| format!(
+        "The noise is coloured, and hides what white noise of the same size would show: an effect has to be about {} times larger to be seen. Smaller ones than the sizes under \"visible from\" may be there.",
+        significant(price, 2)
+    ))
+}

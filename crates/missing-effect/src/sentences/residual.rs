@@ -1,0 +1,85 @@
+//! What the residual of a model holds that is not noise.
+
+use ct_signals::duration;
+
+use super::rms;
+use crate::{
+    Diagnosis, PerOutput, Step,
+    diagnostics::remains::{Left, Remains},
+    numbers::significant,
+};
+
+/// What is left in the residual of a step, as the end of a sentence.
+pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
+    // A comparison has not looked into the catalogue.
+    let effect = if diagnosis.scores.is_empty() {
+        "an effect that the model lacks"
+    } else {
+        "an effect outside the catalogue"
+    };
+    // Of several outputs the one that shows it.
+    let shown = step.rmse_per_output.0.get(left.output);
+    let shown = PerOutput(shown.cloned().into_iter().collect());
+    let residual = rms(&shown, &diagnosis.output_unit);
+    let at = if step.rmse_per_output.0.len() > 1 {
+        format!(" of {}", shown.0.first().map_or("", |(name, _)| name))
+    } else {
+        String::new()
+    };
+    let record = diagnosis
+        .records
+        .iter()
+        .filter_map(|record| Some(record.time.last()? - record.time.first()?))
+        .fold(0.0, f64::max);
+    let several = diagnosis
+        .records
+        .iter()
+        .filter(|record| !record.held_out)
+        .count()
+        > 1;
+    let name = left
+        .record
+        .filter(|_| several)
+        .and_then(|k| diagnosis.records.get(k));
+    let residual = format!(
+        "the residual{at} of {residual}{}",
+        name.map_or(String::new(), |record| format!(" (in {})", record.name))
+    );
+    match left.what {
+        Remains::Input => format!("the input still shows in {residual}"),
+        Remains::Period(period) => format!(
+            "{residual} swings with a period of about {}, which noise does not: it may be a disturbance or {effect}",
+            about(period)
+        ),
+        Remains::Instant(at, length) => format!(
+            "{residual} holds something sudden, {}, which noise does not: it may be a disturbance, a fault of the sensor or {effect}",
+            if length > 0.0 {
+                diagnosis.clock.span(at, at + length)
+            } else {
+                format!("at {}", diagnosis.clock.at(at))
+            }
+        ),
+        Remains::Level => format!(
+            "{residual} follows the {}, which noise does not: the balance lacks {effect}",
+            diagnosis.domain().level_words("level")
+        ),
+        Remains::Slow(wander, process) => format!(
+            "{residual} wanders as slowly as the process, or more: its correlation lasts {}, the slowest time constant is {}; it may be a disturbance or {effect}",
+            if wander < record {
+                about(wander)
+            } else {
+                "longer than the record".to_string()
+            },
+            about(process)
+        ),
+    }
+}
+
+/// A time of which two digits are known: in seconds below two hours.
+pub(super) fn about(seconds: f64) -> String {
+    if seconds.abs() < 7200.0 {
+        format!("{} s", significant(seconds, 2))
+    } else {
+        duration(seconds)
+    }
+}

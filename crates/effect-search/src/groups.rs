@@ -30,7 +30,7 @@ const SAME_EFFECT: f64 = 0.1;
 const OTHERS: &str = "other effects that may explain the same";
 
 /// A candidate of the user's own stands in where it explains this part of what the effect does, and what it leaves may be noise.
-const NEARLY_ALL: f64 = 0.9;
+const MOST_OF_IT: f64 = 0.75;
 
 impl Context<'_> {
     /// For each effect that the search added itself, then all that can stand in for it, best first; and the set, in which a candidate of the
@@ -107,7 +107,7 @@ impl Context<'_> {
                 || deviance < SAME_DEVIANCE && node.fit.parameters <= last.fit.parameters
                 || self.ends_in_own(node)
                     && self
-                        .nearly_explains((node, last), &without, &own_last)
+                        .explains_most((node, last), &without, &own_last)
                         .unwrap_or(false)
         });
         self.limit.leaves_out(OTHERS);
@@ -120,10 +120,10 @@ impl Context<'_> {
         last.is_some_and(|&i| self.candidates[i].effect.is_none())
     }
 
-    /// Whether a set explains nearly all that another one does of what a third leaves, and leaves what may be noise of another colour: with a
+    /// Whether a set explains most of what another one does of what a third leaves, and leaves what may be noise of another colour: with a
     /// noise model of its own, what the other one gains is not beyond chance. The users of a model name its likely physics, and it is rarely
     /// all that acts in a measured record: an effect of the catalogue that bends further wins by the rest.
-    fn nearly_explains(
+    fn explains_most(
         &self,
         (set, last): (&Node, &Node),
         without: &Node,
@@ -131,7 +131,7 @@ impl Context<'_> {
     ) -> Result<bool, Error> {
         let floors: Vec<f64> = own_last.noise.iter().map(ArModel::sigma).collect();
         let of_last = explained(&without.fit, &last.fit, &floors);
-        if explained(&without.fit, &set.fit, &floors) < NEARLY_ALL * of_last {
+        if explained(&without.fit, &set.fit, &floors) < MOST_OF_IT * of_last {
             return Ok(false);
         }
         let own = self.in_limited_noise(set)?;

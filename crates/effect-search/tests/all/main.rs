@@ -4,3 +4,4 @@
 mod design;
 mod hidden;
 mod results;
+mod together;

@@ -5,6 +5,7 @@
 //! fit, [`estimation`] least squares under a noise model.
 
 mod accept;
+mod assemble;
 mod believed;
 pub mod design;
 mod diagnose;

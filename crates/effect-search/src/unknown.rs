@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::diagnose::sizes;
+use crate::assemble::sizes;
 use crate::node::{Context, FINE, Node, ROUGH};
 use crate::partial::{explained, fall};
 use crate::result::Estimate;

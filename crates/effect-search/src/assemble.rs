@@ -1,0 +1,257 @@
+//! The result of a search as plain values: the model that was believed, then the effects one by one, with what each does to the error.
+
+use std::collections::BTreeMap;
+
+use ct_model::Given;
+use ct_model::effects::Candidate;
+use ct_signals::ArModel;
+use estimation::{Fit, Noise};
+use greybox::{Robust, weighted_rms};
+
+use crate::accept::NOISE_ORDER;
+use crate::node::{Context, FINE, Node};
+use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
+use crate::search::Grown;
+use crate::{Error, held_out};
+
+/// What was found.
+pub(crate) struct Finding<'a> {
+    /// The believed model, and the last one.
+    pub base: &'a Node,
+    pub last: &'a Node,
+    /// The fit whose noise is told: that of the last model with the noise model of its own residual.
+    pub own: &'a Fit,
+    pub verdict: Verdict,
+    pub groups: Vec<Vec<usize>>,
+    pub left: Option<crate::Left>,
+    pub unknown: Option<crate::Unknown>,
+    pub share: Option<f64>,
+    /// Time of the search \[s\].
+    pub seconds: f64,
+    pub left_out: Vec<String>,
+}
+
+/// The result as values: the ladder of models, sizes, noise, singles.
+pub(crate) fn assemble(
+    context: &Context,
+    grown: &Grown,
+    finding: Finding,
+) -> Result<Diagnosis, Error> {
+    let Finding {
+        base,
+        last,
+        own,
+        verdict,
+        groups,
+        left,
+        unknown,
+        share,
+        seconds,
+        left_out,
+    } = finding;
+    let problem = context.problem;
+    let outputs = &problem.records[0].outputs;
+    let level = |noise: &ArModel| {
+        // The deviation of what is slower than noise is not known from so short a record.
+        if context.is_slow(&own.noise) {
+            noise.sigma()
+        } else {
+            noise.stationary_std()
+        }
+    };
+    let floors: Vec<f64> = own.noise.iter().map(level).collect();
+    // Outputs count by their noise. Errors are compared in one metric, that of the simulation error; the last model has its own where it
+    // leaves noise.
+    let white = Noise::white(outputs.len());
+    let weighted = Context {
+        scales: (outputs.len() > 1).then(|| floors.clone()),
+        ..context.clone()
+    };
+    let mut ladder = ladder(&weighted, base, last, &white)?;
+    if left.is_none()
+        && let Some(end) = ladder.last_mut()
+        && let Ok(shown) = context.refitted(end, &own.noise, FINE)
+    {
+        *end = shown;
+    }
+    let steps = ladder
+        .iter()
+        .map(|node| step(context, base, node, &floors))
+        .collect::<Result<Vec<_>, Error>>()?;
+    let named = |values: &[f64]| -> BTreeMap<String, f64> {
+        let names = outputs.iter().map(|y| y.name.clone());
+        names.zip(values.iter().copied()).collect()
+    };
+    let singles: Vec<Single> = grown
+        .singles
+        .iter()
+        .filter_map(|node| {
+            let candidate = &context.candidates[*node.added.last()?];
+            Some(Single {
+                effect: candidate.id.clone(),
+                sizes: sizes(node, candidate),
+                bic_gain: node.gain_over(&grown.base),
+                rmse_per_output: named(&node.fit.rmse),
+            })
+        })
+        .collect();
+    let mut ranked: Vec<String> = Vec::new();
+    if verdict == Verdict::Adequate {
+        ranked.push("none".to_string());
+    }
+    ranked.extend(singles.iter().map(|single| single.effect.clone()));
+    let noise = outputs.iter().zip(own.noise.iter());
+    let noise = noise.map(|(output, noise)| NoiseFloor {
+        output: output.name.clone(),
+        level: level(noise),
+        innovation: noise.sigma(),
+        coefficients: noise.coefficients().to_vec(),
+    });
+    // In the order of the ladder.
+    let order = &ladder.last().map_or(&last.added, |node| &node.added)[base.added.len()..];
+    let groups: Vec<Vec<String>> = order
+        .iter()
+        .filter_map(|own| groups.iter().find(|group| group.first() == Some(own)))
+        .map(|group| context.ids(group))
+        .collect();
+    let said = groups.iter().flatten().chain(&problem.effects);
+    let said = said.chain(singles.iter().map(|single| &single.effect));
+    let said = said.chain(unknown.iter().map(|unknown| &unknown.effect));
+    let all = || context.candidates.iter().chain(&context.shapes);
+    let record_numbers = said
+        .filter_map(|id| all().find(|c| c.id == *id))
+        .map(|candidate| (candidate.id.clone(), candidate.numbers_of_record()))
+        .collect();
+    Ok(Diagnosis {
+        schema: 2,
+        model: problem.spec.name.clone(),
+        verdict,
+        effects: context.ids(order),
+        groups,
+        ranked,
+        steps,
+        share: share.filter(|_| !order.is_empty()),
+        left,
+        unknown,
+        noise: noise.collect(),
+        singles,
+        record_numbers,
+        candidates: context.candidates.len(),
+        left_out,
+        seconds: seconds + context.limit.seconds(),
+    })
+}
+
+/// The believed model, then the effects one by one, each time the one that lowers the error most.
+fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<Vec<Node>, Error> {
+    let mut nodes = vec![context.subset(last, base.added.clone(), noise, FINE)?];
+    // From where the believed model was fitted, too.
+    if let Ok(again) = context.refitted(base, noise, FINE)
+        && again.fit.cost < nodes[0].fit.cost
+    {
+        nodes[0] = again;
+    }
+    nodes[0].fit = nodes[0].fit.clone().continuing(&base.fit);
+    let mut rest: Vec<usize> = last.added[base.added.len()..].to_vec();
+    while !rest.is_empty() {
+        let begun = nodes[nodes.len() - 1].added.clone();
+        let mut fits: Vec<Node> = rest
+            .iter()
+            .filter_map(|&i| {
+                let mut added = begun.clone();
+                added.push(i);
+                context.subset(last, added, noise, FINE).ok()
+            })
+            .collect();
+        fits.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
+        if fits.is_empty() {
+            break;
+        }
+        let next = fits.swap_remove(0);
+        rest.retain(|i| !next.added[begun.len()..].contains(i));
+        nodes.push(next);
+    }
+    Ok(nodes)
+}
+
+/// What was found of the parameters of an effect in a set.
+pub(crate) fn sizes(node: &Node, candidate: &Candidate) -> Vec<Estimate> {
+    let errors = node.fit.std_errors();
+    let parameters = node.spec().parameters.iter().enumerate();
+    let own =
+        parameters.filter(|(_, p)| candidate.parameters.iter().any(|o| o.name == p.about.name));
+    own.map(|(i, parameter)| Estimate {
+        effect: Some(candidate.id.clone()),
+        name: parameter.about.name.clone(),
+        value: node.fit.x[i],
+        std_error: errors[i],
+        unit: parameter.about.unit.clone(),
+        known: parameter.given != Given::Fitted,
+    })
+    .collect()
+}
+
+fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<Step, Error> {
+    let problem = context.problem;
+    let setup = context.setup(&node.model)?;
+    let outputs = &problem.records[0].outputs;
+    let named = |values: &[f64]| -> BTreeMap<String, f64> {
+        let names = outputs.iter().map(|y| y.name.clone());
+        names.zip(values.iter().copied()).collect()
+    };
+    let errors = if node.fit.noise.order() > 0 {
+        node.fit.std_errors()
+    } else {
+        let robust: Result<Robust, _> = estimation::robust_with_memory(
+            &setup,
+            &node.fit,
+            NOISE_ORDER,
+            context.longest_memory(),
+        );
+        robust.map_or_else(|_| node.fit.std_errors(), |robust| robust.std_errors)
+    };
+    let spec = node.spec();
+    let units = spec.parameters.iter().map(|p| p.about.unit.clone());
+    let states = problem
+        .records
+        .iter()
+        .flat_map(|_| spec.states.iter().map(|s| s.about.unit.clone()));
+    let entries = setup.names().iter().zip(units.chain(states)).enumerate();
+    let effect_of = |name: &String| {
+        let brings = |&&c: &&usize| {
+            let own = &context.candidates[c].parameters;
+            own.iter().any(|p| p.name == *name)
+        };
+        let effect = node.added.iter().find(brings);
+        effect.map(|&c| context.candidates[c].id.clone())
+    };
+    let parameters = entries.map(|(i, (name, unit))| Estimate {
+        effect: effect_of(name),
+        name: name.clone(),
+        value: node.fit.x[i],
+        std_error: errors[i],
+        unit,
+        known: !setup.free().contains(&i),
+    });
+    let test = held_out(&setup, &node.fit, &problem.test)?;
+    let mut simulated = setup.simulate(&node.fit.x).unwrap_or_default();
+    simulated.extend(test.iter().flat_map(|test| test.simulated.iter().cloned()));
+    let added = node.added.len() > base.added.len();
+    Ok(Step {
+        added: added.then(|| {
+            context.candidates[node.added[node.added.len() - 1]]
+                .id
+                .clone()
+        }),
+        rmse: (outputs.len() == 1).then(|| node.fit.rmse[0]),
+        rmse_per_output: named(&node.fit.rmse),
+        state_rows: test.as_ref().map(|test| test.state_rows.clone()),
+        rmse_test_per_output: test.map(|test| named(&test.rmse)),
+        weighted_rmse: weighted_rms(&node.fit.rmse, floors, &node.fit.samples_per_output),
+        bic: node.fit.bic(),
+        starts: node.fit.starts,
+        starts_agree: node.fit.agree,
+        simulated,
+        parameters: parameters.collect(),
+    })
+}

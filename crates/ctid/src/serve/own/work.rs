@@ -98,11 +98,7 @@ impl Work {
 
     /// Fits the model, until the flag is set.
     pub(crate) fn compute(&self, interrupt: &AtomicBool) -> Result<Comparison, Error> {
-        let options = Options {
-            time_limit: Some(EffortLevel::default().limit_of_own_model()),
-            interrupt: Some(interrupt),
-            ..Options::default()
-        };
+        let options = options(EffortLevel::default(), interrupt);
         compare(&self.model, &self.records, &options)
     }
 
@@ -120,11 +116,7 @@ impl Work {
             "confirming",
             "telling apart",
         ];
-        let mut options = Options {
-            time_limit: Some(effort.limit_of_own_model()),
-            interrupt: Some(interrupt),
-            ..Options::default()
-        };
+        let mut options = options(effort, interrupt);
         if let Some(most) = max_effects {
             options.max_effects = usize::from(most.get());
         }
@@ -147,11 +139,7 @@ impl Work {
             "trying experiments",
             "confirming by refits",
         ];
-        let options = Options {
-            time_limit: Some(EffortLevel::default().limit_of_own_model()),
-            interrupt: Some(interrupt),
-            ..Options::default()
-        };
+        let options = options(EffortLevel::default(), interrupt);
         let between = between.each_ref().map(String::as_str);
         design(
             &self.model,
@@ -268,5 +256,13 @@ impl Work {
             "not_determined": found.not_determined.iter().map(|of| of.join(", ")).collect::<Vec<_>>(),
             "curves": curves.collect::<Vec<_>>(),
         })
+    }
+}
+
+fn options(effort: EffortLevel, interrupt: &AtomicBool) -> Options<'_> {
+    Options {
+        time_limit: Some(effort.limit_of_own_model()),
+        interrupt: Some(interrupt),
+        ..Options::default()
     }
 }

@@ -1,20 +1,23 @@
 //! `ctid identify`: a linear model from a record.
 
+mod choice;
+mod records;
+
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use clap::{Args, ValueEnum, builder::PossibleValue};
-use ct_signals::{Columns, Hold, ReadOptions, Reading, Record, quoted, read_csv};
+use clap::{Args, ValueEnum};
+use ct_signals::{Columns, Hold, Reading};
 use linear_identification::{
     DelayChoice, LevelChoice, Method, Request, identify_mended, mend,
     side_by_side::{self, Orders},
 };
 use missing_effect::Progress;
 
+use self::choice::Choice;
 use super::{Results, finish};
 use crate::Error;
-use crate::column_errors::of_option;
 use crate::identify::{side_by_side_text, text};
 use crate::input::{self, ReadArguments};
 use crate::look::Look;
@@ -266,63 +269,6 @@ impl Identify {
         Ok(request)
     }
 
-    /// What a column that is not there is blamed on: the model file, or the option.
-    fn named_by(&self) -> fn(ct_signals::Error) -> Error {
-        if self.model.is_some() {
-            Error::from
-        } else {
-            of_option
-        }
-    }
-
-    /// A record as `--columns` says: without a reference that it does not name.
-    fn without_unnamed(&self, mut record: Record) -> Record {
-        let named = self
-            .columns
-            .as_ref()
-            .map(|columns| !columns.references.is_empty());
-        if named == Some(false) {
-            record.references.clear();
-        }
-        record
-    }
-
-    /// A record as `--columns` and `--model` say.
-    fn read(&self, path: &Path, (columns, hold, own): Layout) -> Result<Reading, Error> {
-        let options = ReadOptions {
-            hold,
-            ..self.reading.options()
-        };
-        let reading = read_csv(path, columns, &options).map_err(self.named_by())?;
-        let Reading { record, summary } = reading;
-        let mut record = self.without_unnamed(record);
-        if let Some(own) = own {
-            own.convert(&mut record)?;
-        }
-        Ok(Reading { record, summary })
-    }
-
-    /// A record that is simulated only, in the units of the one that is fitted.
-    fn read_test(&self, path: &Path, layout: Layout, fitted: &Record) -> Result<Reading, Error> {
-        let Reading { record, summary } = self.read(path, layout)?;
-        let inputs = record.inputs.iter().zip(&fitted.inputs);
-        let pairs = inputs.chain(record.outputs.iter().zip(&fitted.outputs));
-        for (test, fitted) in pairs {
-            if test.unit != fitted.unit {
-                return Err(Error::file(
-                    path,
-                    format!(
-                        "\"{}\" is in [{}], and in the record that is fitted in [{}]; convert one of them",
-                        quoted(&test.name),
-                        quoted(&test.unit),
-                        quoted(&fitted.unit)
-                    ),
-                ));
-            }
-        }
-        Ok(Reading { record, summary })
-    }
-
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let methods = self.methods();
         let alone = methods.len() == 1 && self.order.0.len() == 1 && self.test.is_empty();
@@ -448,47 +394,4 @@ impl Identify {
 /// Whether a method has no memory that could fade.
 fn weighs_all_alike(method: Method) -> bool {
     method.is_refined() || method.is_of_loop() && method != Method::RecursiveFcloe
-}
-
-/// A method, or all of them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Choice {
-    One(Method),
-    All,
-}
-
-impl ValueEnum for Choice {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[
-            Self::All,
-            Self::One(Method::StabilizedOe),
-            Self::One(Method::CtRls),
-            Self::One(Method::Ls),
-            Self::One(Method::Iv),
-            Self::One(Method::Fcloe),
-            Self::One(Method::RecursiveFcloe),
-            Self::One(Method::Srivc),
-            Self::One(Method::Rivc),
-        ]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        match self {
-            Self::All => Some(PossibleValue::new("all").help("Every method, side by side")),
-            Self::One(method) => method.to_possible_value(),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_method_can_be_chosen() {
-        let choices = Choice::value_variants();
-        for method in Method::value_variants() {
-            assert!(choices.contains(&Choice::One(*method)), "{}", method.id());
-        }
-    }
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import shutil
 from pathlib import Path
 
 import matplotlib
@@ -123,20 +124,41 @@ def test_a_tank_is_diagnosed(tour, tour_test):
         assert shown.plot()[0].get_ylabel() == "y [cm]"
 
 
-def test_an_alarm_is_raised_and_a_monitor_is_kept(block):
-    model = ctid.Model.from_file(MODELS / "heated-block.mo").fit(block, known={"C": 52.0}).model
-    mon = model.monitor(learn=200)
+def _alarms(mon):
+    """A block whose loss grows at 10000 s; half way the monitor is pickled."""
     rng = np.random.default_rng(1)
-    temperature, kinds, alarm = 20.0, set(), None
+    temperature, kinds, alarms = 20.0, set(), []
     for k in range(2600):
         u = 80.0 if k // 60 % 2 else 20.0
         step = mon.update(5.0 * k, {"u": u, "Ta": 20.0}, {"y": temperature + 0.1 * rng.standard_normal()})
         kinds |= {notice["kind"] for notice in step.notices}
-        alarm = alarm or step.alarm
+        if step.alarm is not None:
+            alarms.append(step.alarm)
         if k == 1500:
-            assert alarm is None and mon.phase == "watching"
+            assert not alarms and mon.phase == "watching"
             mon = pickle.loads(pickle.dumps(mon))
         loss = 0.17 if k < 2000 else 0.3
         temperature += 5.0 / 52.0 * (0.12 * u - loss * (temperature - 20.0))
-    assert "learned" in kinds and alarm is not None and 10_000.0 < alarm["time"] < 12_000.0
+    assert "learned" in kinds and alarms and 10_000.0 < alarms[0]["time"] < 12_000.0
     assert list(mon.estimates.index)
+    return alarms
+
+
+def test_an_alarm_is_raised_and_a_monitor_is_kept(block):
+    model = ctid.Model.from_file(MODELS / "heated-block.mo").fit(block, known={"C": 52.0}).model
+    alarms = _alarms(model.monitor(learn=200))
+    assert "vent" not in alarms[-1]["effects"]
+
+
+def test_a_monitor_names_a_candidate_of_its_user(block, tmp_path):
+    shutil.copy(MODELS / "heated-block.mo", tmp_path)
+    vent = """model = "heated-block.mo"
+
+[candidates.vent]
+parameters = { q = { unit = "W/K", min = 0.0, start = 0.01 } }
+terms = { T = "-q*(T - Ta)" }
+"""
+    (tmp_path / "block.toml").write_text(vent)
+    model = ctid.Model.from_file(tmp_path / "block.toml").fit(block, known={"C": 52.0}).model
+    alarms = _alarms(model.monitor(learn=200))
+    assert "vent" in alarms[-1]["effects"]

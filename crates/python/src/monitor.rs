@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use ct_model::effects::{apply, own_candidates};
 use ct_model::{Model as Compiled, ModelSpec};
 use ctid::own_model::OwnSettings;
-use monitor::{Notice, OwnModel, Row, Settings, State, Units};
+use monitor::{CandidateModel, Notice, OwnModel, Row, Settings, State, Units};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
@@ -13,16 +14,40 @@ use serde::{Deserialize, Serialize};
 use crate::model::Inner;
 use crate::{bytes, error};
 
-/// Models that are watched live as long as the interpreter: a monitor borrows its own. Each text is kept once.
-static MODELS: Mutex<Option<HashMap<String, &'static Compiled>>> = Mutex::new(None);
+/// A watched model, and with each candidate of its user's own.
+struct Models {
+    model: Compiled,
+    candidates: Vec<CandidateModel>,
+}
 
-fn kept(spec: ModelSpec) -> &'static Compiled {
+/// Models that are watched live as long as the interpreter: a monitor borrows its own. Each text is kept once with the same candidates.
+static MODELS: Mutex<Option<HashMap<String, &'static Models>>> = Mutex::new(None);
+
+fn kept(spec: ModelSpec, settings: &OwnSettings) -> PyResult<&'static Models> {
+    let mut own = settings.candidates.clone();
+    own.retain(|id, _| !settings.effects.contains(id));
+    let key = format!("{spec}{own:?}");
     let mut models = MODELS.lock().unwrap_or_else(PoisonError::into_inner);
     let models = models.get_or_insert_default();
-    let text = spec.to_string();
-    models
-        .entry(text)
-        .or_insert_with(|| Box::leak(Box::new(Compiled::new(spec))))
+    if let Some(known) = models.get(&key) {
+        return Ok(known);
+    }
+    let candidates = own_candidates(&spec, &own).map_err(error::of_model)?;
+    let is_on = |id: &String| settings.effects.contains(id);
+    let candidates = candidates
+        .into_iter()
+        // Alone it is the same as what it repeats.
+        .filter(|candidate| candidate.repeats.as_ref().is_none_or(is_on))
+        .map(|candidate| {
+            let with = apply(&spec, &[&candidate]).map_err(error::of_model)?;
+            let model = Compiled::new(with);
+            Ok(CandidateModel { candidate, model })
+        });
+    let candidates = candidates.collect::<PyResult<_>>()?;
+    let model = Compiled::new(spec);
+    let all = Box::leak(Box::new(Models { model, candidates }));
+    models.insert(key, all);
+    Ok(all)
 }
 
 /// Watches a plant row by row.
@@ -46,13 +71,14 @@ struct Watched {
 impl Watched {
     fn begin(&self, state: Option<State>) -> PyResult<monitor::Monitor<'static>> {
         let spec = ModelSpec::parse_to_simulate(&self.text).map_err(error::of_model)?;
+        let models = kept(spec, &self.settings)?;
         let model = OwnModel {
-            model: kept(spec),
+            model: &models.model,
             known: self.settings.known.clone(),
             priors: self.settings.priors.clone(),
             hold: self.settings.hold,
             time_unit: self.time_unit,
-            candidates: &[],
+            candidates: &models.candidates,
         };
         let settings = Settings {
             rows_between_false_alarms: self.rows_between_false_alarms,

@@ -147,7 +147,8 @@ pub struct Thresholds {
     pub group_predicted_margin: f64,
     /// A candidate of the user's own replaces an effect of the catalogue in the answer where the deviances differ by less. Chosen.
     pub same_effect: f64,
-    /// A candidate of the user's own stands in where it explains this share of what the effect does (0 to 1). Chosen.
+    /// A candidate of the user's own stands in where it explains this share of what the effect does, and what it leaves may be noise
+    /// (0 to 1). Chosen.
     pub own_candidate_share: f64,
 
     // The shape of what no candidate explains.

@@ -5,6 +5,7 @@ pub mod design_cases;
 pub mod draw;
 pub mod fuzz;
 pub mod http;
+pub mod library;
 pub mod measured;
 pub mod onset;
 pub mod outside;

@@ -8,13 +8,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::Error;
 use crate::node::{Context, FINE, Node};
 
-/// Largest order of the noise model.
-pub(crate) const NOISE_ORDER: usize = 6;
-/// An effect is accepted where the criterion falls by more than this ...
-pub(crate) const BIC_MARGIN: f64 = 6.0;
-/// ... and where chance would let so large a fall happen less often than this, counted over all candidates and their starts.
-pub(crate) const FALSE_CLAIM: f64 = 0.003;
-
 impl Context<'_> {
     /// Whether a set lowers the deviance by more than chance would against one that lacks some of its effects: chi-square, corrected
     /// (Bonferroni) for all candidates and starts that were looked at.
@@ -35,7 +28,7 @@ impl Context<'_> {
         let fall = lacking.1.deviance - gained.1.deviance;
         let chance =
             ChiSquared::new(freedom.max(1) as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
-        chance * looks < FALSE_CLAIM
+        chance * looks < self.thresholds.false_claim
     }
 
     /// Takes out, one by one, what the noise explains as well, first what is worth least.
@@ -43,7 +36,7 @@ impl Context<'_> {
         loop {
             let lacking = self.each_lacking(&node, base, noise);
             let doubtful = lacking.into_iter().filter(|lacking| {
-                node.gain_over(lacking) <= BIC_MARGIN
+                node.gain_over(lacking) <= self.thresholds.bic_margin
                     || !self.beyond_chance((&node, &node.fit), (lacking, &lacking.fit))
                     || self.rests_on_one_reading(&node, lacking, noise)
             });
@@ -71,7 +64,7 @@ impl Context<'_> {
         else {
             return false;
         };
-        lacks.bic() - with.bic() <= BIC_MARGIN
+        lacks.bic() - with.bic() <= self.thresholds.bic_margin
             || !self.beyond_chance((node, &with), (lacking, &lacks))
     }
 
@@ -82,7 +75,7 @@ impl Context<'_> {
         while node.added.len() > base.added.len() {
             let lacking = self.each_lacking(&node, base, &white);
             let mut resting = lacking.into_iter().filter(|lacking| {
-                node.gain_over(lacking) <= BIC_MARGIN
+                node.gain_over(lacking) <= self.thresholds.bic_margin
                     || self.rests_on_one_reading(&node, lacking, &white)
             });
             let Some(less) = resting.next() else {
@@ -101,7 +94,6 @@ impl Context<'_> {
         lacking: &Node,
         noise: &Noise,
     ) -> Option<(usize, usize)> {
-        const TELLING: f64 = 0.5;
         let whitened = |of: &Node| {
             let setup = self.setup(&of.model).ok()?;
             Some(noise.whiten(&estimation::residuals(&setup, &of.fit.x)?))
@@ -129,7 +121,7 @@ impl Context<'_> {
         });
         let (most, series, window) = at_each.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let row = window.max_by(|&a, &b| falls[series][a].total_cmp(&falls[series][b]))?;
-        (most >= TELLING * all).then_some((series, row))
+        (most >= self.thresholds.telling_reading * all).then_some((series, row))
     }
 
     /// The set without each of the effects that the search added.
@@ -143,28 +135,29 @@ impl Context<'_> {
     /// The fit of a set with the noise model of its own residual.
     pub fn in_own_noise(&self, node: &Node) -> Result<Fit, Error> {
         let setup = self.setup(&node.model)?;
-        Ok(coloured(&setup, node.fit.clone(), NOISE_ORDER, FINE)?)
+        Ok(coloured(
+            &setup,
+            node.fit.clone(),
+            self.thresholds.noise_order,
+            FINE,
+        )?)
     }
 
     /// The noise model of a set's residual, with a memory of at most a part of the longest record: a root near one takes every slow effect
     /// for noise. And whether the memory had to be limited: then what remains may be slow physics.
     pub fn noise_of(&self, node: &Node) -> Result<(Noise, bool), Error> {
         let setup = self.setup(&node.model)?;
-        let noise = estimation::noise_of(&setup, &node.fit, NOISE_ORDER)?;
+        let noise = estimation::noise_of(&setup, &node.fit, self.thresholds.noise_order)?;
         let slow = self.slow_output(&noise).is_some();
         Ok((noise.with_memory_at_most(self.longest_memory()), slow))
     }
 
     /// The first output whose noise has a longer memory than noise that a search may trust.
     pub fn slow_output(&self, noise: &Noise) -> Option<usize> {
-        /// Noise of an ordinary colour forgets within so many samples, however short the record is.
-        const ORDINARY_MEMORY: f64 = 12.0;
-        /// Records that hold fewer times this memory do not tell slow physics from noise.
-        const TIMES: f64 = 10.0;
-        if self.longest_record() < TIMES * ORDINARY_MEMORY {
+        if self.longest_record() < self.thresholds.memory_times * self.thresholds.ordinary_memory {
             return None;
         }
-        let longest = self.longest_memory().max(ORDINARY_MEMORY);
+        let longest = self.longest_memory().max(self.thresholds.ordinary_memory);
         let limited = noise.with_memory_at_most(longest);
         let mut pairs = noise.iter().zip(limited.iter());
         pairs.position(|(noise, limited)| noise != limited)
@@ -177,9 +170,7 @@ impl Context<'_> {
 
     /// The longest memory of a noise model in whose metric effects are searched \[samples\].
     pub fn longest_memory(&self) -> f64 {
-        /// Noise whose memory is longer has left fewer than some ten independent samples.
-        const LONGEST_MEMORY: f64 = 1.0 / 15.0;
-        LONGEST_MEMORY * self.longest_record()
+        self.thresholds.longest_memory * self.longest_record()
     }
 
     /// Rows of the longest record.

@@ -8,7 +8,6 @@ use ct_signals::ArModel;
 use estimation::{Fit, Noise};
 use greybox::{Robust, weighted_rms};
 
-use crate::accept::NOISE_ORDER;
 use crate::node::{Context, FINE, Node};
 use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 use crate::search::Grown;
@@ -205,7 +204,7 @@ fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<S
         let robust: Result<Robust, _> = estimation::robust_with_memory(
             &setup,
             &node.fit,
-            NOISE_ORDER,
+            context.thresholds.noise_order,
             context.longest_memory(),
         );
         robust.map_or_else(|_| node.fit.std_errors(), |robust| robust.std_errors)

@@ -77,6 +77,7 @@ pub(crate) fn begin<'a>(
         shapes: Vec::new(),
         scales: None,
         limit,
+        thresholds: options.thresholds,
     };
     let fit_options = FitOptions {
         starts: options.starts,

@@ -12,21 +12,13 @@ use estimation::Noise;
 use greybox::weighted_rms;
 
 use crate::Error;
-use crate::accept::BIC_MARGIN;
 use crate::assemble::{Finding, assemble};
 use crate::believed::begin;
 use crate::node::{Context, FINE, Node};
-use crate::partial::{PART, explained};
+use crate::partial::explained;
 use crate::problem::{Limit, Options, Phase, Problem};
 use crate::result::{Diagnosis, Verdict};
 use crate::search::Grown;
-
-/// So many effects are searched in white noise before the noise model is taken from what they leave: more of them explain noise.
-const BEFORE_NOISE: usize = 2;
-/// So many effects or more together may imitate one that no candidate holds: they are called a part of the answer.
-pub const MANY: usize = 3;
-/// Noise models whose coefficients differ by less are one.
-const SAME_NOISE: f64 = 0.05;
 
 /// How far the computation is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,7 +46,9 @@ pub fn diagnose(
     context.limit.begin(Phase::White);
     let white = Noise::white(problem.spec.outputs.len());
     let all: Vec<usize> = (0..context.candidates.len()).collect();
-    let few = options.max_effects.min(BEFORE_NOISE);
+    let few = options
+        .max_effects
+        .min(options.thresholds.effects_before_noise);
     let mut by_error = context.grow(base.clone(), (&all, &[]), &white, few)?;
     let (mut noise, slow) = context.noise_of(&by_error.best)?;
     let full = by_error.best.added.len() >= base.added.len() + few;
@@ -89,7 +83,7 @@ pub fn diagnose(
         let error =
             |node: &Node| weighted_rms(&node.fit.rmse, &floors, &node.fit.samples_per_output);
         // And the simulation error falls: in the metric of coloured noise a single reading can ask for an effect.
-        let needed = bare.bic() - own.bic() > BIC_MARGIN
+        let needed = bare.bic() - own.bic() > options.thresholds.bic_margin
             && context.beyond_chance((&confirmed, &own), (&grown.base, &bare))
             && error(&confirmed) < error(&grown.base);
         if !needed {
@@ -99,7 +93,7 @@ pub fn diagnose(
     let mut own = context.in_own_noise(&confirmed)?;
     let mut left = context.left(&confirmed, &own)?;
     let mut slowness = 1.0;
-    let many = |set: &Node| set.added.len() >= base.added.len() + MANY;
+    let many = |set: &Node| set.added.len() >= base.added.len() + options.thresholds.many_effects;
     if left.is_some() || many(&confirmed) {
         context.limit.begin(Phase::Part);
         let mut sets = by_error_sets;
@@ -148,7 +142,9 @@ pub fn diagnose(
         (true, None, _) if open || many => Verdict::Partial,
         (false, None, _) => Verdict::Adequate,
         (false, Some(_), _) => Verdict::Unexplained,
-        (true, Some(_), Some(share)) if share >= PART => Verdict::Partial,
+        (true, Some(_), Some(share)) if share >= options.thresholds.partial_share => {
+            Verdict::Partial
+        }
         (true, Some(_), _) => Verdict::Unexplained,
         (true, None, _) if groups.iter().any(|group| group.len() > 1) => Verdict::Undecided,
         (true, None, _) => Verdict::Effect,
@@ -240,7 +236,10 @@ fn in_metric(
         grown.best = other;
     }
     let (own, _) = context.noise_of(&grown.best)?;
-    if own.order() > 0 && own.difference(&noise) > SAME_NOISE && !context.limit.passed() {
+    if own.order() > 0
+        && own.difference(&noise) > options.thresholds.same_noise
+        && !context.limit.passed()
+    {
         let base = context.refitted(&grown.base, &own, FINE);
         let best = context.refitted(&grown.best, &own, FINE);
         if let (Ok(base), Ok(best)) = (base, best) {

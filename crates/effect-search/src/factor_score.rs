@@ -15,11 +15,6 @@ use crate::joined::Joined;
 use crate::node::{Context, Node};
 use crate::score::{DAMPING, Trial, thinned};
 
-/// From so many of the best starts, one of them scaled, a candidate is fitted.
-const PLACES: usize = 3;
-/// Parameters of a candidate above which they are not scaled by the factor: three ways for each are too many.
-const SCALED: usize = 4;
-
 /// A start of the candidate's own parameters.
 struct Place {
     /// Cost that the step predicts.
@@ -98,7 +93,7 @@ impl Context<'_> {
                 factor: size,
             })
         };
-        let mut scored: Vec<Place> = thinned(candidate.starts())
+        let mut scored: Vec<Place> = thinned(candidate.starts(), self.thresholds.scored_starts)
             .into_iter()
             .filter_map(place)
             .collect();
@@ -107,7 +102,7 @@ impl Context<'_> {
             return Ok(None);
         };
         let fall = self.samples() * (node.fit.cost / best.predicted.max(f64::MIN_POSITIVE)).ln();
-        scored.truncate(PLACES);
+        scored.truncate(self.thresholds.kept_factor_starts);
         // Without the factor every entry behind it is one place nearer.
         let own: Vec<usize> = own
             .iter()
@@ -123,15 +118,17 @@ impl Context<'_> {
             .iter()
             .map(|place| {
                 let all = [&place.x, &place.stepped].into_iter().flat_map(|x| {
-                    scalings(own.len(), place.factor).map(|scales| {
-                        let mut x = x.clone();
-                        for (&at, scale) in own.iter().zip(scales) {
-                            if setup.free().contains(&at) {
-                                x[at] = within(scale * x[at], setup.bounds()[at]);
+                    scalings(own.len(), place.factor, self.thresholds.scaled_parameters).map(
+                        |scales| {
+                            let mut x = x.clone();
+                            for (&at, scale) in own.iter().zip(scales) {
+                                if setup.free().contains(&at) {
+                                    x[at] = within(scale * x[at], setup.bounds()[at]);
+                                }
                             }
-                        }
-                        (cost(&x), x)
-                    })
+                            (cost(&x), x)
+                        },
+                    )
                 });
                 all.min_by(|a, b| a.0.total_cmp(&b.0))
                     .unwrap_or((f64::INFINITY, place.x.clone()))
@@ -147,9 +144,9 @@ impl Context<'_> {
     }
 }
 
-/// Every combination of scales of so many parameters: one, the factor, and its inverse.
-fn scalings(parameters: usize, factor: f64) -> impl Iterator<Item = Vec<f64>> {
-    let usable = factor.is_finite() && factor != 0.0 && parameters <= SCALED;
+/// Every combination of scales of so many parameters: one, the factor, and its inverse; one alone for more than `most` parameters.
+fn scalings(parameters: usize, factor: f64, most: usize) -> impl Iterator<Item = Vec<f64>> {
+    let usable = factor.is_finite() && factor != 0.0 && parameters <= most;
     let each = [1.0, factor, factor.recip()];
     let count = if usable {
         3_usize.pow(parameters as u32)

@@ -11,16 +11,7 @@ use estimation::{Fit, Noise};
 use rayon::prelude::*;
 
 use crate::node::{Context, Node, ROUGH};
-use crate::search::{FALL_FACTOR, FALL_MARGIN, PAYS, REFITS, best_first, same_set};
-
-/// So many sets of each metric, the best, are fitted in white noise to see where the search begins.
-const SEEDS: usize = 8;
-/// It begins once from the best set of so many effects or fewer.
-const FEW: usize = 2;
-/// So many of the sets are compared with the noise models of their own residuals.
-const COMPARED: usize = 4;
-/// So many effects, those with the best scores, are tried in the place of one.
-const EXCHANGED: usize = 4;
+use crate::search::{best_first, same_set};
 
 impl Context<'_> {
     /// Sets of up to so many effects that do not follow time, fitted in white noise. `sets`: what earlier searches fitted, in whatever metric.
@@ -47,7 +38,9 @@ impl Context<'_> {
 
     /// The set with the least criterion when each model has the noise model of its own residual, where that is less than a fit's.
     pub fn better_in_own_noise(&self, sets: Vec<Node>, than: &Fit) -> Option<Node> {
-        let best = best_first(sets).into_iter().take(COMPARED);
+        let best = best_first(sets)
+            .into_iter()
+            .take(self.thresholds.floating_compared);
         let fits: Vec<Node> = best
             .collect::<Vec<Node>>()
             .into_par_iter()
@@ -57,7 +50,7 @@ impl Context<'_> {
             })
             .collect();
         let least = best_first(fits).into_iter().next()?;
-        (least.fit.bic() < than.bic() - PAYS).then_some(least)
+        (least.fit.bic() < than.bic() - self.thresholds.growth_margin).then_some(least)
     }
 
     /// What of the best sets does not follow time, fitted in white noise.
@@ -74,7 +67,9 @@ impl Context<'_> {
                     |i: &usize| base.added.contains(i) || !self.candidates[*i].follows_time();
                 let mut seed = set;
                 let kept: Vec<usize> = seed.added.iter().copied().filter(timeless).collect();
-                if kept.len() <= base.added.len() || seeds.len() - before >= SEEDS {
+                if kept.len() <= base.added.len()
+                    || seeds.len() - before >= self.thresholds.floating_seeds
+                {
                     continue;
                 }
                 if kept.len() < seed.added.len() {
@@ -93,7 +88,9 @@ impl Context<'_> {
             .filter_map(|seed| self.refitted(&seed, white, ROUGH).ok());
         let seeds = best_first(fits.collect());
         // The best set of few effects, and the best of all: what grew beside effects that follow time may lead astray.
-        let few = |seed: &&Node| seed.added.len() <= base.added.len() + FEW;
+        let few = |seed: &&Node| {
+            seed.added.len() <= base.added.len() + self.thresholds.floating_small_set
+        };
         let first = seeds.iter().find(few).into_iter();
         let mut begin: Vec<Node> = first.chain(seeds.first()).cloned().collect();
         begin.dedup_by(|a, b| same_set(a, b));
@@ -110,11 +107,11 @@ impl Context<'_> {
     ) -> Option<Node> {
         let mut trials = self.trials_among(set, of, white);
         trials.retain(|trial| self.may_lower_the_criterion(trial));
-        trials.truncate(REFITS);
+        trials.truncate(self.thresholds.refits);
         let children = self.refits(set, &trials, white);
         fitted.extend(children.iter().cloned());
         let best = children.into_iter().next()?;
-        (best.gain_over(set) > PAYS).then_some(best)
+        (best.gain_over(set) > self.thresholds.growth_margin).then_some(best)
     }
 
     /// The set with effects exchanged for others, or left out, one by one, while that lowers the criterion.
@@ -137,12 +134,14 @@ impl Context<'_> {
                 }
                 let loss = lacking.fit.deviance - set.fit.deviance;
                 let mut trials = self.trials_among(&lacking, &others, white);
-                trials.retain(|trial| FALL_FACTOR * trial.fall + FALL_MARGIN > loss);
-                trials.truncate(EXCHANGED);
+                trials.retain(|trial| {
+                    self.thresholds.fall_factor * trial.fall + self.thresholds.fall_margin > loss
+                });
+                trials.truncate(self.thresholds.floating_swaps);
                 let exchanged = self.refits(&lacking, &trials, white);
                 fitted.extend(exchanged.iter().cloned());
                 let best = exchanged.into_iter().next()?;
-                (best.gain_over(&set) > PAYS).then_some(best)
+                (best.gain_over(&set) > self.thresholds.growth_margin).then_some(best)
             });
             match better {
                 Some(better) => {

@@ -5,32 +5,12 @@ use estimation::{Fit, Noise};
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::accept::BIC_MARGIN;
 use crate::node::{Context, FINE, Node};
 use crate::partial::explained;
 use crate::search::best_first;
 
-/// A candidate can stand in where the deviance is within this of the best: the 99 % quantile of chi-square with two degrees of freedom ...
-pub(crate) const SAME_DEVIANCE: f64 = 9.21;
-/// ... or the criterion within this.
-pub(crate) const SAME_BIC: f64 = 6.0;
-/// So many stand-ins are fitted, those with the best scores.
-const REFITS: usize = 20;
-/// Those whose first fit is within this are fitted to the end.
-const NEAR: f64 = 60.0;
-
-/// A stand-in is fitted where the fall of the deviance that one step predicts is at least this share of the effect's own, less this margin.
-const PREDICTED_SHARE: f64 = 0.3;
-const PREDICTED_MARGIN: f64 = 10.0;
-
-/// Two effects are one where the deviances of the sets differ by less.
-const SAME_EFFECT: f64 = 0.1;
-
 /// What is left out where the time has passed.
 const OTHERS: &str = "other effects that may explain the same";
-
-/// A candidate of the user's own stands in where it explains this part of what the effect does, and what it leaves may be noise.
-const MOST_OF_IT: f64 = 0.75;
 
 impl Context<'_> {
     /// For each effect that the search added itself, then all that can stand in for it, best first; and the set, in which a candidate of the
@@ -53,7 +33,9 @@ impl Context<'_> {
                 let is_same = |node: &&Node| {
                     let further = node.fit.parameters > last.fit.parameters;
                     let worse = node.fit.deviance - last.fit.deviance;
-                    self.ends_in_own(node) && !further && worse / slowness < SAME_EFFECT
+                    self.ends_in_own(node)
+                        && !further
+                        && worse / slowness < self.thresholds.same_effect
                 };
                 let same = others.iter().find(is_same).cloned();
                 group.extend(others.iter().filter_map(|node| node.added.last()));
@@ -85,11 +67,16 @@ impl Context<'_> {
             .into_iter()
             .filter(|trial| !last.added.contains(&trial.candidate))
             .filter(|trial| !self.repeats_one_of(trial.candidate, &last.added))
-            .filter(|trial| trial.fall > PREDICTED_SHARE * fall - PREDICTED_MARGIN)
-            .take(REFITS)
+            .filter(|trial| {
+                trial.fall
+                    > self.thresholds.group_predicted_share * fall
+                        - self.thresholds.group_predicted_margin
+            })
+            .take(self.thresholds.group_refits)
             .collect();
         let near = |node: &Node| {
-            node.fit.bic() - last.fit.bic() < NEAR * slowness || self.ends_in_own(node)
+            node.fit.bic() - last.fit.bic() < self.thresholds.group_near * slowness
+                || self.ends_in_own(node)
         };
         let rough = self.refits(&without, &trials, noise);
         let fine = rough
@@ -103,8 +90,9 @@ impl Context<'_> {
             let further = node.fit.parameters as f64 - last.fit.parameters as f64;
             let bic = deviance + further * (self.samples() / slowness).ln();
             // As many parameters or fewer: the deviance decides; more have to pay for themselves.
-            bic < SAME_BIC
-                || deviance < SAME_DEVIANCE && node.fit.parameters <= last.fit.parameters
+            bic < self.thresholds.same_bic
+                || deviance < self.thresholds.same_deviance
+                    && node.fit.parameters <= last.fit.parameters
                 || self.ends_in_own(node)
                     && self
                         .explains_most((node, last), &without, &own_last)
@@ -131,11 +119,13 @@ impl Context<'_> {
     ) -> Result<bool, Error> {
         let floors: Vec<f64> = own_last.noise.iter().map(ArModel::sigma).collect();
         let of_last = explained(&without.fit, &last.fit, &floors);
-        if explained(&without.fit, &set.fit, &floors) < MOST_OF_IT * of_last {
+        if explained(&without.fit, &set.fit, &floors)
+            < self.thresholds.own_candidate_share * of_last
+        {
             return Ok(false);
         }
         let own = self.in_limited_noise(set)?;
-        let gained = own_last.bic() - own.bic() > BIC_MARGIN;
+        let gained = own_last.bic() - own.bic() > self.thresholds.bic_margin;
         Ok(!(gained && self.beyond_chance((last, own_last), (set, &own))))
     }
 }

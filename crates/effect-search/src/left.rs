@@ -8,13 +8,10 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::Error;
-use crate::accept::NOISE_ORDER;
 use crate::node::{Context, Node};
 use crate::residual::{harmonics_p, instant, level_p, of_command, period, standardised};
 use crate::stationarity::stationary_p;
-
-/// Below this p-value a residual is not noise, in each test of a residual, corrected for all that it looked at.
-const NOT_NOISE: f64 = 1e-4;
+use crate::thresholds::Thresholds;
 
 /// What a residual shows that noise does not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -71,16 +68,13 @@ pub enum Left {
     },
 }
 
-/// A signal whose past predicts all but this share of its standard deviation has no innovations that a residual could depend on: what
-/// prewhitening leaves of it is its first samples and rounding.
-const PREDICTABLE: f64 = 0.01;
-
-fn is_predictable(signal: &[f64]) -> bool {
+/// Whether the past of a signal predicts nearly all of it.
+fn is_predictable(signal: &[f64], thresholds: &Thresholds) -> bool {
     let mean = signal.iter().sum::<f64>() / signal.len().max(1) as f64;
     let centred: Vec<f64> = signal.iter().map(|v| v - mean).collect();
     let power = centred.iter().map(|v| v * v).sum::<f64>() / centred.len().max(1) as f64;
-    ArModel::fit(&[&centred], NOISE_ORDER)
-        .is_ok_and(|model| model.sigma() <= PREDICTABLE * power.sqrt())
+    ArModel::fit(&[&centred], thresholds.noise_order)
+        .is_ok_and(|model| model.sigma() <= thresholds.predictable_input * power.sqrt())
 }
 
 impl Context<'_> {
@@ -108,7 +102,7 @@ impl Context<'_> {
                     continue;
                 }
                 for signal in of_command(&input.values) {
-                    if is_predictable(&signal) {
+                    if is_predictable(&signal, &self.thresholds) {
                         continue;
                     }
                     count += 1.0;
@@ -121,7 +115,7 @@ impl Context<'_> {
                 }
             }
         }
-        if let Some((input, i)) = place.filter(|_| least * count < NOT_NOISE) {
+        if let Some((input, i)) = place.filter(|_| least * count < self.thresholds.not_noise) {
             return Ok(Some(Left::Input {
                 input,
                 output: name(i),
@@ -133,7 +127,7 @@ impl Context<'_> {
                 period: period * self.problem.time_unit,
             }));
         }
-        let level = NOT_NOISE / residuals.len() as f64;
+        let level = self.thresholds.not_noise / residuals.len() as f64;
         for (i, residual) in residuals.iter().enumerate() {
             if samples(residual) < 8 {
                 continue;
@@ -159,7 +153,7 @@ impl Context<'_> {
             if level_p(&models[i], &white) < level {
                 return Ok(Some(Left::Level { output: name(i) }));
             }
-            if stationary_p(own.noise.of_series(i), residual) < level {
+            if stationary_p(own.noise.of_series(i), residual, &self.thresholds) < level {
                 return Ok(Some(Left::Spectrum {
                     output: name(i),
                     record: record.name.clone(),
@@ -176,9 +170,6 @@ impl Context<'_> {
     /// The smooth function that lowers the deviance of a set by more than chance would, in the metric of the noise of its own residual: the
     /// score test of each that the shape of what is missing may have.
     fn function(&self, node: &Node, own: &Fit) -> Option<Left> {
-        /// Below this p-value a function is more than chance. It is larger than [`NOT_NOISE`], as the functions are correlated: the
-        /// correction by their number is too strict.
-        const CHANCE: f64 = 1e-3;
         let (with_shapes, of) = self.with_shapes();
         let node = Node {
             fit: own.clone(),
@@ -199,7 +190,7 @@ impl Context<'_> {
             })
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let (p, candidate) = least?;
-        (p * (of.len() as f64) < CHANCE).then(|| Left::Function {
+        (p * (of.len() as f64) < self.thresholds.function_chance).then(|| Left::Function {
             effect: candidate.id.clone(),
             variable: self.variable_of(candidate).0,
         })
@@ -227,11 +218,11 @@ impl Context<'_> {
                 Some(own.x[position])
             })
             .collect();
-        let level = NOT_NOISE / (residuals.len() * periods.len().max(1)) as f64;
+        let level = self.thresholds.not_noise / (residuals.len() * periods.len().max(1)) as f64;
         for period in periods {
             for (i, residual) in residuals.iter().enumerate() {
                 let time = setup.model_time(i / outputs);
-                let p = harmonics_p(&time, residual, period, NOISE_ORDER);
+                let p = harmonics_p(&time, residual, period, self.thresholds.noise_order);
                 if p.is_ok_and(|p| p < level) {
                     return Some((0.5 * period, i));
                 }

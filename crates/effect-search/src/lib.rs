@@ -28,10 +28,11 @@ mod score;
 mod search;
 mod spectral_line;
 mod stationarity;
+mod thresholds;
 mod unknown;
 
 pub use believed::{Believed, all_candidates, believed};
-pub use diagnose::{MANY, Progress, diagnose};
+pub use diagnose::{Progress, diagnose};
 pub use error::Error;
 pub use found_model::with_effects;
 pub use held_out::{HeldOut, held_out};
@@ -40,4 +41,5 @@ pub use problem::{Kept, Options, Problem};
 pub use problem_builder::ProblemBuilder;
 pub use result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 pub use spectral_line::{Line, strongest_line};
+pub use thresholds::Thresholds;
 pub use unknown::{PortScore, Unknown};

@@ -10,6 +10,7 @@ use greybox::ModelSetup;
 
 use crate::Error;
 use crate::problem::{Limit, Problem};
+use crate::thresholds::Thresholds;
 
 /// A first fit: its rank is sought, not its digits.
 pub(crate) const ROUGH: Stopping = Stopping {
@@ -32,6 +33,7 @@ pub(crate) struct Context<'a> {
     /// Smooth functions, for the shape of what no candidate explains.
     pub shapes: Vec<Candidate>,
     pub limit: Limit<'a>,
+    pub thresholds: Thresholds,
 }
 
 /// A model with effects, and its fit.

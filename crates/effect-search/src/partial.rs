@@ -3,12 +3,16 @@
 //! Measured records hold several causes, and disturbances that are nearly integrated. A noise model with a long memory looks at changes from
 //! sample to sample alone: it takes every slow effect for noise, and a fit in its metric lets the simulation drift off. There sets are compared
 //! by their simulation error. A set is a part of the answer where
-//! - it explains [`PART`] of the mean squared error above the noise, what its past does not predict; an effect that follows time alone, which
-//!   imitates any slow disturbance, [`WHOLE`] of it, and without others beside it, as those then bend to any disturbance;
+//! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an effect
+//!   that follows time alone, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and without others
+//!   beside it, as those then bend to any disturbance;
 //! - several effects are called for where each model has a noise model of its own, of limited memory;
 //! - it predicts the next sample as well as the model without it, each beside a noise model of its own;
 //! - what is fitted to three quarters of the records predicts the fourth (cross-validation);
 //! - no size of its effects is at a bound.
+//!
+//! [`Thresholds::partial_share`]: crate::Thresholds::partial_share
+//! [`Thresholds::partial_share_of_time`]: crate::Thresholds::partial_share_of_time
 //!
 //! A larger set is taken where each further effect leaves at most a half of what a smaller set leaves.
 
@@ -17,25 +21,8 @@ use estimation::{Fit, Noise, fit_from, prewhitened};
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::accept::{BIC_MARGIN, NOISE_ORDER};
 use crate::node::{Context, FINE, Node, ROUGH};
 use crate::search::{best_first, same_set};
-
-/// Effects that leave more than noise are a part of the answer where they explain this share of the error above the noise.
-pub(crate) const PART: f64 = 0.38;
-/// This share is asked of an effect that follows time alone.
-const WHOLE: f64 = 0.9;
-/// So many sets of one size are tested, those with the least criterion.
-const TESTED: usize = 6;
-/// Each further effect leaves at most this part of what a smaller set leaves of the error above the noise.
-const LEFT: f64 = 0.5;
-/// A set explains this part of the mean squared error at least on parts of the records that it was not fitted to.
-const CARRIED_OVER: f64 = 0.3;
-/// Parts of a record, each of which is left out in turn.
-const FOLDS: usize = 4;
-/// The innovations beside a set are at most so many times as large as those beside the model without it: what imitates a slow course by
-/// moves of its own is rougher than the record.
-const ROUGHER: f64 = 1.05;
 
 impl Context<'_> {
     /// The set that explains the largest part of the error, fitted in white noise, and that part; `None` where no set is a part of the answer.
@@ -60,7 +47,7 @@ impl Context<'_> {
                 .into_par_iter()
                 .filter_map(|set| self.refitted(&set, &white, ROUGH).ok());
             let mut fits = best_first(fits.collect());
-            fits.truncate(TESTED);
+            fits.truncate(self.thresholds.partial_tested);
             let tested: Vec<(Node, f64, bool)> = fits
                 .into_par_iter()
                 .filter_map(|set| self.refitted(&set, &white, FINE).ok())
@@ -71,7 +58,7 @@ impl Context<'_> {
                 .collect();
             let pays = |(set, share): (&Node, f64), (less, of_less): (&Node, f64)| {
                 let further = self.size(set) - self.size(less);
-                1.0 - share <= LEFT.powi(further as i32) * (1.0 - of_less)
+                1.0 - share <= self.thresholds.partial_left.powi(further as i32) * (1.0 - of_less)
             };
             let says_more = |set: &Node, share: f64| {
                 smaller.iter().all(|(subset, of_subset)| {
@@ -120,16 +107,21 @@ impl Context<'_> {
         let share = explained(&base.fit, &set.fit, &floors);
         let new = &set.added[base.added.len()..];
         let in_time = new.iter().any(|&i| self.candidates[i].follows_time());
-        let accepted = share >= if in_time { WHOLE } else { PART }
+        let accepted = share
+            >= if in_time {
+                self.thresholds.partial_share_of_time
+            } else {
+                self.thresholds.partial_share
+            }
             && !(in_time && new.len() > 1)
             && !self.at_a_bound(set, new)
-            && (new.len() == 1 || own_base.bic() - own.bic() > BIC_MARGIN)
+            && (new.len() == 1 || own_base.bic() - own.bic() > self.thresholds.bic_margin)
             && own
                 .noise
                 .iter()
                 .zip(own_base.noise.iter())
-                .all(|(own, base)| own.sigma() <= ROUGHER * base.sigma())
-            && self.carried_over(base, set)? >= CARRIED_OVER;
+                .all(|(own, base)| own.sigma() <= self.thresholds.innovation_ratio * base.sigma())
+            && self.carried_over(base, set)? >= self.thresholds.carried_over;
         if std::env::var("DBG").is_ok() {
             eprintln!(
                 "DBG part {:?} share {share:.3} bound {} bicgain {:.1} sig {:?} {:?} cv {:?}",
@@ -151,7 +143,7 @@ impl Context<'_> {
         Ok(prewhitened(
             &setup,
             node.fit.clone(),
-            NOISE_ORDER,
+            self.thresholds.noise_order,
             memory,
             FINE,
         )?)
@@ -198,7 +190,7 @@ impl Context<'_> {
     /// The squared error of each output on parts of the records that take no part in the fit; `None` where a simulation is not finite.
     pub fn left_out_squares(&self, node: &Node) -> Result<Option<Vec<f64>>, Error> {
         let mut squares = vec![0.0; self.problem.records[0].outputs.len()];
-        for fold in 0..FOLDS {
+        for fold in 0..self.thresholds.folds {
             let Some(of_fold) = self.left_out(node, fold)? else {
                 return Ok(None);
             };
@@ -213,7 +205,7 @@ impl Context<'_> {
     /// simulation is not finite.
     fn left_out(&self, node: &Node, fold: usize) -> Result<Option<Vec<f64>>, Error> {
         let part = |record: &Record| {
-            let row = |fold: usize| record.len() * fold / FOLDS;
+            let row = |fold: usize| record.len() * fold / self.thresholds.folds;
             row(fold)..row(fold + 1)
         };
         let mut fitted = self.problem.records.clone();

@@ -11,6 +11,8 @@ use ct_signals::Record;
 use greybox::{ModelSetup, PriorValue, TimeLimit};
 use serde::{Deserialize, Serialize};
 
+use crate::thresholds::Thresholds;
+
 /// A model and the records that it is held against.
 #[derive(Debug, Clone)]
 pub struct Problem {
@@ -58,6 +60,8 @@ pub struct Options<'a> {
     pub time_limit: Option<Duration>,
     /// Interruption flag: when set, the search ends soon with the best that was found so far.
     pub interrupt: Option<&'a AtomicBool>,
+    /// What is claimed, and how widely is searched.
+    pub thresholds: Thresholds,
 }
 
 impl Default for Options<'_> {
@@ -68,6 +72,7 @@ impl Default for Options<'_> {
             seed: 1,
             time_limit: None,
             interrupt: None,
+            thresholds: Thresholds::DEFAULT,
         }
     }
 }

@@ -19,16 +19,10 @@ use crate::joined::Joined;
 use crate::node::{Context, Node};
 use crate::spectral_line::strongest_line;
 
-/// More starts of a candidate than this are thinned out.
-const MOST_STARTS: usize = 24;
 /// Damping of the predicted step, against what the data do not determine.
 pub(crate) const DAMPING: f64 = 1e-9;
-/// From so many of the best starts of a threshold or a shape a candidate is fitted.
-const PLACES: usize = 2;
 /// Parts of the predicted step from which a fit may begin, as shares of it.
 const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
-/// So many of the best starts of a threshold are linearised by all parameters.
-const LINEARISED: usize = 3;
 
 /// A candidate beside a set of effects, before it is fitted.
 #[derive(Debug, Clone)]
@@ -42,13 +36,13 @@ pub(crate) struct Trial {
     pub fall: f64,
 }
 
-/// The starts, or as many of them as are linearised.
-pub(crate) fn thinned(starts: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    if starts.len() <= MOST_STARTS {
+/// The starts, or so many of them.
+pub(crate) fn thinned(starts: Vec<Vec<f64>>, most: usize) -> Vec<Vec<f64>> {
+    if starts.len() <= most {
         return starts;
     }
-    let every = starts.len() as f64 / MOST_STARTS as f64;
-    (0..MOST_STARTS)
+    let every = starts.len() as f64 / most as f64;
+    (0..most)
         .map(|k| starts[(k as f64 * every) as usize].clone())
         .collect()
 }
@@ -197,7 +191,7 @@ impl Context<'_> {
                 starts.insert(0, x);
             }
         }
-        let starts = thinned(starts);
+        let starts = thinned(starts, self.thresholds.scored_starts);
         let count = self.samples();
         let set = self.setup(&node.model)?;
         let columns = self.columns_beside(node, &set, &setup);
@@ -257,7 +251,7 @@ impl Context<'_> {
             for share in BETWEEN {
                 let away = share * duration;
                 let mut others: Vec<Vec<f64>> = Vec::new();
-                for best in scored.iter().take(PLACES) {
+                for best in scored.iter().take(self.thresholds.kept_starts) {
                     for side in [-away, away] {
                         let mut x = best.x.clone();
                         x[at] = within(x[at] + side, setup.bounds()[at]);
@@ -277,7 +271,7 @@ impl Context<'_> {
         }
         if !smooth {
             // Where the effect acts the set's own derivatives are others.
-            scored.truncate(LINEARISED);
+            scored.truncate(self.thresholds.linearised_starts);
             scored = scored
                 .into_iter()
                 .filter_map(|Place { x, .. }| {
@@ -298,7 +292,7 @@ impl Context<'_> {
         let kept = if smooth && scored.len() == 1 {
             1
         } else {
-            PLACES
+            self.thresholds.kept_starts
         };
         let cost = |x: &[f64]| {
             let squares = estimation::squares(&setup, x, noise);

@@ -13,27 +13,6 @@ use crate::node::{Context, FINE, Node, ROUGH};
 use crate::pairs::joint_scores;
 use crate::score::Trial;
 
-/// So many candidates beside a set are fitted, those with the best scores; beside the believed model this many.
-pub(crate) const REFITS: usize = 8;
-const FIRST_REFITS: usize = 28;
-/// So many single effects, the best, are fitted from starts of their own too, ...
-const OWN_STARTS: usize = 16;
-/// ... and from so many each.
-const STARTS: usize = 4;
-/// So many pairs are fitted.
-const PAIRS: usize = 8;
-/// So many candidates, the best beside the believed model, are scored beside larger sets at least; half of all where there are more.
-const ALWAYS: usize = 40;
-/// Sets that grow side by side.
-const BEAM: usize = 4;
-/// A set grows where it lowers the criterion by this share of what the best one does.
-const SHARE_OF_BEST: f64 = 0.6;
-/// A candidate is fitted beside a set where so many times its predicted fall of the deviance, and this margin, would lower the criterion: the
-/// prediction of one step is too small where an effect is far from linear.
-pub(crate) const FALL_FACTOR: f64 = 2.0;
-pub(crate) const FALL_MARGIN: f64 = 6.0;
-/// A larger set has to lower the criterion by this, or the search ends.
-pub(crate) const PAYS: f64 = 2.0;
 /// What is left out where the time has passed.
 const LARGER: &str = "larger sets of effects";
 
@@ -86,30 +65,33 @@ impl Context<'_> {
     /// The best single effects fitted again from starts of their own: where the believed model has no minimum within its bounds, an effect
     /// beside it begins there, and that may be a place that it has no part in. `known`: fits of single effects in another metric.
     fn refit_from_own_starts(&self, nodes: &mut [Node], known: &[Node], noise: &Noise) {
-        nodes.par_iter_mut().take(OWN_STARTS).for_each(|node| {
-            if self.limit.passed() {
-                return;
-            }
-            let start = match known.iter().find(|known| known.added == node.added) {
-                Some(known) => Ok(known.fit.x.clone()),
-                None => self.own_minimum(node),
-            };
-            let added = node.added.clone();
-            let model = node.model.clone();
-            let again = start.and_then(|x| self.fitted(added, model, vec![x], noise, ROUGH));
-            if let Ok(again) = again
-                && again.fit.cost < node.fit.cost
-            {
-                *node = again;
-            }
-        });
+        nodes
+            .par_iter_mut()
+            .take(self.thresholds.own_start_refits)
+            .for_each(|node| {
+                if self.limit.passed() {
+                    return;
+                }
+                let start = match known.iter().find(|known| known.added == node.added) {
+                    Some(known) => Ok(known.fit.x.clone()),
+                    None => self.own_minimum(node),
+                };
+                let added = node.added.clone();
+                let model = node.model.clone();
+                let again = start.and_then(|x| self.fitted(added, model, vec![x], noise, ROUGH));
+                if let Ok(again) = again
+                    && again.fit.cost < node.fit.cost
+                {
+                    *node = again;
+                }
+            });
         sort_by_criterion(nodes);
     }
 
     /// Where a set ends that is fitted from starts of its own, in white noise.
     fn own_minimum(&self, node: &Node) -> Result<Vec<f64>, Error> {
         let options = FitOptions {
-            starts: STARTS,
+            starts: self.thresholds.own_starts,
             stopping: ROUGH,
             ..FitOptions::default()
         };
@@ -125,18 +107,18 @@ impl Context<'_> {
         max_effects: usize,
     ) -> Result<Grown, Error> {
         let trials = self.trials_among(&base, of, noise);
-        let promising = &trials[..trials.len().min(FIRST_REFITS)];
+        let promising = &trials[..trials.len().min(self.thresholds.first_refits)];
         let mut singles = self.refits(&base, promising, noise);
         if self.is_open(&base) {
             self.refit_from_own_starts(&mut singles, known, noise);
         }
         let mut beam: Vec<Node> = Vec::new();
         if max_effects > 0 {
-            beam.extend(singles.iter().take(BEAM).cloned());
+            beam.extend(singles.iter().take(self.thresholds.beam).cloned());
         }
         let few = beam.len();
         if max_effects > 1 && !self.limit.passed() {
-            let pairs = joint_scores(self, &base, &trials, noise, PAIRS);
+            let pairs = joint_scores(self, &base, &trials, noise, self.thresholds.pair_refits);
             let fits: Vec<Node> = pairs
                 .par_iter()
                 .filter(|_| !self.limit.passed())
@@ -144,7 +126,9 @@ impl Context<'_> {
                 .collect();
             beam.extend(fits);
         }
-        let many = (trials.len() / 2).max(ALWAYS).min(trials.len());
+        let many = (trials.len() / 2)
+            .max(self.thresholds.kept_candidates)
+            .min(trials.len());
         let mut among: Vec<usize> = trials[..many].iter().map(|t| t.candidate).collect();
         // What repeats one of them has no score before that is there.
         for i in 0..self.candidates.len() {
@@ -182,7 +166,7 @@ impl Context<'_> {
         let mut size = first_size.max(best.added.len());
         loop {
             beam = best_first(beam);
-            beam.truncate(BEAM);
+            beam.truncate(self.thresholds.beam);
             let Some(first) = beam.first() else { break };
             if std::env::var("DBG").is_ok() {
                 eprintln!(
@@ -204,7 +188,8 @@ impl Context<'_> {
                 best = first.clone();
             }
             let longer = beam.iter().any(|node| node.added.len() >= size);
-            if gain < PAYS && longer && size > first_size || size >= base.added.len() + max_effects
+            if gain < self.thresholds.growth_margin && longer && size > first_size
+                || size >= base.added.len() + max_effects
             {
                 break;
             }
@@ -213,7 +198,7 @@ impl Context<'_> {
                 break;
             }
             size += 1;
-            let enough = SHARE_OF_BEST * beam[0].gain_over(&base);
+            let enough = self.thresholds.beam_share * beam[0].gain_over(&base);
             let parents: Vec<Node> = beam
                 .iter()
                 .filter(|node| node.added.len() < base.added.len() + max_effects)
@@ -229,7 +214,7 @@ impl Context<'_> {
                 let promising: Vec<Trial> = trials
                     .into_iter()
                     .filter(|trial| self.may_lower_the_criterion(trial))
-                    .take(REFITS)
+                    .take(self.thresholds.refits)
                     .collect();
                 for child in self.refits(parent, &promising, noise) {
                     let same = |known: &Node| same_set(known, &child);
@@ -255,7 +240,8 @@ impl Context<'_> {
     /// Whether a candidate might lower the criterion.
     pub fn may_lower_the_criterion(&self, trial: &Trial) -> bool {
         let fitted = self.candidates[trial.candidate].fitted().max(1) as f64;
-        FALL_FACTOR * trial.fall + FALL_MARGIN > fitted * self.samples().ln()
+        self.thresholds.fall_factor * trial.fall + self.thresholds.fall_margin
+            > fitted * self.samples().ln()
     }
 
     /// A pair of candidates beside a set, from the best starts of each.

@@ -11,18 +11,13 @@ use ct_signals::ArModel;
 use realfft::RealFftPlanner;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Parts of the residual.
-const PARTS: usize = 4;
-/// Lines of the lowest band; each band above has as many as all below it, as what physics leaves is slow more often than fast.
-const LINES: usize = 2;
-/// Samples of a part at least: four bands.
-const LEAST: usize = 50;
+use crate::thresholds::Thresholds;
 
 /// p-value of the test that a residual has the same noise model in all its parts; 1 where it is too short for that.
 #[must_use]
-pub fn stationary_p(noise: &ArModel, residual: &[f64]) -> f64 {
-    let size = residual.len() / PARTS;
-    if size < LEAST {
+pub fn stationary_p(noise: &ArModel, residual: &[f64], thresholds: &Thresholds) -> f64 {
+    let size = residual.len() / thresholds.stationary_parts;
+    if size < thresholds.stationary_part_samples {
         return 1.0;
     }
     let white: Vec<f64> = noise
@@ -35,7 +30,7 @@ pub fn stationary_p(noise: &ArModel, residual: &[f64]) -> f64 {
     let mut spectrum = transform.make_output_vec();
     let mut powers: Vec<Vec<f64>> = Vec::new();
     let mut lines: Vec<f64> = Vec::new();
-    for part in white.chunks_exact(size).take(PARTS) {
+    for part in white.chunks_exact(size).take(thresholds.stationary_parts) {
         let mut part = part.to_vec();
         if transform.process(&mut part, &mut spectrum).is_err() {
             return 1.0;
@@ -51,7 +46,7 @@ pub fn stationary_p(noise: &ArModel, residual: &[f64]) -> f64 {
         }
         let mut bands = Vec::new();
         lines.clear();
-        let (mut from, mut to) = (0, LINES);
+        let (mut from, mut to) = (0, thresholds.stationary_lines);
         while to <= power.len() {
             // What does not fill another band belongs to the last one.
             let end = if 2 * to > power.len() {
@@ -105,7 +100,7 @@ mod tests {
                 e[SAMPLES / 2..].iter_mut().for_each(|e| *e *= 3.0);
             }
             let model = ArModel::fit(&[&e], 6).unwrap();
-            chance += usize::from(stationary_p(&model, &e) < 0.01);
+            chance += usize::from(stationary_p(&model, &e, &Thresholds::DEFAULT) < 0.01);
         }
         // One in a hundred is asked for, of 400.
         assert!(chance <= 10, "{chance}");
@@ -123,7 +118,7 @@ mod tests {
                 *e += 4.0 * (TAU * (4.0 * part + 10.0 * part * part)).sin();
             }
             let model = ArModel::fit(&[&e], 6).unwrap();
-            seen += usize::from(stationary_p(&model, &e) < 1e-4);
+            seen += usize::from(stationary_p(&model, &e, &Thresholds::DEFAULT) < 1e-4);
         }
         // An autoregressive model explains most of it: the test has what is left.
         assert!(seen >= RUNS / 2, "{seen} of {RUNS}");

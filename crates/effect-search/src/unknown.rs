@@ -20,15 +20,6 @@ use crate::partial::{explained, fall};
 use crate::result::Estimate;
 use crate::search::best_first;
 
-/// So many functions of those with the best scores are fitted, ...
-const FITTED: usize = 10;
-/// ... and so many of these are held against parts of the records that they were not fitted to.
-const CARRIED: usize = 5;
-/// A function of a signal explains this share of the error there, or it is none.
-const LEAST_SHARE: f64 = 0.2;
-/// Values of the shape are given at so many places.
-const PLACES: usize = 25;
-
 /// A smooth function at a port.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PortScore {
@@ -98,7 +89,7 @@ impl Context<'_> {
         let mut fitted = Vec::new();
         for kind in [&shapes, &courses] {
             let mut trials = self.trials_among(&base, kind, &white);
-            trials.truncate(FITTED);
+            trials.truncate(self.thresholds.shape_refits);
             fitted.extend(self.refits(&base, &trials, &white));
         }
         let fitted: Vec<Node> = best_first(fitted)
@@ -112,7 +103,7 @@ impl Context<'_> {
         let before: Vec<f64> = counts.map(|(rmse, n)| rmse * rmse * *n as f64).collect();
         let tested: Vec<Option<f64>> = shapes
             .par_iter()
-            .take(CARRIED)
+            .take(self.thresholds.shape_left_out)
             .map(|set| {
                 let squares = self.left_out_squares(set).ok().flatten()?;
                 Some(fall(&before, &squares))
@@ -125,7 +116,7 @@ impl Context<'_> {
             share(b.1).total_cmp(&share(a.1))
         });
         let carries = all.first().and_then(|(_, share)| *share);
-        let carries = carries.is_some_and(|share| share >= LEAST_SHARE);
+        let carries = carries.is_some_and(|share| share >= self.thresholds.shape_least_share);
         all.extend(courses.into_iter().map(|set| (set, None)));
         if !carries {
             all.sort_by(|a, b| b.0.gain_over(&base).total_cmp(&a.0.gain_over(&base)));
@@ -144,7 +135,7 @@ impl Context<'_> {
             bic_gain: set.gain_over(&base),
             share_left_out: *share,
         });
-        let (at, value, std_error) = curve(&best, candidate);
+        let (at, value, std_error) = curve(&best, candidate, self.thresholds.shape_points);
         let (variable, variable_unit) = self.variable_of(candidate);
         Ok(Some(Unknown {
             effect: candidate.id.clone(),
@@ -190,7 +181,11 @@ impl Context<'_> {
 }
 
 /// The function over the range that it is written in, with standard errors.
-fn curve(set: &Node, candidate: &Candidate) -> (Vec<f64>, Vec<f64>, Vec<Option<f64>>) {
+fn curve(
+    set: &Node,
+    candidate: &Candidate,
+    points: usize,
+) -> (Vec<f64>, Vec<f64>, Vec<Option<f64>>) {
     let numbers = &candidate.record_numbers;
     let number = |name: &str, other: f64| numbers.get(name).copied().unwrap_or(other);
     let (from, width) = if candidate.follows_time() {
@@ -207,7 +202,7 @@ fn curve(set: &Node, candidate: &Candidate) -> (Vec<f64>, Vec<f64>, Vec<Option<f
     let heights: Vec<f64> = positions.iter().map(|&i| set.fit.x[i]).collect();
     let errors = set.fit.std_errors();
     let correlations = set.fit.correlations();
-    let share = |k: usize| k as f64 / (PLACES - 1) as f64;
+    let share = |k: usize| k as f64 / points.saturating_sub(1).max(1) as f64;
     let bell = |j: usize, k: usize| {
         let mut unit = vec![0.0; heights.len()];
         unit[j] = 1.0;
@@ -217,16 +212,16 @@ fn curve(set: &Node, candidate: &Candidate) -> (Vec<f64>, Vec<f64>, Vec<Option<f
     let of_parameter = matches!(candidate.port, Port::Value(_) | Port::Dependence(..));
     let means: Vec<f64> = (0..heights.len())
         .map(|j| {
-            let sum: f64 = (0..PLACES).map(|k| bell(j, k)).sum();
+            let sum: f64 = (0..points).map(|k| bell(j, k)).sum();
             if of_parameter {
-                sum / PLACES as f64
+                sum / points as f64
             } else {
                 0.0
             }
         })
         .collect();
     let mut curve = (Vec::new(), Vec::new(), Vec::new());
-    for k in 0..PLACES {
+    for k in 0..points {
         let parts: Vec<f64> = (0..heights.len()).map(|j| bell(j, k) - means[j]).collect();
         curve.0.push(from + share(k) * width);
         curve

@@ -11,21 +11,16 @@
 //! Counted are records on which the noise that made them shows what is hidden. A miss is printed with a name that `--only` runs again.
 #![allow(clippy::unwrap_used)]
 
-mod outside;
-mod own;
-mod record;
-
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use ct_model::effects::{Visited, candidates};
 use ctid_examples::model_records::driven_models;
-use effect_search::Verdict;
+use ctid_tests::library::{Outcome, jobs, outcome};
+use effect_search::{Options, Verdict};
+use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use record::{Hidden, Job, Outcome, outcome};
 
 /// A study of simulated records of the model library.
 #[derive(Debug, Parser)]
@@ -63,64 +58,13 @@ fn main() {
     let arguments = Arguments::parse();
     let models = driven_models().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.seed);
-    let mut jobs = Vec::new();
-    for (model, driven) in models.iter().enumerate() {
-        if !arguments.models.is_empty() && !arguments.models.iter().any(|m| m == driven.name) {
-            continue;
-        }
-        let all = candidates(&driven.spec, &Visited::nominal(&driven.spec));
-        let effects: Vec<String> = all.iter().map(|c| c.id.clone()).collect();
-        let own: Vec<String> = own::candidates(driven.name).into_keys().collect();
-        let mut hidden: Vec<(&'static str, Hidden)> = Vec::new();
-        hidden.extend(
-            effects
-                .iter()
-                .map(|id| ("single", Hidden::Effects(vec![id.clone()]))),
-        );
-        hidden.extend(
-            own.iter()
-                .map(|id| ("own", Hidden::Effects(vec![id.clone()]))),
-        );
-        let both: Vec<&String> = effects.iter().chain(&own).collect();
-        for _ in 0..both.len() {
-            let a = both[rng.random_range(0..both.len())];
-            // As often as not one of them is of the user's own.
-            let b = if rng.random::<f64>() < 0.4 && !own.is_empty() {
-                &own[rng.random_range(0..own.len())]
-            } else {
-                both[rng.random_range(0..both.len())]
-            };
-            if a != b {
-                hidden.push(("pair", Hidden::Effects(vec![a.clone(), b.clone()])));
-            }
-        }
-        hidden.extend((0..20).map(|_| ("clean", Hidden::Nothing)));
-        hidden.extend(
-            (0..3 * outside::KINDS.len())
-                .map(|k| ("outside", Hidden::Outside(k % outside::KINDS.len()))),
-        );
-        let mut number = 0;
-        for (kind, hidden) in hidden {
-            for &ratio in &arguments.ratios {
-                for coloured in [false, true] {
-                    for closed in [false, true] {
-                        for _ in 0..arguments.records {
-                            number += 1;
-                            jobs.push(Job {
-                                model,
-                                kind,
-                                hidden: hidden.clone(),
-                                ratio,
-                                coloured,
-                                closed,
-                                number,
-                            });
-                        }
-                    }
-                }
-            }
-        }
-    }
+    let mut jobs = jobs(
+        &models,
+        &arguments.models,
+        &arguments.ratios,
+        arguments.records,
+        &mut rng,
+    );
     jobs.retain(|job| {
         arguments.kinds.iter().any(|kind| kind == job.kind)
             && job.name(&models).contains(&arguments.only)
@@ -139,10 +83,13 @@ fn main() {
     let begun = Instant::now();
     let mut cells: BTreeMap<String, Vec<Outcome>> = BTreeMap::new();
     let mut skipped: BTreeMap<String, usize> = BTreeMap::new();
+    let options = Options {
+        time_limit: Some(Duration::from_secs_f64(arguments.limit)),
+        ..Options::default()
+    };
     for job in &jobs {
         let name = job.name(&models);
-        let limit = Duration::from_secs_f64(arguments.limit);
-        match outcome(job, &models, arguments.seed, limit, arguments.verbose) {
+        match outcome(job, &models, arguments.seed, &options, arguments.verbose) {
             Ok(outcome) => {
                 if !outcome.right || arguments.verbose {
                     let mark = if outcome.right { "right" } else { "MISS" };

@@ -1,6 +1,6 @@
 //! What a model of its user's own is missing.
 
-use effect_search::{Diagnosis, Left, MANY, Options, Step, Verdict};
+use effect_search::{Diagnosis, Left, Options, Step, Thresholds, Verdict};
 
 use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
@@ -112,9 +112,10 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
         }
         (None, _) => all.push("What remains looks like noise.".to_string()),
     }
-    if diagnosis.effects.len() >= MANY {
+    let many = Thresholds::DEFAULT.many_effects;
+    if diagnosis.effects.len() >= many {
         all.push(format!(
-            "{MANY} effects or more together may imitate one that no candidate holds: take them for a description of the records until each is confirmed."
+            "{many} effects or more together may imitate one that no candidate holds: take them for a description of the records until each is confirmed."
         ));
     }
     if !diagnosis.left_out.is_empty() {

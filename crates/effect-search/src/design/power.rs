@@ -6,7 +6,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use serde::Serialize;
 
-use crate::accept::BIC_MARGIN;
+use crate::thresholds::Thresholds;
 
 /// How far an experiment takes two effects apart.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -35,6 +35,8 @@ pub enum Prospect {
 
 /// More power than this is of no use: it decides even where the effect is half as large as the records make it.
 pub const PLENTY: f64 = 200.0;
+/// The criterion decides where it differs by more than this.
+const BIC_MARGIN: f64 = Thresholds::DEFAULT.bic_margin;
 /// Excursions that differ by less than this are one.
 const SAME_EXCURSION: f64 = 0.1;
 /// A decision as good as certain, as likely, and what the criterion does not notice.

@@ -4,4 +4,5 @@
 mod design;
 mod hidden;
 mod results;
+mod thresholds;
 mod together;

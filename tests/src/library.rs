@@ -1,7 +1,10 @@
-//! Records with something hidden, and what is said of them.
+//! Records of the model library with something hidden, and what is said of them.
 
 mod drive;
+mod jobs;
 mod outcome;
+mod outside;
+mod own;
 
 use std::collections::BTreeMap;
 
@@ -16,8 +19,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use self::drive::{Drive, range, side_measurements};
+pub use self::jobs::jobs;
 pub use self::outcome::outcome;
-use crate::outside;
 
 /// Of one record, its inputs and its outputs, each a series.
 type Series = (Vec<Vec<f64>>, Vec<Vec<f64>>);
@@ -32,24 +35,36 @@ const FINE: Stopping = Stopping {
 /// What is hidden.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Hidden {
+    /// Nothing.
     Nothing,
+    /// Effects and candidates of the user's own, by their identifiers.
     Effects(Vec<String>),
+    /// What neither holds, by the position of its kind.
     Outside(usize),
 }
 
 /// A record to be made.
 #[derive(Debug, Clone)]
 pub struct Job {
+    /// Position of the model among the models of the library.
     pub model: usize,
+    /// `single`, `own`, `pair`, `clean` or `outside`.
     pub kind: &'static str,
+    /// What is hidden in it.
     pub hidden: Hidden,
+    /// Structural error over the noise.
     pub ratio: f64,
+    /// Whether the noise is coloured.
     pub coloured: bool,
+    /// Whether a controller makes the command.
     pub closed: bool,
+    /// Makes its name unique.
     pub number: u64,
 }
 
 impl Job {
+    /// A name for people, from which its random numbers follow.
+    #[must_use]
     pub fn name(&self, models: &[DrivenModel]) -> String {
         let hidden = match &self.hidden {
             Hidden::Nothing => "nothing".to_string(),
@@ -72,18 +87,26 @@ impl Job {
 pub struct Outcome {
     /// What is hidden is in the groups, all of it.
     pub in_group: bool,
+    /// All of it was named first.
     pub first: bool,
+    /// Size of the largest group.
     pub group: usize,
+    /// The verdict.
     pub verdict: Verdict,
     /// What is hidden is in the groups, or what was named fits as well under the noise that made the record.
     pub right: bool,
+    /// Processor time of the program during the diagnosis, where the system says it \[s\].
     pub seconds: f64,
+    /// Time that passed during the diagnosis \[s\].
+    pub elapsed: f64,
+    /// The time limit left something out.
     pub cut_short: bool,
+    /// A line about it.
     pub told: String,
 }
 
 /// A seed from a name.
-pub fn seed_of(name: &str) -> u64 {
+fn seed_of(name: &str) -> u64 {
     let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     name.bytes().fold(0xcbf2_9ce4_8422_2325, step)
 }

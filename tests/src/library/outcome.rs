@@ -9,29 +9,32 @@ use estimation::Noise;
 use greybox::PriorValue;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::drive::{Drive, side_measurements, visited};
 use super::{
-    CORRELATION, Hidden, Job, Judge, Outcome, bic_of, drawn, seed_of, structural, values_of,
+    CORRELATION, Hidden, Job, Judge, Outcome, bic_of, drawn, outside, own, seed_of, structural,
+    values_of,
 };
-use crate::{outside, own};
 
 /// The truth has to lower the criterion by this against what lacks (a part of) it, under the noise that made the record.
 const DETECTABLE: f64 = 14.0;
 
 /// Models whose criterion differs by less cannot be told apart.
-pub const SAME: f64 = 6.0;
+const SAME: f64 = 6.0;
 
 /// What comes from outside may be imitated: it counts where it is better than what was found by this.
 const BEYOND: f64 = 40.0;
 
-/// Makes a record and diagnoses it; why not, where it cannot be made so.
+/// Makes a record and diagnoses it.
+///
+/// # Errors
+/// Why it does not count: it cannot be made so, it does not show what is hidden, or what was named imitates it.
 pub fn outcome(
     job: &Job,
     models: &[DrivenModel],
     seed: u64,
-    limit: Duration,
+    options: &Options,
     verbose: bool,
 ) -> Result<Outcome, String> {
     let driven = &models[job.model];
@@ -257,12 +260,8 @@ pub fn outcome(
         }
     }
 
-    let options = Options {
-        time_limit: Some(limit),
-        ..Options::default()
-    };
     let (begun, processor) = (Instant::now(), processor_time());
-    let found = diagnose(&problem, &options, &|progress| {
+    let found = diagnose(&problem, options, &|progress| {
         if verbose {
             println!(
                 "    {} at {:.1} s",
@@ -369,6 +368,7 @@ pub fn outcome(
         verdict: found.verdict,
         right,
         seconds,
+        elapsed: found.seconds,
         cut_short: !found.left_out.is_empty(),
         told,
     })

@@ -71,17 +71,6 @@ impl Context<'_> {
                 .filter(|(set, share, _)| says_more(set, *share));
             let accepted = more.filter(|(.., accepted)| *accepted);
             let largest = accepted.max_by(|a, b| a.1.total_cmp(&b.1)).cloned();
-            if std::env::var("DBG").is_ok() {
-                for (set, share, ok) in &tested {
-                    eprintln!(
-                        "DBG size {size} {:?} share {share:.4} ok {ok} says_more {} rmse {:?} bic {:.0}",
-                        self.ids(&set.added),
-                        says_more(set, *share),
-                        set.fit.rmse,
-                        set.fit.bic()
-                    );
-                }
-            }
             if let Some((set, share, _)) = largest
                 && best
                     .as_ref()
@@ -122,17 +111,6 @@ impl Context<'_> {
                 .zip(own_base.noise.iter())
                 .all(|(own, base)| own.sigma() <= self.thresholds.innovation_ratio * base.sigma())
             && self.carried_over(base, set)? >= self.thresholds.carried_over;
-        if std::env::var("DBG").is_ok() {
-            eprintln!(
-                "DBG part {:?} share {share:.3} bound {} bicgain {:.1} sig {:?} {:?} cv {:?}",
-                self.ids(&set.added),
-                self.at_a_bound(set, new),
-                own_base.bic() - own.bic(),
-                own.noise.iter().map(|n| n.sigma()).collect::<Vec<_>>(),
-                own_base.noise.iter().map(|n| n.sigma()).collect::<Vec<_>>(),
-                self.carried_over(base, set)
-            );
-        }
         Ok((share, accepted))
     }
 

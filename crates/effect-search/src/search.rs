@@ -168,21 +168,6 @@ impl Context<'_> {
             beam = best_first(beam);
             beam.truncate(self.thresholds.beam);
             let Some(first) = beam.first() else { break };
-            if std::env::var("DBG").is_ok() {
-                eprintln!(
-                    "DBG beam at {:.1} s, noise order {}",
-                    self.limit.seconds(),
-                    noise.order()
-                );
-                for n in &beam {
-                    eprintln!(
-                        "DBG    {:?} {:.1} {:?}",
-                        self.ids(&n.added),
-                        n.gain_over(&base),
-                        n.fit.rmse
-                    );
-                }
-            }
             let gain = first.gain_over(&best);
             if gain > 0.0 {
                 best = first.clone();

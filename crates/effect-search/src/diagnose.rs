@@ -5,7 +5,9 @@
 //!    its metric.
 //! 3. Of the best set the effects stay that the acceptance test asks for, in one metric and with the noise model of each model's own
 //!    residual.
-//! 4. Residual tests of what it leaves decide between the verdicts; groups hold what cannot be told apart.
+//! 4. Residual tests say whether it leaves more than noise. Where it does, or where many effects were needed, sets of effects that do not
+//!    follow time are grown once more; where something is left the largest part of the error is looked for among all sets.
+//! 5. What is left decides between the verdicts; groups hold what cannot be told apart.
 
 use ct_signals::ArModel;
 use estimation::Noise;
@@ -59,9 +61,7 @@ pub fn diagnose(
     let mut by_error_sets = by_error.fitted.clone();
     by_error_sets.push(by_error.best.clone());
     if slow {
-        // What follows time alone imitates any slow disturbance, and leaves no room for others.
-        let mut timeless = all.clone();
-        timeless.retain(|&i| !context.candidates[i].follows_time());
+        let timeless = context.timeless();
         let grown = context.grow(base.clone(), (&timeless, &by_error.singles), &white, few)?;
         by_error_sets.extend(grown.fitted);
         by_error_sets.push(grown.best);

@@ -17,10 +17,7 @@ impl Context<'_> {
     /// Sets of up to so many effects that do not follow time, fitted in white noise. `sets`: what earlier searches fitted, in whatever metric.
     pub fn floating(&self, base: &Node, sets: &[Node], max_effects: usize) -> Vec<Node> {
         let white = Noise::white(base.spec().outputs.len());
-        let all = 0..self.candidates.len();
-        let timeless: Vec<usize> = all
-            .filter(|&i| !self.candidates[i].follows_time())
-            .collect();
+        let timeless = self.timeless();
         let most = base.added.len() + max_effects;
         let mut fitted: Vec<Node> = Vec::new();
         for seed in self.seeds(base, sets, &white) {

@@ -208,6 +208,13 @@ impl Context<'_> {
         added.iter().any(|&i| first(i) == first(candidate))
     }
 
+    /// Positions of the candidates that do not follow time: those that do imitate any slow disturbance, and leave no room for others.
+    pub fn timeless(&self) -> Vec<usize> {
+        let all = 0..self.candidates.len();
+        all.filter(|&i| !self.candidates[i].follows_time())
+            .collect()
+    }
+
     pub fn samples(&self) -> f64 {
         let outputs = self.problem.records.iter().flat_map(|r| &r.outputs);
         outputs.map(|y| y.values.len() - y.missing()).sum::<usize>() as f64

@@ -5,7 +5,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use ct_model::{Dual, Given, Model, ModelSpec, Scalar, Simulation};
-use plants::{Command, Known, Plant, Scales, Simulator, Structure};
+use plants::{Command, Known, Number, Plant, Scales, Simulator, Structure};
 
 const SAMPLES: usize = 1000;
 
@@ -57,7 +57,7 @@ fn duals<const N: usize>(values: &[f64], first: usize) -> Vec<Dual<N>> {
         .collect()
 }
 
-fn kernel<T: Scalar>(structure: &Structure, rig: &Rig, theta: &[T], levels: &[T]) -> Option<T> {
+fn kernel<T: Number>(structure: &Structure, rig: &Rig, theta: &[T], levels: &[T]) -> Option<T> {
     let rest = [command(0), second(command(0))];
     let mut simulator = Simulator::with_inputs(structure, theta, levels, rest).ok()?;
     let mut sum = T::constant(0.0);

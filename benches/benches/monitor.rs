@@ -57,9 +57,9 @@ fn benchmark(criterion: &mut Criterion) {
     let rows = rows();
     let mut group = criterion.benchmark_group("monitor");
     group.throughput(Throughput::Elements(ROWS as u64));
-    group.bench_function("simulation with 3 derivatives", |bencher| {
+    group.bench_function("simulation with 4 derivatives", |bencher| {
         let theta = [
-            Dual::<3>::variable(THETA[0], 0),
+            Dual::<4>::variable(THETA[0], 0),
             Dual::variable(THETA[1], 1),
         ];
         let structure = structure();

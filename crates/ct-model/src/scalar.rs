@@ -18,10 +18,16 @@ pub trait Scalar:
     + Sub<f64, Output = Self>
     + Mul<f64, Output = Self>
 {
+    /// How many derivatives it carries.
+    const LANES: usize;
     /// A number without derivatives.
     fn constant(value: f64) -> Self;
+    /// The `lane`-th variable itself: derivative one in its own lane. A `lane` at or beyond [`Scalar::LANES`] gives a constant.
+    fn variable(value: f64, lane: usize) -> Self;
     /// The value, without derivatives.
     fn value(self) -> f64;
+    /// The derivatives, [`Scalar::LANES`] of them.
+    fn slopes(&self) -> &[f64];
     /// Square root; the argument must be positive.
     fn sqrt(self) -> Self;
     /// Exponential function.
@@ -52,13 +58,22 @@ pub trait Scalar:
 }
 
 impl Scalar for f64 {
+    const LANES: usize = 0;
     #[inline]
     fn constant(value: f64) -> Self {
         value
     }
     #[inline]
+    fn variable(value: f64, _lane: usize) -> Self {
+        value
+    }
+    #[inline]
     fn value(self) -> f64 {
         self
+    }
+    #[inline]
+    fn slopes(&self) -> &[f64] {
+        &[]
     }
     #[inline]
     fn sqrt(self) -> Self {
@@ -92,16 +107,6 @@ pub struct Dual<const N: usize> {
 }
 
 impl<const N: usize> Dual<N> {
-    /// The `lane`-th parameter itself: derivative one in its own lane. A `lane` at or beyond `N` gives a constant.
-    #[must_use]
-    pub fn variable(value: f64, lane: usize) -> Self {
-        let mut eps = [0.0; N];
-        if let Some(own) = eps.get_mut(lane) {
-            *own = 1.0;
-        }
-        Self { re: value, eps }
-    }
-
     /// `f(self)` with the value `re` and the derivative `slope` of `f`.
     #[inline(always)]
     fn chain(self, re: f64, slope: f64) -> Self {
@@ -113,6 +118,7 @@ impl<const N: usize> Dual<N> {
 }
 
 impl<const N: usize> Scalar for Dual<N> {
+    const LANES: usize = N;
     #[inline]
     fn constant(value: f64) -> Self {
         Self {
@@ -121,8 +127,20 @@ impl<const N: usize> Scalar for Dual<N> {
         }
     }
     #[inline]
+    fn variable(value: f64, lane: usize) -> Self {
+        let mut variable = Self::constant(value);
+        if let Some(own) = variable.eps.get_mut(lane) {
+            *own = 1.0;
+        }
+        variable
+    }
+    #[inline]
     fn value(self) -> f64 {
         self.re
+    }
+    #[inline]
+    fn slopes(&self) -> &[f64] {
+        &self.eps
     }
     #[inline]
     fn sqrt(self) -> Self {

@@ -13,7 +13,7 @@
 //!
 //! **Reference**: G. A. F. Seber, C. J. Wild, Nonlinear Regression, 1989, sections 2.1.2 and 5.1.
 
-use ct_model::{Dual, Model};
+use ct_model::{Dual, Model, Scalar};
 use estimation::{
     Fit, Noise, Prior, Residuals, Sample, Start, Stopping, fit_from, linearise, robust,
 };

@@ -1,7 +1,7 @@
 //! The learned model on the rows as they come, with exact derivatives of its readings.
 
 use ct_signals::Hold;
-use plants::{Command, Dual, Scalar, Simulator, Structure};
+use plants::{Command, Dual, Number, Scalar, Simulator, Structure};
 
 use crate::{Each, intake::Sample};
 
@@ -22,16 +22,16 @@ pub(crate) trait Model: Send + Sync {
     fn stands(&self) -> f64;
 }
 
-struct Lanes<const N: usize>(Simulator<Dual<N>>);
+struct Lanes<T: Number>(Simulator<T>);
 
-impl<const N: usize> Model for Lanes<N> {
+impl<T: Number> Model for Lanes<T> {
     fn observe(&mut self, _sample: &Sample) {}
     fn read(&mut self, output: usize, row: &mut [f64]) -> f64 {
         let y = self.0.read(output);
-        for (to, derivative) in row.iter_mut().zip(y.eps) {
-            *to = derivative;
+        for (to, derivative) in row.iter_mut().zip(y.slopes()) {
+            *to = *derivative;
         }
-        y.re
+        y.value()
     }
     fn advance(&mut self, hold: Hold, from: &Sample, to: &Sample) {
         self.0.advance(command(hold, from, to), to.time - from.time);
@@ -58,25 +58,25 @@ pub(crate) fn model(
     at_rest: f64,
 ) -> Result<Box<dyn Model>, plants::Error> {
     match lanes(theta.len()) {
-        0..=4 => in_lanes::<4>(structure, substeps, theta, levels, at_rest),
-        5..=8 => in_lanes::<8>(structure, substeps, theta, levels, at_rest),
-        _ => in_lanes::<MOST_LANES>(structure, substeps, theta, levels, at_rest),
+        0..=4 => simulated_in::<Dual<4>>(structure, substeps, theta, levels, at_rest),
+        5..=8 => simulated_in::<Dual<8>>(structure, substeps, theta, levels, at_rest),
+        _ => simulated_in::<Dual<MOST_LANES>>(structure, substeps, theta, levels, at_rest),
     }
 }
 
-fn in_lanes<const N: usize>(
+fn simulated_in<T: Number>(
     structure: &Structure,
     substeps: usize,
     theta: &[f64],
     levels: &[f64],
     at_rest: f64,
 ) -> Result<Box<dyn Model>, plants::Error> {
-    let theta: Vec<Dual<N>> = theta
+    let theta: Vec<T> = theta
         .iter()
         .enumerate()
-        .map(|(lane, value)| Dual::variable(*value, lane))
+        .map(|(lane, value)| T::variable(*value, lane))
         .collect();
-    let levels: Vec<Dual<N>> = levels.iter().map(|level| Dual::constant(*level)).collect();
+    let levels: Vec<T> = levels.iter().map(|level| T::constant(*level)).collect();
     let mut simulator = Simulator::new(structure, &theta, &levels, at_rest)?;
     simulator.set_substeps(substeps);
     Ok(Box::new(Lanes(simulator)))

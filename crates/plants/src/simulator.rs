@@ -1,6 +1,9 @@
 //! Steps a structure from sample to sample.
 
 mod construction;
+mod numbers;
+
+pub use numbers::Number;
 
 use crate::{
     Scalar, actuator::Actuator, actuator::Signal, inflow::Feed, inflow::Inflow, sensor::Sensor,
@@ -88,7 +91,7 @@ struct SecondPump<T: Scalar> {
     pieces: Vec<(T, Signal<T>)>,
 }
 
-impl<T: Scalar> Simulator<T> {
+impl<T: Number> Simulator<T> {
     /// Cuts every sampling interval into `n` equal parts (at least one).
     pub fn set_substeps(&mut self, n: usize) {
         self.substeps = n.max(1);
@@ -101,12 +104,7 @@ impl<T: Scalar> Simulator<T> {
 
     /// The reading of an output now. Sensors may have memory, so it is called once for each output and sample, in order of time.
     pub fn read(&mut self, output: usize) -> T {
-        let (vessel, sensor) = &mut self.sensors[output];
-        let level = match &self.layout {
-            Layout::Series(vessels) => vessels.levels[*vessel],
-            Layout::Joined(joined) => joined.vessels.levels[*vessel],
-        };
-        sensor.read(level, self.time)
+        T::read(self, output)
     }
 
     /// The level of each vessel now; only the first [`crate::Plant::vessels`] entries are used.
@@ -140,12 +138,23 @@ impl<T: Scalar> Simulator<T> {
     /// The same under a command to either pump, or under one and a measured disturbance, each held or a ramp; the second one is not looked
     /// at where there is neither.
     pub fn advance_both(&mut self, [command, second]: [Command; 2], h: f64) {
-        self.step(T::constant(command.from), command.to, second, h);
+        T::step(self, T::constant(command.from), command.to, second, h);
     }
 
     /// The same under a held command to the first pump that has derivatives, as a controller gives it.
     pub fn advance_held(&mut self, command: T, second: Command, h: f64) {
-        self.step(command, None, second, h);
+        T::step(self, command, None, second, h);
+    }
+}
+
+impl<T: Scalar> Simulator<T> {
+    fn reading(&mut self, output: usize) -> T {
+        let (vessel, sensor) = &mut self.sensors[output];
+        let level = match &self.layout {
+            Layout::Series(vessels) => vessels.levels[*vessel],
+            Layout::Joined(joined) => joined.vessels.levels[*vessel],
+        };
+        sensor.read(level, self.time)
     }
 
     fn step(&mut self, from: T, to: Option<f64>, second: Command, h: f64) {

@@ -1,6 +1,6 @@
 //! Simulates the records: rows of residuals and their derivatives.
 
-use ct_model::{Dual, Simulation};
+use ct_model::{Dual, Scalar, Simulation};
 use ct_signals::Hold;
 use estimation::{Prior, Residuals, Sample};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,22 +24,22 @@ impl<'a> ModelSetup<'a> {
             return Some(model.collect());
         }
         let mut all = vec![Vec::new(); self.records.len() * self.samples.len()];
-        self.each_instant::<0>(x, &[], |r, _, outputs| {
+        self.each_instant::<f64>(x, &[], |r, _, outputs| {
             for (o, y) in outputs.iter().enumerate() {
-                all[r * self.samples.len() + o].push(y.re);
+                all[r * self.samples.len() + o].push(*y);
             }
             Some(())
         })?;
         Some(all)
     }
 
-    /// Simulates all records with derivatives by some entries, at most `L` of them at once, and shows the outputs row by row with the
-    /// entries of the lanes.
-    fn each_instant<const L: usize>(
+    /// Simulates all records with derivatives by some entries and shows the outputs row by row, in so many simulations that each of their
+    /// numbers carries at most [`Scalar::LANES`] of the derivatives.
+    fn each_instant<T: Scalar>(
         &self,
         x: &[f64],
         by: &[usize],
-        mut each: impl FnMut(usize, usize, &[Dual<L>]) -> Option<()>,
+        mut each: impl FnMut(usize, usize, &[T]) -> Option<()>,
     ) -> Option<()> {
         let (count, states) = (self.parameter_count(), self.model.spec().states.len());
         let outputs = self.samples.len();
@@ -52,24 +52,24 @@ impl<'a> ModelSetup<'a> {
                 .copied()
                 .filter(|i| *i < count || own.contains(i))
                 .collect();
-            let mut chunks: Vec<&[usize]> = lanes.chunks(L.max(1)).collect();
+            let mut chunks: Vec<&[usize]> = lanes.chunks(T::LANES.max(1)).collect();
             if chunks.is_empty() {
                 chunks.push(&[]);
             }
             let begin = self.clock.begins[r] / self.time_unit;
-            let mut simulations: Vec<Simulation<'_, Dual<L>>> = chunks
+            let mut simulations: Vec<Simulation<'_, T>> = chunks
                 .iter()
                 .map(|chunk| {
                     let dual = |i: usize| {
-                        let lane = chunk.iter().position(|own| *own == i).unwrap_or(L);
-                        Dual::<L>::variable(x[i], lane)
+                        let lane = chunk.iter().position(|own| *own == i).unwrap_or(T::LANES);
+                        T::variable(x[i], lane)
                     };
                     let parameters: Vec<_> = (0..count).map(dual).collect();
                     let initial: Vec<_> = own.clone().map(dual).collect();
                     Simulation::new(self.model, &parameters, &initial, begin)
                 })
                 .collect();
-            let mut read = vec![Dual::<L>::variable(0.0, L); outputs * chunks.len()];
+            let mut read = vec![T::constant(0.0); outputs * chunks.len()];
             for k in 0..record.len() {
                 for (i, input) in record.inputs.iter().enumerate() {
                     inputs[i] = input.values[k];
@@ -105,11 +105,11 @@ impl<'a> ModelSetup<'a> {
         let own = |r: usize| self.free.iter().filter(|i| of(r).contains(i)).count();
         let lanes = parameters + (0..self.records.len()).map(own).max().unwrap_or(0);
         match lanes {
-            0..=2 => self.each_row_in_lanes::<2>(x, &self.free, each),
-            3..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
-            5..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
-            9..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
-            _ => self.each_row_in_lanes::<8>(x, &self.free, each),
+            0..=2 => self.each_row_in::<Dual<2>>(x, &self.free, each),
+            3..=4 => self.each_row_in::<Dual<4>>(x, &self.free, each),
+            5..=8 => self.each_row_in::<Dual<8>>(x, &self.free, each),
+            9..=12 => self.each_row_in::<Dual<12>>(x, &self.free, each),
+            _ => self.each_row_in::<Dual<8>>(x, &self.free, each),
         }
     }
 
@@ -120,10 +120,10 @@ impl<'a> ModelSetup<'a> {
         x: &[f64],
         each: &mut dyn FnMut(Sample, &mut [f64]) -> bool,
     ) -> Option<()> {
-        self.each_row_in_lanes::<0>(x, &[], each)
+        self.each_row_in::<f64>(x, &[], each)
     }
 
-    fn each_row_in_lanes<const L: usize>(
+    fn each_row_in<T: Scalar>(
         &self,
         x: &[f64],
         by: &[usize],
@@ -133,15 +133,16 @@ impl<'a> ModelSetup<'a> {
         let columns = by.len() + 1;
         let outputs = self.samples.len();
         let mut row = vec![0.0; columns];
-        self.each_instant::<L>(x, by, |r, k, read| {
+        self.each_instant::<T>(x, by, |r, k, read| {
             let own = count + r * states..count + (r + 1) * states;
             for output in 0..outputs {
                 row.fill(0.0);
                 let mine = (0..by.len()).filter(|&c| by[c] < count || own.contains(&by[c]));
                 for (lane, column) in mine.enumerate() {
-                    row[column] = read[lane / L.max(1) * outputs + output].eps[lane % L.max(1)];
+                    row[column] =
+                        read[lane / T::LANES * outputs + output].slopes()[lane % T::LANES];
                 }
-                let model = read[output].re;
+                let model = read[output].value();
                 let measured = self.records[r].outputs[output].values[k];
                 row[columns - 1] = measured - model;
                 let sample = Sample {

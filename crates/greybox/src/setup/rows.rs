@@ -1,7 +1,7 @@
 //! The derivatives of a simulation, row by row.
 
 use estimation::{Noise, Prior, Residuals, Rows, Sample, Triangle};
-use plants::{Dual, Simulator};
+use plants::{Dual, Number, Simulator};
 
 use super::{Setup, at_rest, commands, reference, second_command};
 use crate::feedback::Response;
@@ -76,13 +76,12 @@ impl Setup<'_> {
             .filter(|&&i| i < self.parameter_count())
             .count();
         match parameters + self.states() {
-            0..=4 => self.each_row_in_lanes::<4>(x, &self.free, each),
-            5..=6 => self.each_row_in_lanes::<6>(x, &self.free, each),
-            7..=8 => self.each_row_in_lanes::<8>(x, &self.free, each),
-            9..=12 => self.each_row_in_lanes::<12>(x, &self.free, each),
-            // One lane more, and a compiler copies a dual by a call instead of in registers.
-            13..=15 => self.each_row_in_lanes::<15>(x, &self.free, each),
-            _ => self.each_row_in_lanes::<8>(x, &self.free, each),
+            0..=4 => self.each_row_in::<Dual<4>>(x, &self.free, each),
+            5..=8 => self.each_row_in::<Dual<8>>(x, &self.free, each),
+            9..=12 => self.each_row_in::<Dual<12>>(x, &self.free, each),
+            13..=16 => self.each_row_in::<Dual<16>>(x, &self.free, each),
+            17..=24 => self.each_row_in::<Dual<12>>(x, &self.free, each),
+            _ => self.each_row_in::<Dual<16>>(x, &self.free, each),
         }
     }
 
@@ -93,11 +92,11 @@ impl Setup<'_> {
         x: &[f64],
         each: &mut dyn FnMut(Sample, &mut [f64]) -> bool,
     ) -> Option<()> {
-        self.each_row_in_lanes::<0>(x, &[], each)
+        self.each_row_in::<f64>(x, &[], each)
     }
 
-    /// Shows every row with derivatives by some of the entries, in simulators of so many lanes.
-    fn each_row_in_lanes<const L: usize>(
+    /// Shows every row with derivatives by some of the entries, in simulators that run on this kind of number.
+    fn each_row_in<T: Number>(
         &self,
         x: &[f64],
         by: &[usize],
@@ -130,7 +129,7 @@ impl Setup<'_> {
             let lanes: Vec<usize> = (0..by.len())
                 .filter(|&column| by[column] < count || own.contains(&by[column]))
                 .collect();
-            let mut chunks: Vec<&[usize]> = lanes.chunks(L.max(1)).collect();
+            let mut chunks: Vec<&[usize]> = lanes.chunks(T::LANES.max(1)).collect();
             if chunks.is_empty() {
                 chunks.push(&[]);
             }
@@ -140,8 +139,8 @@ impl Setup<'_> {
                     let lane = chunk
                         .iter()
                         .position(|&column| by[column] == i)
-                        .unwrap_or(L);
-                    Dual::<L>::variable(x[i], lane)
+                        .unwrap_or(T::LANES);
+                    T::variable(x[i], lane)
                 };
                 let theta: Vec<_> = (0..count).map(dual).collect();
                 let levels: Vec<_> = plant.clone().map(dual).collect();
@@ -168,10 +167,10 @@ impl Setup<'_> {
                     let mut controlled = None;
                     for (o, model) in models.iter_mut().enumerate() {
                         let y = simulator.read(o);
-                        *model = y.re;
+                        *model = y.value();
                         let row = &mut rows[o * columns..][..columns];
                         for (lane, &column) in chunk.iter().enumerate() {
-                            row[column] = y.eps[lane];
+                            row[column] = y.slopes()[lane];
                         }
                         if self.reads(o) {
                             controlled = Some(y);
@@ -187,9 +186,9 @@ impl Setup<'_> {
                             let u = regulator.command_beside(reference(record, k), y, beside, h);
                             if let Some((_, commands)) = &mut response {
                                 for (lane, &column) in chunk.iter().enumerate() {
-                                    commands[column] = -u.eps[lane];
+                                    commands[column] = -u.slopes()[lane];
                                 }
-                                commands[columns - 1] = u.re - record.inputs[0].values[k];
+                                commands[columns - 1] = u.value() - record.inputs[0].values[k];
                             }
                             simulator.advance_held(u, second_command(record, k), h);
                         }

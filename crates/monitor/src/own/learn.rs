@@ -4,7 +4,7 @@
 //! linearised at its mean state under the mean inputs: from the eigenvalues of `dx(t + h)/dx(t)`, which the simulation gives exactly.
 //! A model that does not settle there is not watched: it would leave the plant for ever, however right it is.
 
-use ct_model::{Dual, Simulation};
+use ct_model::{Dual, Scalar, Simulation};
 use ct_signals::Hold;
 use greybox::{FitOptions, ModelSetup};
 use nalgebra::DMatrix;

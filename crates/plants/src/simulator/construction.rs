@@ -1,12 +1,12 @@
 //! A simulator from the structure of a plant, its parameters and initial states.
 
-use super::{Disturbance, Joined, Layout, SecondPump, Simulator};
+use super::{Disturbance, Joined, Layout, Number, SecondPump, Simulator};
 use crate::actuator::Actuator;
 use crate::sensor::Sensor;
 use crate::vessels::{Valves, Vessels};
 use crate::{Error, Outlet, Place, Scalar, Structure, effects, term};
 
-impl<T: Scalar> Simulator<T> {
+impl<T: Number> Simulator<T> {
     /// `theta` in the order of [`Structure::parameters`], `initial` the level of each vessel when the record begins
     /// and, where the lags had not settled by then, an excess for each of [`Structure::lags`]; `at_rest` the command
     /// before the record began.
@@ -42,6 +42,19 @@ impl<T: Scalar> Simulator<T> {
     /// # Errors
     /// As [`Simulator::new`].
     pub fn starting_at(
+        start: f64,
+        structure: &Structure,
+        theta: &[T],
+        initial: &[T],
+        at_rest: [f64; 2],
+    ) -> Result<Self, Error> {
+        T::starting_at(start, structure, theta, initial, at_rest)
+    }
+}
+
+impl<T: Scalar> Simulator<T> {
+    /// [`Simulator::starting_at`].
+    pub(super) fn construct(
         start: f64,
         structure: &Structure,
         theta: &[T],

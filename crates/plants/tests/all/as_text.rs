@@ -1,6 +1,6 @@
 //! The plants as text give what their kernels give.
 
-use ct_model::{Dual, Given, Method, Model, ModelSpec, Simulation};
+use ct_model::{Dual, Given, Method, Model, ModelSpec, Scalar, Simulation};
 use plants::{Command, Plant};
 
 use crate::support::{Case, DRIVES, Drive, base, input};

@@ -245,7 +245,7 @@ fn derivatives_are_finite_and_right_where_levels_cross_and_rest() {
 fn valves_that_are_over_within_a_step_settle() {
     for ratio in [3.0, 30.0, 300.0, 3e4] {
         let theta = [9.0, 8.5, 0.46 * ratio, 0.48 * ratio, 0.6];
-        let duals: Vec<Dual<5>> = theta
+        let duals: Vec<Dual<8>> = theta
             .iter()
             .enumerate()
             .map(|(lane, &value)| Dual::variable(value, lane))

@@ -4,7 +4,7 @@
 pub mod reference;
 
 use plants::{
-    CATALOGUE, Command, Dual, Known, Outlet, ParameterInfo, Placed, Plant, Scalar, Scales,
+    CATALOGUE, Command, Dual, Known, Number, Outlet, ParameterInfo, Placed, Plant, Scalar, Scales,
     Simulator, Structure,
 };
 use rand::{RngExt, SeedableRng};
@@ -241,7 +241,7 @@ impl Case {
     }
 
     /// The output at other variables.
-    pub fn run_at<T: Scalar>(
+    pub fn run_at<T: Number>(
         &self,
         variables: &[T],
         input: &[(Command, f64)],
@@ -281,7 +281,7 @@ pub fn mirrored(command: Command) -> Command {
 }
 
 /// One reading before each command.
-pub fn simulate<T: Scalar>(
+pub fn simulate<T: Number>(
     structure: &Structure,
     theta: &[T],
     levels: &[T],

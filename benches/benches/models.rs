@@ -4,8 +4,8 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use ct_model::{Dual, Given, Model, ModelSpec, Scalar, Simulation};
-use plants::{Command, Known, Number, Plant, Scales, Simulator, Structure};
+use ct_model::{Dual, Given, Model, ModelSpec, Scalar, Simulation, SimulationNumber};
+use plants::{Command, Known, Plant, Scales, Simulator, SimulatorNumber, Structure};
 
 const SAMPLES: usize = 1000;
 
@@ -57,7 +57,12 @@ fn duals<const N: usize>(values: &[f64], first: usize) -> Vec<Dual<N>> {
         .collect()
 }
 
-fn kernel<T: Number>(structure: &Structure, rig: &Rig, theta: &[T], levels: &[T]) -> Option<T> {
+fn kernel<T: SimulatorNumber>(
+    structure: &Structure,
+    rig: &Rig,
+    theta: &[T],
+    levels: &[T],
+) -> Option<T> {
     let rest = [command(0), second(command(0))];
     let mut simulator = Simulator::with_inputs(structure, theta, levels, rest).ok()?;
     let mut sum = T::constant(0.0);
@@ -70,7 +75,7 @@ fn kernel<T: Number>(structure: &Structure, rig: &Rig, theta: &[T], levels: &[T]
 }
 
 /// The fitted parameters are `theta`, the others those of the model.
-fn text<T: Scalar>(model: &Model, interval: f64, theta: &[T], levels: &[T]) -> Option<T> {
+fn text<T: SimulationNumber>(model: &Model, interval: f64, theta: &[T], levels: &[T]) -> Option<T> {
     let spec = model.spec();
     let mut fitted = theta.iter().copied();
     let parameters: Vec<T> = spec

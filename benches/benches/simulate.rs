@@ -9,7 +9,8 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use ode_solvers::dopri5::Dopri5;
 use ode_solvers::{OutputType, System, Vector2};
 use plants::{
-    Command, Dual, EffectInfo, Known, Number, Placed, Plant, Scalar, Scales, Simulator, Structure,
+    Command, Dual, EffectInfo, Known, Placed, Plant, Scalar, Scales, Simulator, SimulatorNumber,
+    Structure,
 };
 
 const SAMPLES: usize = 1000;
@@ -37,7 +38,7 @@ fn structure(plant: Plant, effects: &[&str]) -> Structure {
 }
 
 /// One run over the record: the sum of the readings, so that nothing is left out.
-fn run<T: Number>(structure: &Structure, theta: &[T], levels: &[T]) -> Option<T> {
+fn run<T: SimulatorNumber>(structure: &Structure, theta: &[T], levels: &[T]) -> Option<T> {
     let mut simulator = Simulator::new(structure, theta, levels, command(0)).ok()?;
     let mut sum = T::constant(0.0);
     for k in 0..SAMPLES {

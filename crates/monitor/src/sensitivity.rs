@@ -1,7 +1,7 @@
 //! The learned model on the rows as they come, with exact derivatives of its readings.
 
 use ct_signals::Hold;
-use plants::{Command, Dual, Number, Scalar, Simulator, Structure};
+use plants::{Command, Dual, Scalar, Simulator, SimulatorNumber, Structure};
 
 use crate::{Each, intake::Sample};
 
@@ -22,9 +22,9 @@ pub(crate) trait Model: Send + Sync {
     fn stands(&self) -> f64;
 }
 
-struct Lanes<T: Number>(Simulator<T>);
+struct Lanes<T: SimulatorNumber>(Simulator<T>);
 
-impl<T: Number> Model for Lanes<T> {
+impl<T: SimulatorNumber> Model for Lanes<T> {
     fn observe(&mut self, _sample: &Sample) {}
     fn read(&mut self, output: usize, row: &mut [f64]) -> f64 {
         let y = self.0.read(output);
@@ -64,7 +64,7 @@ pub(crate) fn model(
     }
 }
 
-fn simulated_in<T: Number>(
+fn simulated_in<T: SimulatorNumber>(
     structure: &Structure,
     substeps: usize,
     theta: &[f64],

@@ -61,7 +61,7 @@ pub use error::Error;
 pub use law::{Balance, Law, Rim, Side};
 pub use plant::{Outlet, ParameterInfo, Plant};
 pub use scales::{Deciles, OutputScales, Picked, Scales, deciles};
-pub use simulator::{Command, Number, Simulator};
+pub use simulator::{Command, Simulator, SimulatorNumber};
 pub use structure::{Known, MAX_VESSELS, Placed, Site, Structure, WIDENED};
 pub use term::{Fitted, MOST_KNOTS, Term, Variable};
 pub use unit::Unit;

@@ -3,7 +3,7 @@
 mod construction;
 mod numbers;
 
-pub use numbers::Number;
+pub use numbers::SimulatorNumber;
 
 use crate::{
     Scalar, actuator::Actuator, actuator::Signal, inflow::Feed, inflow::Inflow, sensor::Sensor,
@@ -91,7 +91,7 @@ struct SecondPump<T: Scalar> {
     pieces: Vec<(T, Signal<T>)>,
 }
 
-impl<T: Number> Simulator<T> {
+impl<T: SimulatorNumber> Simulator<T> {
     /// Cuts every sampling interval into `n` equal parts (at least one).
     pub fn set_substeps(&mut self, n: usize) {
         self.substeps = n.max(1);

@@ -17,8 +17,11 @@ mod explicit;
 mod implicit;
 mod interval;
 mod memory;
+mod numbers;
 mod sliding;
 mod step;
+
+pub use self::numbers::SimulationNumber;
 
 use self::delays::{Delay, Delays};
 use self::exact::Exact;
@@ -142,7 +145,7 @@ pub struct Simulation<'a, T> {
     settled: bool,
 }
 
-impl<'a, T: Scalar> Simulation<'a, T> {
+impl<'a, T: SimulationNumber> Simulation<'a, T> {
     /// Begins at `start` on the clock that `time` follows, with parameters in the order of [`ModelSpec::parameters`] and a value for
     /// each state.
     ///
@@ -150,6 +153,37 @@ impl<'a, T: Scalar> Simulation<'a, T> {
     /// Where the numbers of parameters or states are not the model's.
     #[must_use]
     pub fn new(model: &'a Model, parameters: &[T], initial: &[T], start: f64) -> Self {
+        T::begin(model, parameters, initial, start)
+    }
+
+    /// The outputs now, with the inputs of this row.
+    pub fn read(&mut self, inputs: &[f64], outputs: &mut [T]) {
+        T::read(self, inputs, outputs);
+    }
+
+    /// Goes on to `until`, the inputs in straight lines from one value to the other (the same where they are held).
+    ///
+    /// # Errors
+    /// Where the simulation cannot go on.
+    pub fn advance(&mut self, from: &[f64], to: &[f64], until: f64) -> Result<(), NoSolution> {
+        T::advance(self, from, to, until)
+    }
+}
+
+impl<'a, T: Scalar> Simulation<'a, T> {
+    /// How it is simulated by now.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The present states.
+    #[must_use]
+    pub fn state(&self) -> &[T] {
+        &self.state
+    }
+
+    fn begin(model: &'a Model, parameters: &[T], initial: &[T], start: f64) -> Self {
         let tape = &model.tape;
         assert_eq!(parameters.len(), tape.parameters, "parameters");
         assert_eq!(initial.len(), tape.states, "initial states");
@@ -199,20 +233,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         }
     }
 
-    /// How it is simulated by now.
-    #[must_use]
-    pub fn method(&self) -> Method {
-        self.method
-    }
-
-    /// The present states.
-    #[must_use]
-    pub fn state(&self) -> &[T] {
-        &self.state
-    }
-
-    /// The outputs now, with the inputs of this row.
-    pub fn read(&mut self, inputs: &[f64], outputs: &mut [T]) {
+    fn read_outputs(&mut self, inputs: &[f64], outputs: &mut [T]) {
         let Some(delays) = self.delays.take() else {
             return;
         };
@@ -257,11 +278,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         self.delays = Some(delays);
     }
 
-    /// Goes on to `until`, the inputs in straight lines from one value to the other (the same where they are held).
-    ///
-    /// # Errors
-    /// Where the simulation cannot go on.
-    pub fn advance(&mut self, from: &[f64], to: &[f64], until: f64) -> Result<(), NoSolution> {
+    fn advance_to(&mut self, from: &[f64], to: &[f64], until: f64) -> Result<(), NoSolution> {
         let Some(mut delays) = self.delays.take() else {
             return Err(NoSolution { time: until });
         };

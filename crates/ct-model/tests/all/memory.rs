@@ -1,13 +1,18 @@
 //! Plays, rounding, and states that the first row settles.
 
-use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation};
+use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation, SimulationNumber};
 
 fn model(text: &str) -> Model {
     Model::new(ModelSpec::parse(text).unwrap_or_else(|error| panic!("{error}")))
 }
 
 /// The only output at every row.
-fn run<T: Scalar>(model: &Model, parameters: &[T], u: &[f64], lines: bool) -> (Vec<T>, Method) {
+fn run<T: SimulationNumber>(
+    model: &Model,
+    parameters: &[T],
+    u: &[f64],
+    lines: bool,
+) -> (Vec<T>, Method) {
     let initial = model.starts(parameters);
     let mut simulation = Simulation::new(model, parameters, &initial, 0.0);
     let mut y = [T::constant(0.0)];
@@ -38,7 +43,7 @@ fn a_play_follows_at_a_distance() {
     // Of no width it is not there, ...
     assert_eq!(run(&play, &[0.0], &u, false).0, u);
     // ... and the derivative says on which side it is in contact.
-    let (y, _) = run(&play, &[Dual::<1>::variable(1.0, 0)], &u, false);
+    let (y, _) = run(&play, &[Dual::<2>::variable(1.0, 0)], &u, false);
     let slopes: Vec<f64> = y.iter().map(|y| y.eps[0]).collect();
     assert_eq!(slopes, [0.0, 0.0, -1.0, -1.0, -1.0, 1.0, -1.0]);
 }
@@ -109,7 +114,7 @@ end Lag;
         assert!((x - 15.0).abs() < 1e-12, "{x}");
     }
     // It moves with the parameters that it is made of.
-    let parameters = [Dual::<1>::variable(3.0, 0), Dual::constant(2.0)];
+    let parameters = [Dual::<2>::variable(3.0, 0), Dual::constant(2.0)];
     let (x, _) = run(&own, &parameters, &[5.0, 5.0], false);
     assert!((x[0].eps[0] - 5.0).abs() < 1e-12 && (x[1].eps[0] - 5.0).abs() < 1e-12);
 }

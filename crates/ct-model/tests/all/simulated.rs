@@ -322,13 +322,13 @@ fn a_delay_lets_jumps_through_when_they_are_due() {
         assert!((row[0] - expected).abs() < 1e-12, "row {k}: {}", row[0]);
     }
     // Later by d is less by d.
-    let (rows, _) = case.run(&[Dual::<1>::variable(2.5, 0)], &[Dual::constant(0.0)]);
+    let (rows, _) = case.run(&[Dual::<2>::variable(2.5, 0)], &[Dual::constant(0.0)]);
     for (k, row) in rows.iter().enumerate() {
         let expected = if k > 12 { -1.0 } else { 0.0 };
         assert!((row[0].eps[0] - expected).abs() < 1e-12, "row {k}");
     }
     // No delay at all has the same derivative.
-    let (rows, _) = case.run(&[Dual::<1>::variable(0.0, 0)], &[Dual::constant(0.0)]);
+    let (rows, _) = case.run(&[Dual::<2>::variable(0.0, 0)], &[Dual::constant(0.0)]);
     assert!((rows[20][0].re - 10.0).abs() < 1e-12 && (rows[20][0].eps[0] + 1.0).abs() < 1e-12);
 }
 

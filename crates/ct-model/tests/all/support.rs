@@ -1,6 +1,6 @@
 //! Simulations against an adaptive solver that no one here wrote, and derivatives against central differences.
 
-use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation};
+use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation, SimulationNumber};
 use ode_solvers::{DVector, Dopri5, System, dop_shared::OutputType};
 
 /// A model and what drives it: rows of inputs, held or in straight lines.
@@ -26,7 +26,11 @@ impl Case {
     }
 
     /// The outputs of all rows, and the method at the end.
-    pub fn run<T: Scalar>(&self, parameters: &[T], initial: &[T]) -> (Vec<Vec<T>>, Method) {
+    pub fn run<T: SimulationNumber>(
+        &self,
+        parameters: &[T],
+        initial: &[T],
+    ) -> (Vec<Vec<T>>, Method) {
         let mut simulation = Simulation::new(&self.model, parameters, initial, 0.0);
         let mut rows = Vec::new();
         for k in 0..self.time.len() {

@@ -1,6 +1,6 @@
 //! Simulates the records: rows of residuals and their derivatives.
 
-use ct_model::{Dual, Scalar, Simulation};
+use ct_model::{Dual, Simulation, SimulationNumber};
 use ct_signals::Hold;
 use estimation::{Prior, Residuals, Sample};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,8 +34,8 @@ impl<'a> ModelSetup<'a> {
     }
 
     /// Simulates all records with derivatives by some entries and shows the outputs row by row, in so many simulations that each of their
-    /// numbers carries at most [`Scalar::LANES`] of the derivatives.
-    fn each_instant<T: Scalar>(
+    /// numbers carries at most [`ct_model::Scalar::LANES`] derivatives.
+    fn each_instant<T: SimulationNumber>(
         &self,
         x: &[f64],
         by: &[usize],
@@ -109,7 +109,9 @@ impl<'a> ModelSetup<'a> {
             3..=4 => self.each_row_in::<Dual<4>>(x, &self.free, each),
             5..=8 => self.each_row_in::<Dual<8>>(x, &self.free, each),
             9..=12 => self.each_row_in::<Dual<12>>(x, &self.free, each),
-            _ => self.each_row_in::<Dual<8>>(x, &self.free, each),
+            13..=16 => self.each_row_in::<Dual<16>>(x, &self.free, each),
+            17..=24 => self.each_row_in::<Dual<12>>(x, &self.free, each),
+            _ => self.each_row_in::<Dual<16>>(x, &self.free, each),
         }
     }
 
@@ -123,7 +125,7 @@ impl<'a> ModelSetup<'a> {
         self.each_row_in::<f64>(x, &[], each)
     }
 
-    fn each_row_in<T: Scalar>(
+    fn each_row_in<T: SimulationNumber>(
         &self,
         x: &[f64],
         by: &[usize],

@@ -1,7 +1,7 @@
 //! The derivatives of a simulation, row by row.
 
 use estimation::{Noise, Prior, Residuals, Rows, Sample, Triangle};
-use plants::{Dual, Number, Simulator};
+use plants::{Dual, Simulator, SimulatorNumber};
 
 use super::{Setup, at_rest, commands, reference, second_command};
 use crate::feedback::Response;
@@ -96,7 +96,7 @@ impl Setup<'_> {
     }
 
     /// Shows every row with derivatives by some of the entries, in simulators that run on this kind of number.
-    fn each_row_in<T: Number>(
+    fn each_row_in<T: SimulatorNumber>(
         &self,
         x: &[f64],
         by: &[usize],

@@ -1,18 +1,18 @@
 //! A model of its user's own on the rows as they come, with exact derivatives of its outputs by the watched parameters.
 //!
-//! Simulations of `N` derivatives run side by side until every watched parameter has one. **Cost** of a row: that many simulations of the
+//! Simulations that carry a few derivatives each run side by side until every watched parameter has one. **Cost** of a row: that many simulations of the
 //! model from row to row; nothing is allocated, but for the past of what is delayed.
 
-use ct_model::{Dual, Scalar, Simulation};
+use ct_model::{Dual, Simulation, SimulationNumber};
 use ct_signals::Hold;
 
 use super::OwnModel;
 use crate::{Each, intake::Sample, sensitivity::Model as Running};
 
-struct Lanes<'a, const N: usize> {
-    simulations: Vec<Simulation<'a, Dual<N>>>,
+struct Lanes<'a, T> {
+    simulations: Vec<Simulation<'a, T>>,
     /// Of each simulation its outputs, as they were observed.
-    observed: Vec<Vec<Dual<N>>>,
+    observed: Vec<Vec<T>>,
     /// Model's time since it began, and how many of it a second has.
     time: f64,
     per_second: f64,
@@ -27,28 +27,32 @@ pub(super) fn running<'a>(
     states: &[f64],
 ) -> Box<dyn Running + 'a> {
     match theta.len() {
-        0..=4 => Box::new(in_lanes::<4>(own, theta, states)),
-        _ => Box::new(in_lanes::<8>(own, theta, states)),
+        0..=4 => Box::new(running_in::<Dual<4>>(own, theta, states)),
+        _ => Box::new(running_in::<Dual<8>>(own, theta, states)),
     }
 }
 
-fn in_lanes<'a, const N: usize>(own: &OwnModel<'a>, theta: &[f64], states: &[f64]) -> Lanes<'a, N> {
+fn running_in<'a, T: SimulationNumber>(
+    own: &OwnModel<'a>,
+    theta: &[f64],
+    states: &[f64],
+) -> Lanes<'a, T> {
     let watched = own.watched();
     let values = own.parameters_with(theta);
-    let states: Vec<Dual<N>> = states.iter().map(|x| Dual::constant(*x)).collect();
+    let states: Vec<T> = states.iter().map(|x| T::constant(*x)).collect();
     let with_derivatives = |chunk: &[usize]| {
-        let lane = |i: usize| chunk.iter().position(|own| *own == i).unwrap_or(N);
-        let parameters: Vec<Dual<N>> = values
+        let lane = |i: usize| chunk.iter().position(|own| *own == i).unwrap_or(T::LANES);
+        let parameters: Vec<T> = values
             .iter()
             .enumerate()
-            .map(|(i, value)| Dual::variable(*value, lane(i)))
+            .map(|(i, value)| T::variable(*value, lane(i)))
             .collect();
         Simulation::new(own.model, &parameters, &states, 0.0)
     };
-    let simulations: Vec<_> = watched.chunks(N).map(with_derivatives).collect();
+    let simulations: Vec<_> = watched.chunks(T::LANES).map(with_derivatives).collect();
     let outputs = own.model.spec().outputs.len();
     Lanes {
-        observed: vec![vec![Dual::constant(0.0); outputs]; simulations.len()],
+        observed: vec![vec![T::constant(0.0); outputs]; simulations.len()],
         simulations,
         time: 0.0,
         per_second: 1.0 / own.time_unit,
@@ -56,7 +60,7 @@ fn in_lanes<'a, const N: usize>(own: &OwnModel<'a>, theta: &[f64], states: &[f64
     }
 }
 
-impl<const N: usize> Running for Lanes<'_, N> {
+impl<T: SimulationNumber> Running for Lanes<'_, T> {
     fn observe(&mut self, sample: &Sample) {
         for (simulation, observed) in self.simulations.iter_mut().zip(&mut self.observed) {
             simulation.read(&sample.inputs, observed);
@@ -64,13 +68,13 @@ impl<const N: usize> Running for Lanes<'_, N> {
     }
 
     fn read(&mut self, output: usize, row: &mut [f64]) -> f64 {
-        for (lanes, observed) in row.chunks_mut(N).zip(&self.observed) {
-            for (to, derivative) in lanes.iter_mut().zip(observed[output].eps) {
-                *to = derivative;
+        for (lanes, observed) in row.chunks_mut(T::LANES).zip(&self.observed) {
+            for (to, derivative) in lanes.iter_mut().zip(observed[output].slopes()) {
+                *to = *derivative;
             }
         }
         match self.observed.first() {
-            Some(observed) if !self.failed => observed[output].re,
+            Some(observed) if !self.failed => observed[output].value(),
             _ => f64::NAN,
         }
     }
@@ -90,7 +94,7 @@ impl<const N: usize> Running for Lanes<'_, N> {
     fn states(&self) -> Each<f64> {
         let first = self.simulations.first();
         let states = first.map_or(&[][..], Simulation::state);
-        states.iter().map(|x| x.re).collect()
+        states.iter().map(|x| x.value()).collect()
     }
 
     fn stands(&self) -> f64 {

@@ -1,12 +1,12 @@
 //! A simulator from the structure of a plant, its parameters and initial states.
 
-use super::{Disturbance, Joined, Layout, Number, SecondPump, Simulator};
+use super::{Disturbance, Joined, Layout, SecondPump, Simulator, SimulatorNumber};
 use crate::actuator::Actuator;
 use crate::sensor::Sensor;
 use crate::vessels::{Valves, Vessels};
 use crate::{Error, Outlet, Place, Scalar, Structure, effects, term};
 
-impl<T: Number> Simulator<T> {
+impl<T: SimulatorNumber> Simulator<T> {
     /// `theta` in the order of [`Structure::parameters`], `initial` the level of each vessel when the record begins
     /// and, where the lags had not settled by then, an excess for each of [`Structure::lags`]; `at_rest` the command
     /// before the record began.

@@ -28,9 +28,9 @@ pub trait Compiled: Scalar {
 }
 
 /// The numbers that a [`Simulator`] runs on: `f64`, and duals with 4, 8, 12 or 16 derivatives.
-pub trait Number: Compiled {}
+pub trait SimulatorNumber: Compiled {}
 
-impl<T: Compiled> Number for T {}
+impl<T: Compiled> SimulatorNumber for T {}
 
 macro_rules! compile_for {
     ($($number:ty),*) => {$(

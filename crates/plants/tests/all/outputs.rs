@@ -1,7 +1,7 @@
 //! Plants of which several levels are read.
 
 use crate::support::{Case, DRIVES, base, effect, input, interior, mirrored};
-use plants::{Command, Dual, Known, Number, Placed, Plant, Scalar, Simulator, Structure};
+use plants::{Command, Dual, Known, Placed, Plant, Scalar, Simulator, SimulatorNumber, Structure};
 
 /// The plant with these levels read, in this order.
 fn reading(plant: Plant, measured: &[usize]) -> Case {
@@ -32,7 +32,11 @@ fn with(case: &Case, id: &str, output: usize) -> Case {
 }
 
 /// Readings of all outputs and levels of all vessels at every sample.
-fn run<T: Number>(case: &Case, variables: &[T], input: &[(Command, f64)]) -> Vec<(Vec<T>, [T; 3])> {
+fn run<T: SimulatorNumber>(
+    case: &Case,
+    variables: &[T],
+    input: &[(Command, f64)],
+) -> Vec<(Vec<T>, [T; 3])> {
     let (theta, levels) = variables.split_at(case.theta.len());
     let at_rest = [case.at_rest, mirrored(Command::held(case.at_rest)).from];
     let mut simulator = Simulator::with_inputs(&case.structure, theta, levels, at_rest).unwrap();

@@ -1,7 +1,7 @@
 //! Models of several domains that are driven by a record, on which the effects are tried.
 
 use ct_model::effects::{Candidate, EffectParameter, Role, Visited, candidates, shapes_keeping};
-use ct_model::{Method, Model, ModelSpec, Scalar, Simulation};
+use ct_model::{Method, Model, ModelSpec, Simulation, SimulationNumber};
 use std::collections::BTreeMap;
 
 pub(super) const BLOCK: &str = r#"
@@ -98,7 +98,7 @@ impl Driven {
         ]
     }
 
-    pub(super) fn run<T: Scalar>(&self, model: &Model, parameters: &[T]) -> Vec<Vec<T>> {
+    pub(super) fn run<T: SimulationNumber>(&self, model: &Model, parameters: &[T]) -> Vec<Vec<T>> {
         let initial = model.starts(parameters);
         let mut simulation = Simulation::new(model, parameters, &initial, 0.0);
         let mut rows = Vec::new();

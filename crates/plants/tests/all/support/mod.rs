@@ -4,8 +4,8 @@
 pub mod reference;
 
 use plants::{
-    CATALOGUE, Command, Dual, Known, Number, Outlet, ParameterInfo, Placed, Plant, Scalar, Scales,
-    Simulator, Structure,
+    CATALOGUE, Command, Dual, Known, Outlet, ParameterInfo, Placed, Plant, Scalar, Scales,
+    Simulator, SimulatorNumber, Structure,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -241,7 +241,7 @@ impl Case {
     }
 
     /// The output at other variables.
-    pub fn run_at<T: Number>(
+    pub fn run_at<T: SimulatorNumber>(
         &self,
         variables: &[T],
         input: &[(Command, f64)],
@@ -281,7 +281,7 @@ pub fn mirrored(command: Command) -> Command {
 }
 
 /// One reading before each command.
-pub fn simulate<T: Number>(
+pub fn simulate<T: SimulatorNumber>(
     structure: &Structure,
     theta: &[T],
     levels: &[T],

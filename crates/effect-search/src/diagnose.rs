@@ -95,11 +95,12 @@ pub fn diagnose(
     let mut slowness = 1.0;
     let many = |set: &Node| set.added.len() >= base.added.len() + options.thresholds.many_effects;
     if left.is_some() || many(&confirmed) {
-        context.limit.begin(Phase::Part);
+        context.limit.begin(Phase::Floating);
         let mut sets = by_error_sets;
         sets.extend(grown.fitted.iter().cloned());
         sets.extend([grown.best.clone(), confirmed.clone()]);
         let timeless = context.floating(&base, &sets, options.max_effects);
+        context.limit.begin(Phase::Part);
         if left.is_some() {
             // Its noise model takes physics for noise, and where that is slow the simulation drifts off in its metric: sets are compared
             // by their simulation error.

@@ -96,6 +96,8 @@ pub(crate) enum Phase {
     Coloured,
     /// What of the effects stays.
     Confirm,
+    /// Sets of effects that do not follow time, grown once more.
+    Floating,
     /// The largest part of the error that effects explain.
     Part,
     /// What can stand in for them.
@@ -109,6 +111,7 @@ impl Phase {
             Self::White => 0.4,
             Self::Coloured => 0.6,
             Self::Confirm => 0.65,
+            Self::Floating => 0.8,
             Self::Part => 0.9,
             Self::Groups => 1.0,
         }

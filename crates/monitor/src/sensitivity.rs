@@ -6,7 +6,7 @@ use plants::{Command, Dual, Scalar, Simulator, SimulatorNumber, Structure};
 use crate::{Each, intake::Sample};
 
 /// The most parameters by which derivatives are taken; further ones stay as they were learned.
-pub(crate) const MOST_LANES: usize = 16;
+pub(crate) const MOST_LANES: usize = 15;
 
 /// A simulation with derivatives by the parameters of its structure.
 pub(crate) trait Model: Send + Sync {

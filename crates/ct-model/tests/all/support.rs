@@ -66,7 +66,7 @@ impl Case {
     /// The same by differences of another share of each entry: the outputs of a stiff model are good to 1e-10, and a shorter step shows
     /// their error; through events a longer one moves one across a row.
     pub fn check_derivatives_by(&self, share: f64, tolerance: f64) {
-        const LANES: usize = 16;
+        const LANES: usize = 15;
         let parameters = self.model.parameters();
         let initial = self.model.starts(&parameters);
         let all: Vec<f64> = parameters.iter().chain(&initial).copied().collect();

@@ -6,7 +6,7 @@ use plants::{Command, Plant};
 use crate::support::{Case, DRIVES, Drive, base, input};
 
 /// Numbers that a derivative is taken by, at most.
-const LANES: usize = 16;
+const LANES: usize = 15;
 
 fn spec(plant: Plant) -> ModelSpec {
     ModelSpec::parse(plant.text()).unwrap()

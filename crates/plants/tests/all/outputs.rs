@@ -84,7 +84,7 @@ fn every_output_reads_the_level_of_its_vessel() {
 /// two lengths of the difference the better counts: one may lie across a corner of the output.
 fn disagreement(case: &Case, input: &[(Command, f64)], output: usize) -> f64 {
     let variables = case.variables();
-    let duals: Vec<Dual<16>> = variables
+    let duals: Vec<Dual<15>> = variables
         .iter()
         .enumerate()
         .map(|(lane, &value)| Dual::variable(value, lane))
@@ -93,7 +93,7 @@ fn disagreement(case: &Case, input: &[(Command, f64)], output: usize) -> f64 {
         let run = run(case, at, input);
         run.iter().map(|(readings, _)| readings[output]).collect()
     };
-    let exact: Vec<Dual<16>> = run(case, &duals, input)
+    let exact: Vec<Dual<15>> = run(case, &duals, input)
         .iter()
         .map(|(readings, _)| readings[output])
         .collect();

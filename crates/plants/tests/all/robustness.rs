@@ -16,7 +16,7 @@ fn between(lower: f64, upper: f64, share: f64) -> f64 {
 
 /// Runs a case and checks every level at every sample; how far a derivative went.
 fn run(case: &Case, input: &[(Command, f64)], substeps: usize) -> Result<f64, TestCaseError> {
-    let variables: Vec<Dual<16>> = case
+    let variables: Vec<Dual<15>> = case
         .variables()
         .iter()
         .enumerate()
@@ -172,9 +172,9 @@ fn a_level_a_little_above_a_hole_settles() {
                 // Dormand and Prince's step shrinks to nothing at a root; many short ones are as good.
                 let fine = case.run_dual(&input, (8.0 * stretch) as usize);
                 let coarse = case.run_dual(&input, 1);
-                let values = |run: &[Dual<16>]| run.iter().map(|y| y.re).collect::<Vec<_>>();
+                let values = |run: &[Dual<15>]| run.iter().map(|y| y.re).collect::<Vec<_>>();
                 let error = difference(&values(&coarse), &values(&fine));
-                let last = |run: &[Dual<16>]| run.last().unwrap().eps;
+                let last = |run: &[Dual<15>]| run.last().unwrap().eps;
                 let slopes = difference(&last(&coarse), &last(&fine));
                 println!(
                     "{largest:8.1e} {error:8.1e} {slopes:8.1e} {above} {stretch} {}",

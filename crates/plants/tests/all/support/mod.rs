@@ -259,14 +259,14 @@ impl Case {
     }
 
     /// The output with its derivatives by all variables.
-    pub fn run_dual(&self, input: &[(Command, f64)], substeps: usize) -> Vec<Dual<16>> {
-        let variables: Vec<Dual<16>> = self
+    pub fn run_dual(&self, input: &[(Command, f64)], substeps: usize) -> Vec<Dual<15>> {
+        let variables: Vec<Dual<15>> = self
             .variables()
             .iter()
             .enumerate()
             .map(|(i, &v)| Dual::variable(v, i))
             .collect();
-        assert!(variables.len() <= 16);
+        assert!(variables.len() <= 15);
         self.run_at(&variables, input, substeps)
     }
 }

@@ -9,7 +9,7 @@ pub enum Error {
     Rls(#[from] ct_rls::Error),
     /// The weights of the data are no least squares, so that constraints would bias the estimates.
     #[error(
-        "gamma is {gamma} with c = {c}, but with constraints the criterion is minimised only for gamma = c; take gamma = {c}, or with_free_gamma, which minimises nothing"
+        "gamma is {gamma} with c = {c}, but with constraints the criterion is minimised only for gamma = c; take gamma = {c}, or with_free_gamma, which minimises no criterion"
     )]
     GammaNotWeight {
         /// Gain of the Riccati equation.
@@ -19,7 +19,7 @@ pub enum Error {
     },
     /// A row's gamma is not its weight, so that the criterion would not be minimised.
     #[error(
-        "gamma of the row is {gamma} with the weight {weight}, but the criterion is minimised only for gamma = {weight}; take that, or with_free_gamma, which minimises nothing"
+        "gamma of the row is {gamma} with the weight {weight}, but the criterion is minimised only for gamma = {weight}; take that, or with_free_gamma, which minimises no criterion"
     )]
     RowGammaNotWeight {
         /// The row's entry of Gamma.
@@ -39,7 +39,7 @@ pub enum Error {
     },
     /// An inequality row with a gamma.
     #[error(
-        "gamma of an inequality row is {gamma}, but must be 0: with another the Lyapunov function can grow, and dQ/dt jumps at every crossing"
+        "gamma of an inequality row is {gamma}, but must be 0: with another the Lyapunov function can grow, and dQ/dt is discontinuous at every crossing"
     )]
     PenaltyGamma {
         /// The value that was given.
@@ -103,7 +103,7 @@ pub enum Error {
     },
     /// The projection found no point that obeys all rows.
     #[error(
-        "no estimate obeys all rows: row {row} is violated by {violation} where the others are obeyed; drop a row that contradicts the others, or one of two that are nearly parallel"
+        "no estimate satisfies all rows: row {row} is violated by {violation} where the others are satisfied; drop a row that contradicts the others, or one of two that are nearly parallel"
     )]
     NoCommonPoint {
         /// The row, from 0; of a box, the parameter.

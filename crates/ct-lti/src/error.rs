@@ -23,7 +23,7 @@ pub enum Error {
     },
     /// A transfer function that differentiates.
     #[error(
-        "the numerator has degree {numerator}, above the denominator's {denominator}: no hold can sample that; add poles"
+        "the numerator has degree {numerator}, above the denominator's {denominator}: such a transfer function cannot be sampled; add poles"
     )]
     Improper {
         /// Degree of the numerator.
@@ -33,7 +33,7 @@ pub enum Error {
     },
     /// A loop whose direct terms cancel the output's own coefficient.
     #[error(
-        "the loop has no solution at infinite frequency: 1 + d1*d2 is {determinant}, with direct terms {forward} and {backward}; take the direct term out of one of the two"
+        "the loop has no solution at infinite frequency: 1 + d1*d2 is {determinant}, with direct terms {forward} and {backward}; remove the direct term of one of the two systems"
     )]
     AlgebraicLoop {
         /// Direct term of the forward path.
@@ -98,7 +98,7 @@ pub enum Error {
         im: f64,
     },
     /// Numbers too large for what was asked of them.
-    #[error("{what} leaves the range of f64 (largest finite number 1.8e308); {mend}")]
+    #[error("{what} overflows f64 (largest finite number 1.8e308); {mend}")]
     Overflow {
         /// What was being computed.
         what: &'static str,

@@ -44,7 +44,7 @@ impl Polynomial {
         crate::error::finite("a polynomial", self.coefficients())?;
         if self.is_zero() {
             return Err(Error::ZeroPolynomial {
-                what: "the polynomial whose roots are asked for",
+                what: "the polynomial whose roots are wanted",
             });
         }
         let zeros = self

@@ -214,7 +214,7 @@ impl StateSpace {
             functions.phi12(&self.b, &mut phi1, &mut phi2);
             let y = t * dot(&self.c, &phi1) + self.d;
             let what = "a step response";
-            let mend = "the system is unstable: ask for earlier times";
+            let mend = "the system is unstable: choose earlier times";
             if y.is_finite() {
                 Ok(y)
             } else {

@@ -80,7 +80,7 @@ pub enum Outcome {
     Capped,
     /// The regressor is silent: nothing was forgotten.
     Silent,
-    /// A signal is not finite, or beyond any sense: a regressor above 1e30, an output error above 1e100; or a step of
+    /// A signal is not finite, or beyond any sense: the regressor is above 1e30, an output error above 1e100; or a step of
     /// any rule but [`ExactHold`](crate::ExactHold) would, or might, lead beyond the floating-point range. Nothing was done.
     NotFinite,
     /// `dt` is not above 0 and at most 1e30 s, or `eta dt` is above 300: nothing was done.
@@ -101,13 +101,13 @@ impl Outcome {
         match self {
             Self::Updated | Self::Capped | Self::Silent => "it was used",
             Self::NotFinite => {
-                "a signal is NaN, infinite or beyond any sense (a regressor above 1e30, an output error above 1e100); leave it out"
+                "a signal is NaN, infinite or too large (the regressor is above 1e30, an output error above 1e100); leave it out"
             }
             Self::BadStep => {
                 "its step must be above 0 and at most 1e30 s, with eta dt at most 300; check the clock"
             }
             Self::BadSize => "its regressor needs one entry for each parameter",
-            Self::Stopped => "the run has stopped before; health() says why",
+            Self::Stopped => "the estimator has stopped before; health() gives the reason",
         }
     }
 }

@@ -189,7 +189,7 @@ pub(crate) fn acceptance_rows(test: &Acceptance, unit: &str) -> Vec<AcceptanceRo
         "Squared error above the floor that is explained, fitted data",
         share(test.share),
         format!(
-            "{} where more than noise remains; {} for a partial answer",
+            "{} where the residual is not noise; {} for a partial explanation",
             percent(test.required),
             percent(test.required_partial)
         ),
@@ -207,7 +207,7 @@ pub(crate) fn acceptance_rows(test: &Acceptance, unit: &str) -> Vec<AcceptanceRo
         format!("more than {}", numbers::whole(test.required_bic_fall)),
     ));
     rows.push((
-        "Floor: noise that counts as no error",
+        "Noise floor: error of this size is attributed to noise",
         per_output(&test.floor, 2, unit),
         String::new(),
     ));
@@ -217,7 +217,7 @@ pub(crate) fn acceptance_rows(test: &Acceptance, unit: &str) -> Vec<AcceptanceRo
 /// What the acceptance test was made of.
 pub(crate) fn acceptance_title(diagnosis: &Diagnosis, test: &Acceptance) -> String {
     if test.effects.is_empty() {
-        return "Acceptance test: no candidate lowers the error".to_string();
+        return "Acceptance test: no candidate effect lowers the error".to_string();
     }
     let names = test.effects.join(" + ");
     if diagnosis.effects.is_empty() {
@@ -318,8 +318,8 @@ pub(crate) fn held_out_error(error: &HeldOutError, unit: &str) -> String {
 }
 
 /// What the parts of the error on held-out data mean.
-pub(crate) const HELD_OUT_PARTS: &str = "Held-out error: its offset is the mean of measured minus model, its gain what a factor on the model's deviations from \
-     its mean would remove, its shape the rest; root mean squares.";
+pub(crate) const HELD_OUT_PARTS: &str = "Held-out error: its offset is the mean of measured minus model, its gain the part that a factor on the model's deviations \
+     from its mean would remove, its shape the rest; root mean squares.";
 
 /// Where the reader can ask for more time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -154,7 +154,7 @@ mod tests {
             colour: false,
             width: 20,
         };
-        let text = look.paragraph("  - ", "the level stands still at the rim");
+        let text = look.paragraph("  - ", "the level stays constant at the rim");
         assert_eq!(text, "  - the level stands\n    still at the rim\n");
     }
 

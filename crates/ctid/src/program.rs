@@ -45,7 +45,7 @@ fn start_threads() -> Result<(), String> {
         held_back.add(Signal::SIGXFSZ);
         held_back
             .thread_block()
-            .map_err(|error| format!("a signal cannot be held back: {error}"))?;
+            .map_err(|error| format!("a signal handler cannot be installed: {error}"))?;
     }
     rayon::ThreadPoolBuilder::new().build_global().map_err(|error| {
         format!(

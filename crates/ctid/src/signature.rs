@@ -32,7 +32,7 @@ pub(crate) fn picture(effect: &'static EffectInfo, look: Look) -> Option<String>
     };
     let mut text = look.paragraph(
         "  ",
-        "The trace that it leaves. A tank with the effect, without noise, under steps of the command; its reading [cm]:",
+        "Its signature. A tank with the effect, without noise, under steps of the command; its reading [cm]:",
     );
     text += &draw(&measured, MEASURED, 4);
     text += "  Measured minus a fitted model without the effect [cm]:\n";

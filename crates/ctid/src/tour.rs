@@ -89,8 +89,8 @@ fn step(number: usize, title: &str, text: &str, look: Look) -> String {
 
 fn introduction(look: Look) -> String {
     let text = "A pump fills a tank, and the water leaves through a hole in the bottom. Half an hour was \
-                recorded: the voltage of the pump and the level. Somebody wrote down what they believe \
-                about the tank; one thing about it they do not know, and ctid is not told either.";
+                recorded: the voltage of the pump and the level. The model file states what is known about the tank. One effect is \
+                missing in it, and ctid does not know which.";
     let mut said = format!(
         "{}\n{}\n",
         look.heading("ctid: what is your model missing?"),
@@ -115,8 +115,8 @@ fn compare(diagnosis: &Diagnosis, look: Look) -> String {
 }
 
 fn where_it_fails(diagnosis: &Diagnosis, look: Look) -> String {
-    let text = "A single number does not say what is wrong. So the residual is looked at by time, by level, \
-                by flow, by direction of change and by frequency, and tested for traces of the input.";
+    let text = "A single number does not show what is wrong. So the residual is divided by time, level, flow, \
+                direction of change and frequency, and tested for dependence on the input.";
     let mut said = step(2, "See where it fails", text, look);
     for first in &diagnosis.steps {
         said += &terminal::failures(diagnosis, first, look);
@@ -126,7 +126,7 @@ fn where_it_fails(diagnosis: &Diagnosis, look: Look) -> String {
 
 fn what_is_missing(diagnosis: &Diagnosis, look: Look) -> String {
     let text = "Every effect of the catalogue is tried at every place where it can act, alone and together, \
-                and confirmed by a refit. `visible from` is the smallest size that these data would have shown.";
+                and confirmed by a refit. `visible from` is the smallest size that these data would have shown (minimum detectable size).";
     step(3, "Learn what is missing", text, look)
         + &terminal::ranking(diagnosis, look)
         + &terminal::groups(diagnosis, look)
@@ -156,8 +156,8 @@ fn add(diagnosis: &Diagnosis, look: Look) -> Result<String, Error> {
 fn watch(diagnosis: &Diagnosis, look: Look) -> String {
     let text = match diagnosis.verdict {
         Verdict::Effect | Verdict::Undecided | Verdict::Partial => {
-            "The same simulation, with the effect in the model. What is left is noise when the bars meet the \
-             noise floor and the residual has no shape."
+            "The same simulation, with the effect in the model. The residual is noise when the bars reach the noise \
+             floor and the residual has no pattern."
         }
         Verdict::Unexplained | Verdict::Adequate => "The error, from step to step.",
     };

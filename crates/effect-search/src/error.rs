@@ -39,7 +39,7 @@ pub enum Error {
     },
     /// An effect of the model file beside which the model cannot be simulated.
     #[error(
-        "with {id} no start of its parameters gives a simulation: start them nearer under [effect.\"{id}\"], or remove it"
+        "with {id} the simulation fails from every start of its parameters: give better start values under [effect.\"{id}\"], or remove it"
     )]
     NoStart {
         /// Its identifier.

@@ -53,7 +53,7 @@ pub enum Error {
     },
     /// A sensor's filter without a loop around it.
     #[error(
-        "a sensor filter of {zeta} belongs to a loop, but there is no controller; filter u alike and leave it out here"
+        "a sensor filter of {zeta} belongs to a loop, but there is no controller; apply the same filter to u and leave it out here"
     )]
     FilterWithoutLoop {
         /// Its bandwidth \[1/time\].
@@ -84,7 +84,7 @@ pub enum Error {
     /// A record of a loop without its reference.
     #[error(
         "{record}: there is no reference r, which drives the model in closed loop; give it, or fit in open loop from u, \
-         which coloured noise in the loop biases"
+         in open loop, coloured noise fed back by the controller biases the estimates"
     )]
     MissingReference {
         /// The record's name.
@@ -232,7 +232,7 @@ pub enum Error {
     },
     /// Parameters that the data do not tell apart.
     #[error(
-        "{samples} samples do not determine {parameters} parameters: a combination of them leaves the output as it is; lower the orders, or excite the loop more"
+        "{samples} samples do not determine {parameters} parameters: the output does not depend on some combination of them; lower the orders, or excite the loop more"
     )]
     NotDetermined {
         /// Parameters, estimated levels included.

@@ -63,7 +63,7 @@ pub enum Error {
         high: f64,
     },
     /// The method has come to no model that can be simulated.
-    #[error("{record}: no model of order {order} came of it: {why}; try {}another method", or_lower(*.order))]
+    #[error("{record}: no model of order {order} was found: {why}; try {}another method", or_lower(*.order))]
     NoModel {
         /// Name of the record.
         record: String,
@@ -74,7 +74,7 @@ pub enum Error {
     },
     /// The information of the record is singular.
     #[error(
-        "the record does not tell the parameters of order {order} apart; try {}a record with more movement in its input",
+        "the record does not determine the parameters of order {order}; try {}a record with more movement in its input",
         or_lower(*.order)
     )]
     Untold {
@@ -123,7 +123,7 @@ pub enum Error {
     },
     /// The fit ended where the loop would become unstable.
     #[error(
-        "{record}: the fit ended where the loop would become unstable: the record asks for a plant that this controller does not stabilise; check the controller's sign and units, or the orders"
+        "{record}: the fit ended where the loop would become unstable: the best fit is a plant that this controller does not stabilise; check the controller's sign and units, or the orders"
     )]
     StabilityBorder {
         /// Name of the record.

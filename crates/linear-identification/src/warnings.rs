@@ -79,8 +79,8 @@ pub(crate) fn too_fast(time_constants: &[f64], record: &Record, order: Order) ->
     let fastest = time_constants.last().filter(|fastest| **fastest < step)?;
     let mend = lower_or_faster(order);
     Some(format!(
-        "the fastest time constant, {fastest:.2} s, is below the longest step of {step} s: it cannot be known from these samples, and the output's way between them biases the estimates \
-         by more than the standard errors say; {mend}"
+        "the fastest time constant, {fastest:.2} s, is below the longest step of {step} s: it cannot be known from these samples, and the unknown output between the samples biases the \
+         estimates by more than the standard errors show; {mend}"
     ))
 }
 

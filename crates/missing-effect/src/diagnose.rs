@@ -36,7 +36,7 @@ use crate::{
 };
 
 /// Shares of the time limit after which the phases end: further starts of the believed model, the search of sets, then all that follows
-/// but the report, the fits of the report, and the shape of what is not explained. What each has begun it brings to its end.
+/// but the report, the fits of the report, and the shape of the unexplained error. What each has begun it brings to its end.
 pub(crate) const FITTED: f64 = 0.2;
 const SEARCHED: f64 = 0.65;
 const CONFIRMED: f64 = 0.82;

@@ -180,7 +180,7 @@ fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain, axis: &Tim
             format!("; it shows most at the {}", domain.sensor_words(output))
         });
         format!(
-            "The model does not fit since about {} or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
+            "The model has not fitted since about {} or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
             axis.at(raised),
             alarm.score,
             alarm.threshold
@@ -204,7 +204,7 @@ pub(crate) fn consistent(alarm: &Alarm, place: &str, axis: &TimeAxis) -> Option<
     });
     let group = match &alarm.effects[..] {
         [_, others @ ..] if !others.is_empty() => {
-            format!("; not to be told yet from {}", others.join(", "))
+            format!("; not yet distinguishable from {}", others.join(", "))
         }
         _ => String::new(),
     };

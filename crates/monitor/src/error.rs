@@ -9,7 +9,7 @@ pub enum Error {
     Structure(#[from] plants::Error),
     /// An effect that follows the time since a record began.
     #[error(
-        "{effect} follows the time since a record began, and what is watched has no beginning: remove it, the monitor looks for it by itself"
+        "{effect} follows the time since a record began, and a monitored plant has no start time: remove it, the monitor looks for it by itself"
     )]
     ByClock {
         /// The effect.
@@ -30,7 +30,7 @@ pub enum Error {
     Disturbance,
     /// A model of its user's own that follows the time itself.
     #[error(
-        "the model uses `time`, and what is watched has no beginning: give what follows the clock as an input"
+        "the model uses `time`, and a monitored plant has no start time: give what follows the clock as an input"
     )]
     Time,
     /// A model of its user's own without parameters that are fitted.
@@ -60,14 +60,14 @@ pub enum Error {
     },
     /// A state of another model.
     #[error(
-        "the state belongs to another model: {differences}; name another state file, or delete it to begin anew"
+        "the state belongs to another model: {differences}; name another state file, or delete it to start again"
     )]
     OtherModel {
         /// What differs, in the words of the model file.
         differences: String,
     },
     /// A state whose numbers do not go together.
-    #[error("the state is damaged: {what}; delete it to begin anew")]
+    #[error("the state is damaged: {what}; delete it to start again")]
     Damaged {
         /// What does not go together.
         what: String,

@@ -20,7 +20,8 @@ pub(crate) const READ: f64 = 0.5;
 /// Fits in turn with what is expected of lost readings: each leaves of the error of the one before the share of the information that is lost.
 const ROUNDS: usize = 2;
 
-const NO_NOISE: &str = "the model leaves no noise to judge by: are the readings measured?";
+const NO_NOISE: &str =
+    "the residual is zero, so no threshold can be set: are the readings measured?";
 
 /// More of either was never learned: a state that says so would be computed for ever.
 const MOST_SUBSTEPS: usize = 1024;
@@ -120,7 +121,7 @@ pub(crate) fn learn(
     let (low, high) = record.input_range();
     if stands_still(low, high) {
         return Err(format!(
-            "the command has stood still at {low}, which says nothing about the plant: move it"
+            "the command has stood still at {low}, which does not excite the plant: move it"
         ));
     }
     let mut starts = random_starts(&setup, options.starts, options.seed);
@@ -243,7 +244,7 @@ pub(crate) fn output_noise(
     }
     // Of several outputs each has fewer parameters to itself: the limit is a little wide.
     let scatter = Limit::learned(&innovations, parameters)
-        .ok_or("the model leaves no noise to judge by: do the readings move?")?;
+        .ok_or("the residual is zero, so no threshold can be set: do the readings move?")?;
     Ok(OutputNoise {
         coefficients: noise.coefficients().to_vec(),
         sigma,

@@ -264,7 +264,7 @@ impl ScatterAlarm {
             Moved::Grown(ratio) => {
                 let now = ratio * noise;
                 let sentence = format!(
-                    "The scatter of the readings{of} has grown from {} to {}, without a structure that an effect of the plant has: look at the sensor and its cable.",
+                    "The noise of the readings{of} has grown from {} to {}, without the signature of an effect of the plant: look at the sensor and its cable.",
                     written(noise),
                     written(now)
                 );
@@ -274,7 +274,7 @@ impl ScatterAlarm {
                 ScatterEvent::ScatterBack,
                 noise,
                 format!(
-                    "The scatter of the readings{of} is back at {}.",
+                    "The noise of the readings{of} is back at {}.",
                     written(noise)
                 ),
             ),

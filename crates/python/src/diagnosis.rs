@@ -130,7 +130,7 @@ impl Diagnosis {
     /// The experiment that tells two effects apart best; what `ctid design --json` writes, without its mark, and the unit of the model's time
     /// \[s\].
     #[pyo3(signature = (between, *, ranges, slews, inputs, duration, seed, effort, time_limit, progress=None))]
-    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    #[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
     fn design(
         &self,
         py: Python<'_>,

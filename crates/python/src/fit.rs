@@ -270,7 +270,7 @@ impl Fit {
 
     /// What the model is missing.
     #[pyo3(signature = (test, *, effort, time_limit, max_effects, seed, progress=None))]
-    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    #[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
     fn diagnose(
         &self,
         py: Python<'_>,

@@ -96,7 +96,7 @@ impl StabilizedOe {
     #[pyo3(signature = (
         order, theta0, forgetting, bandwidth, *, P0=1e3, P0_filter=1.0, filter0=None, hold="zero", offset=false
     ))]
-    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    #[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
     #[allow(non_snake_case, reason = "it is the name of the matrix")]
     fn new(
         order: (usize, usize),
@@ -238,7 +238,7 @@ fn offsets(levels: &str) -> PyResult<Offsets> {
 /// Closed-loop output error over a whole record, sampled evenly: the plant in the loop of a known controller, or without one in open loop.
 #[pyfunction]
 #[pyo3(signature = (dt, r, u, y, *, order, controller, levels, theta0, level))]
-#[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+#[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub fn fcloe_fit<'py>(
     py: Python<'py>,
     dt: f64,

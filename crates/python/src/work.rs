@@ -79,7 +79,7 @@ pub fn run<T: Send>(
             match (ended, found) {
                 (Ok(()), Some(found)) => found.map_err(|error| error::of(&error)),
                 _ => Err(error::Error::new_err(
-                    "ctid has failed where it should not: please report the line above",
+                    "this is an internal error of ctid: please report the line above",
                 )),
             }
         })

@@ -142,7 +142,7 @@ pub enum Error {
     },
     /// A delay beside a direct term.
     #[error(
-        "the delay of input {input} cannot be estimated with m = n = {n}: the output would jump with it; choose m of at most {most}"
+        "the delay of input {input} cannot be estimated with m = n = {n}: the output would be discontinuous in the delay; choose m of at most {most}"
     )]
     DelayOfDirectTerm {
         /// Which input, from 1.

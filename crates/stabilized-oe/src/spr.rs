@@ -23,7 +23,7 @@ use crate::{Derivatives, Error, Gain, StabilizedOe};
 
 /// What the check of bounds on `c^` found. [`Display`](core::fmt::Display) says it in a sentence, which is the warning where it fails.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[must_use = "bounds that are no such set ensure nothing: print this, or look at hold()"]
+#[must_use = "bounds outside such a set guarantee nothing: print this result, or look at hold()"]
 pub enum FilterBounds<const N: usize> {
     /// `C^/A0 - d` is strictly positive real for every `c` and every plausible plant.
     PositiveReal,
@@ -71,12 +71,12 @@ impl<const N: usize> core::fmt::Display for FilterBounds<N> {
                 above,
             } => write!(
                 f,
-                "the bounds on c do not ensure convergence: with c = {c:?} and a plant a = {a:?}, Re C/A0 is {:.3} at {frequency:.3e} rad/s, not above {above}; narrow the bounds on c, or what is plausible",
+                "the bounds on c do not guarantee convergence: with c = {c:?} and a plant a = {a:?}, Re C/A0 is {:.3} at {frequency:.3e} rad/s, not above {above}; narrow the bounds on c, or the plausible plants",
                 excess + above
             ),
             Self::PlantUnstable { a } => write!(
                 f,
-                "the bounds on c ensure nothing: the plausible plant a = {a:?} is unstable; narrow what is plausible"
+                "the bounds on c guarantee nothing: the plausible plant a = {a:?} is unstable; narrow the plausible plants"
             ),
         }
     }

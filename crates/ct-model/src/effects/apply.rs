@@ -19,8 +19,8 @@ pub enum ApplyError {
         /// The effect.
         id: String,
     },
-    /// Flows would depend on each other in a circle.
-    #[error("with {effects} these depend on each other in a circle: {}", names.join(" -> "))]
+    /// Flows would form an algebraic loop.
+    #[error("with {effects} these form an algebraic loop: {}", names.join(" -> "))]
     Circle {
         /// The effects.
         effects: String,
@@ -28,7 +28,7 @@ pub enum ApplyError {
         names: Vec<String>,
     },
     /// A candidate belongs to another model.
-    #[error("{id} is of another model: list the candidates of this one")]
+    #[error("{id} belongs to another model: use the candidates of this model")]
     OtherModel {
         /// The effect.
         id: String,

@@ -134,7 +134,7 @@ pub fn own_candidate(
             return Err(error(&[kind, key], what));
         }
         if is_reserved(key) {
-            let what = format!("`{key}` has a meaning of its own: choose another name");
+            let what = format!("`{key}` is a reserved word: choose another name");
             return Err(error(&[kind, key], what));
         }
         Ok(())
@@ -238,7 +238,8 @@ pub fn own_candidate(
         sizes[i] && (about.min > 0.0 || about.max < 0.0)
     }) {
         let key = &scope.parameters[counts.parameters + i].about.name;
-        let what = "at zero the effect is not there, but its bounds leave zero out: widen them";
+        let what =
+            "its bounds exclude zero, but the value zero has to switch the effect off: widen them";
         return Err(error(&["parameters", key], what.to_string()));
     }
     let mut parameters = scope.parameters[counts.parameters..].to_vec();

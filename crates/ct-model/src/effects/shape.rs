@@ -91,9 +91,9 @@ const OF_EQUATION: Effect = Effect {
     place: Place::BalanceAndSignal,
     text: of_signal!("  input Real x;\n", "x", "balance", "20*balance", "", ""),
     parameters: &heights::<7>(OF_BALANCE),
-    physics: "A term of this equation that depends on the signal in some smooth way.",
+    physics: "A term of this equation that is a smooth function of the signal.",
     confused_with: &["loss(x)", "varies_with(p,x)"],
-    confirm: "Look at its shape, and write the physics that has it as a candidate of your own.",
+    confirm: "Look at the shape of the function, and write the physical law with this shape as a candidate in the model file.",
     symptoms: &["nobody knows what it is"],
 };
 
@@ -101,7 +101,7 @@ const OF_INPUT: Effect = Effect {
     place: Place::Input,
     text: of_signal!("  input Real u;\n", "u", "port", "3*width", "u + ", ""),
     parameters: &heights::<7>(OF_WIDTH),
-    physics: "What the actuator gives is another function of the command.",
+    physics: "The output of the actuator is another function of the command than the model's.",
     ..OF_EQUATION
 };
 
@@ -110,9 +110,9 @@ const EQUATION_IN_TIME: Effect = Effect {
     place: Place::Balance,
     text: of_time!("  input Real x;\n", "balance", "20*balance", "", ""),
     parameters: &heights::<12>(OF_BALANCE),
-    physics: "A disturbance of this balance that follows time in some smooth way.",
+    physics: "A disturbance of this balance that is a smooth function of time.",
     confused_with: &["periodic(x)", "step(x)", "constant(x)"],
-    confirm: "Hold its course against the log of the plant: what happened when it changes?",
+    confirm: "Compare the estimated disturbance with the log of the plant: what happened when it changed?",
     symptoms: &["nobody knows what it is"],
 };
 
@@ -120,7 +120,7 @@ const INPUT_IN_TIME: Effect = Effect {
     place: Place::Input,
     text: of_time!("  input Real u;\n", "port", "3*width", "u + ", ""),
     parameters: &heights::<12>(OF_WIDTH),
-    physics: "What acts is the input and a disturbance that follows time.",
+    physics: "A disturbance that is a function of time adds to the input.",
     ..EQUATION_IN_TIME
 };
 
@@ -130,7 +130,7 @@ pub(super) const EFFECTS: [Effect; 8] = [
     OF_INPUT,
     Effect {
         place: Place::Output,
-        physics: "What the sensor gives is another function of what it measures.",
+        physics: "The reading is another function of the measured quantity than the model's.",
         ..OF_INPUT
     },
     Effect {
@@ -144,21 +144,21 @@ pub(super) const EFFECTS: [Effect; 8] = [
             ")"
         ),
         parameters: &heights::<7>(RELATIVE),
-        physics: "It is no constant, but some smooth function of the signal.",
+        physics: "The parameter is not constant, but a smooth function of the signal.",
         ..OF_EQUATION
     },
     EQUATION_IN_TIME,
     INPUT_IN_TIME,
     Effect {
         place: Place::Output,
-        physics: "The reading is off by an error that follows time.",
+        physics: "The reading has an error that is a function of time.",
         ..INPUT_IN_TIME
     },
     Effect {
         place: Place::Parameter,
         text: of_time!("  input Real p;\n", "1", "3", "p*(1 + ", ")"),
         parameters: &heights::<12>(RELATIVE),
-        physics: "It changes over time in some smooth way.",
+        physics: "The parameter is a smooth function of time.",
         ..EQUATION_IN_TIME
     },
 ];

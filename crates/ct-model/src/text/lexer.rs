@@ -104,7 +104,7 @@ fn refused_character(rest: &str) -> String {
         '\'' => "names in quotes are outside the subset: use letters, digits and `_`",
         '!' | '&' | '|' => "write `not`, `and`, `or`, `<>`",
         _ => {
-            "delete it; names have letters, digits and `_`, other characters may stand in descriptions and comments"
+            "delete it; names have letters, digits and `_`, other characters are allowed in descriptions and comments"
         }
     };
     format!(

@@ -121,10 +121,7 @@ impl Names {
             let name = declaration.name.as_str();
             let at = |what: String| TextError::at(text, declaration.from, what);
             if is_reserved(name) {
-                let what = format!(
-                    "{} has a meaning of its own: choose another name",
-                    shown(name)
-                );
+                let what = format!("{} is a reserved word: choose another name", shown(name));
                 return Err(at(what));
             }
             let of_fitted = || {

@@ -152,7 +152,7 @@ impl Parser<'_> {
         }
         if self.is_sign("[") || self.is_sign("{") {
             return self.error(format!(
-                "{found}: arrays are outside the subset; give each element a name of its own"
+                "{found}: arrays are outside the subset; declare each element as a separate variable"
             ));
         }
         if self.is_sign(":=") {

@@ -280,7 +280,7 @@ impl Builder<'_> {
             let Kind::Name(name) = &left.kind else {
                 return self.error(
                     left.from,
-                    "on the left stands one variable, or `der(x)`, or `c*der(x)`: solve the equation for it",
+                    "the left side must be one variable, or `der(x)`, or `c*der(x)`: solve the equation for it",
                 );
             };
             match self.names.all.get(name) {
@@ -347,7 +347,7 @@ impl Builder<'_> {
                     .collect();
                 names.push(names[0]);
                 let what = format!(
-                    "{} depend on each other in a circle: make one of them a state, or solve the equations for it",
+                    "{} form an algebraic loop: make one of them a state, or solve the equations for it",
                     names.join(" -> ")
                 );
                 self.error(froms[circle[0]], what)

@@ -206,7 +206,7 @@ fn what_is_wrong_is_said_with_its_place() {
     store.states.insert("Tw".to_string(), state);
     refused(
         &store,
-        "radiation.states.Tw.equation: 1:1: on the left of this equation stands `der(Tw)`",
+        "radiation.states.Tw.equation: 1:1: the left side of this equation must be `der(Tw)`",
     );
     let error = own_candidate(&block(), "lag(u)", &own(&e, &[("T", "-e*T")])).unwrap_err();
     assert!(error.to_string().contains("letters, digits"), "{error}");

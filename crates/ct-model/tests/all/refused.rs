@@ -124,7 +124,7 @@ fn definitions() {
     );
     refuses_text(
         "model M\n input Real u;\n output Real y;\nequation\n y + u = 1;\nend M;",
-        "5:2: on the left stands one variable",
+        "5:2: the left side must be one variable",
         "solve the equation for it",
     );
     refuses_text(

@@ -231,7 +231,7 @@ impl Identify {
             );
         }
         if self.memory.is_some() && methods.iter().all(|method| weighs_all_alike(*method)) {
-            return refuse("--memory", "which weighs the whole record alike");
+            return refuse("--memory", "which gives all samples the same weight");
         }
         Ok(())
     }
@@ -262,7 +262,7 @@ impl Identify {
         }
         if let Some(zeta) = self.sensor_filter.filter(|_| of_loop) {
             let Some(controller) = request.controller else {
-                return wrong("--sensor-filter is of a loop: give --model with a [controller], and a method that uses it".to_owned());
+                return wrong("--sensor-filter is of a loop: give --model with a [controller], and choose a method that uses the controller".to_owned());
             };
             request.controller = Some(controller.with_sensor_filter(zeta)?);
         }

@@ -221,9 +221,11 @@ pub(crate) fn finish(
         };
         text += &look.faint(match (written, output.kind()) {
             (true, _) => format!("wrote {path}"),
-            (false, Kind::Record) => format!("{path} is not written: nothing is worth applying"),
+            (false, Kind::Record) => {
+                format!("{path} is not written: no experiment is worth applying")
+            }
             (false, _) => {
-                format!("{path} is not written: nothing is left unexplained that has a shape")
+                format!("{path} is not written: the residual shows no function of a variable")
             }
         });
         text.push('\n');

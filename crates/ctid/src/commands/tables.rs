@@ -59,8 +59,7 @@ const RUNS_BAYSSE: usize = 100;
 impl Tables {
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         if self.record.is_some() && !matches!(self.paper, Paper::Baysse) {
-            let what =
-                "--record is of the rig that `ctid tables baysse` emulates; no other paper has one";
+            let what = "--record belongs to the rig that `ctid tables baysse` emulates; no other paper has one";
             return Err(Error::Usage(what.to_owned()));
         }
         if self.results.report.is_some() && matches!(self.paper, Paper::All) {

@@ -9,7 +9,7 @@ use crate::numbers;
 /// How many experiments the table shows.
 pub(crate) const SHOWN: usize = 10;
 /// What the columns of the table mean.
-pub(crate) const NOTE: &str = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; of those with power in plenty the first stays nearest to what the records visited)";
+pub(crate) const NOTE: &str = "(power: the expected rise of the criterion of the wrong model; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; among experiments with ample power the first stays closest to the range of the records)";
 
 fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
@@ -28,11 +28,11 @@ pub fn design(design: &Design, look: Look) -> String {
     alternatives(design, look) + &experiments(design, look) + &findings(design, look)
 }
 
-/// The two effects on the records that there are.
+/// The two effects on the existing records.
 fn alternatives(design: &Design, look: Look) -> String {
     let [a, b] = &design.between;
     let title = format!(
-        "{} or {}, on the records that there are, weighted by their noise",
+        "{} or {}, on the existing records, weighted by their noise",
         named(a),
         named(b)
     );

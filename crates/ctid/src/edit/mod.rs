@@ -27,13 +27,15 @@ use crate::{Error, atomic, names};
 /// then as it was.
 pub fn add(path: &Path, effect: &str, place: Option<&str>) -> Result<String, Error> {
     let name = path.display().to_string();
-    change(path, |text| match (own::is_own(text), place) {
+    change(path, |text| {
+        match (own::is_own(text), place) {
         (false, _) => with_effect(&name, text, effect, place),
         (true, None) => own::with_effect(path, text, effect, None, &own::beside(path)),
         (true, Some(_)) => Err(Error::Usage(
-            "--where is of the plants: at a model of your own the effect names its port, as lag(u)"
+            "--where is for the built-in plants only: for your own model the effect names its port, as lag(u)"
                 .to_string(),
         )),
+    }
     })
 }
 
@@ -111,7 +113,7 @@ pub(crate) fn change(
     }
     Err(changed(
         &path.display().to_string(),
-        "something else writes into it all the time",
+        "another program keeps writing to it",
     ))
 }
 
@@ -140,7 +142,7 @@ fn still(path: &Path, text: &str) -> bool {
 pub(crate) fn changed(file: &str, what: &str) -> Error {
     Error::Changed {
         file: file.to_string(),
-        what: format!("{what}; nothing was written; look at what stands there now and try again"),
+        what: format!("{what}; nothing was written; check the present content and try again"),
     }
 }
 
@@ -165,7 +167,7 @@ pub fn with_effect(
     let effect = names::effect(effect)?;
     if model.effects.iter().any(|on| on.effect.id == effect.id) {
         return Err(refuse(format!(
-            "{} is on already; `ctid remove {0}` takes it out",
+            "{} is in the model already; `ctid remove {0}` takes it out",
             effect.id
         )));
     }
@@ -269,7 +271,7 @@ pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Er
         return Err(Error::File {
             file: file.to_string(),
             what: format!(
-                "{} is not on, so it cannot be removed; effects = {}",
+                "{} is not in the model, so it cannot be removed; effects = {}",
                 id,
                 list(&model)
             ),
@@ -278,7 +280,7 @@ pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Er
     let text = document.to_string();
     let model = model_file::parse(file, &text)?;
     let kept = match document.get(kind).and_then(|table| table.get(id)) {
-        Some(_) => format!("; [{kind}.{id}] stays for the day it is added again"),
+        Some(_) => format!("; [{kind}.{id}] is kept in the file for when it is added again"),
         None => String::new(),
     };
     let done = format!("{file}: removed {}; effects = {}{kept}", id, list(&model));

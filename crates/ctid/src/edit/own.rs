@@ -97,7 +97,7 @@ impl Findings {
         let Some(numbers) = self.record_numbers.get(id) else {
             let known: Vec<&str> = self.record_numbers.keys().map(String::as_str).collect();
             return Err(format!(
-                "the result says nothing of {id}: it has {}; without --from the effect is fitted anew",
+                "the result does not contain {id}: it has {}; without --from the effect is fitted anew",
                 known.join(", ")
             ));
         };
@@ -172,7 +172,7 @@ pub(crate) fn with_effect(
     let is_on = model.effects.on.contains(id);
     if is_on && from.is_none() {
         return Err(refuse(format!(
-            "{id} is on already; `ctid remove '{id}'` takes it out, and --from RESULT.json keeps what a result found of it"
+            "{id} is in the model already; `ctid remove '{id}'` takes it out, and --from RESULT.json keeps what a result found of it"
         )));
     }
     let mut document = document(&file, text)?;
@@ -279,7 +279,7 @@ pub(crate) fn without_effect(
         return Err(Error::File {
             file,
             what: format!(
-                "{wanted} is not on, so it cannot be removed; effects = {:?}",
+                "{wanted} is not in the model, so it cannot be removed; effects = {:?}",
                 model.effects.on
             ),
         });
@@ -288,7 +288,7 @@ pub(crate) fn without_effect(
     let model = OwnModelFile::parse_with(path, &text, read)?;
     let waits = model.effects.waiting.contains(&wanted);
     let kept = if waits {
-        format!("; [effect.\"{wanted}\"] stays for the day it is added again")
+        format!("; [effect.\"{wanted}\"] is kept in the file for when it is added again")
     } else {
         String::new()
     };

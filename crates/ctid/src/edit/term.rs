@@ -20,7 +20,7 @@ pub(super) fn with_waiting_term(
     if model.terms.iter().any(|on| on.term.name == name) {
         return Err(Error::File {
             file: file.to_string(),
-            what: format!("{name} is on already; `ctid remove {name}` takes it out"),
+            what: format!("{name} is in the model already; `ctid remove {name}` takes it out"),
         });
     }
     let mut document = document(file, text)?;
@@ -49,7 +49,7 @@ pub fn with_term(
             file: file.to_string(),
             what: if model.terms.iter().any(|on| on.term.name == name) {
                 format!(
-                    "{name} is on already; give another name, or `ctid remove {name}` and delete [term.{name}]"
+                    "{name} is in the model already; give another name, or `ctid remove {name}` and delete [term.{name}]"
                 )
             } else {
                 format!(

@@ -99,7 +99,7 @@ fn what_cannot_be_done_is_refused() {
     };
     assert_eq!(
         add("overflow", None),
-        "tank.toml: overflow is on already; `ctid remove overflow` takes it out"
+        "tank.toml: overflow is in the model already; `ctid remove overflow` takes it out"
     );
     assert!(add("overflo", None).contains("did you mean overflow?"));
     assert!(add("sqrt_outflow", None).contains("does not act on plant"));
@@ -108,7 +108,7 @@ fn what_cannot_be_done_is_refused() {
     let remove = without_effect("tank.toml", text, "pump_lag");
     assert_eq!(
         remove.err().unwrap().to_string(),
-        "tank.toml: pump_lag is not on, so it cannot be removed; effects = [\"overflow\"]"
+        "tank.toml: pump_lag is not in the model, so it cannot be removed; effects = [\"overflow\"]"
     );
 }
 

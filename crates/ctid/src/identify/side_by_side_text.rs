@@ -28,8 +28,8 @@ pub(crate) fn measure(found: &SideBySide) -> String {
         names => format!(", and on {}, which was not fitted", names.join(", ")),
     };
     let in_loop = if found.in_loop {
-        " The input answers to the noise through the controller, and a model that takes this for the plant fits better: here the fit does \
-         not say which method is right."
+        " The controller feeds the noise back to the input. A model that attributes this feedback to \
+         the plant fits better, so the fit does not show which method is right."
     } else {
         ""
     };
@@ -117,7 +117,7 @@ pub(crate) fn tests(outcome: &Outcome) -> String {
         p => format!("p = {}", numbers::decimals(p, 3)),
     };
     format!(
-        "error white: {}; free of the input: {}",
+        "simulation error white: {}; uncorrelated with the input: {}",
         p(outcome.whiteness_p),
         p(outcome.input_p)
     )
@@ -180,7 +180,7 @@ fn orders(found: &SideBySide, look: Look) -> String {
 /// What the table of orders says.
 pub(crate) const ORDERS: &str = "BIC of the simulation error beside an autoregressive noise model: shown above is the least of a method whose parameters differ \
      significantly from zero. \
-     YIC: the lower, the better known are the parameters of a model that fits; it needs standard errors.";
+     YIC: low for a model that fits and has small standard errors; it needs standard errors.";
 
 /// The largest standard error of a parameter over its size.
 pub(crate) fn largest_error(outcome: &Outcome) -> Option<f64> {

@@ -143,7 +143,7 @@ fn parameters(found: &Identification, look: Look) -> String {
             numbers::duration(settings.first_order),
         ),
         (None, Some(_)) => {
-            "(the last column is of the second half; standard errors take the residual for white)"
+            "(the last column is of the second half; standard errors assume a white residual)"
                 .to_owned()
         }
         (None, None) => return text,
@@ -243,17 +243,17 @@ pub(crate) fn drift_verdict(found: &Identification) -> String {
         return String::new();
     };
     if drift.moves() {
-        return "The estimates move with the level by more than chance: the process is not linear over this range, or not of this order."
+        return "The estimates change with the level by more than chance: the process is not linear over this range, or not of this order."
             .to_owned();
     }
     if drift.tells() {
-        return "The estimates do not move with the level beyond their standard errors; a shorter --memory sees faster changes, less surely."
+        return "The estimates do not change with the level beyond their standard errors; a shorter --memory follows faster changes with larger standard errors."
             .to_owned();
     }
     let percent = |part: f64| numbers::significant(100.0 * part, 2);
     format!(
-        "This record is too short to tell whether the estimates move with the level: the memory is {} % of it, and the level that it \
-         remembers covers {} % of the output's range; record longer, or try a shorter --memory.",
+        "This record is too short to tell whether the estimates change with the level: the memory is {} % of it, and the level within the memory \
+         covers {} % of the output's range; record longer, or try a shorter --memory.",
         percent(drift.memory_part),
         percent(drift.level_part)
     )
@@ -296,7 +296,7 @@ fn in_loop(found: &Identification, look: Look) -> String {
     let Some(in_loop) = &found.in_loop else {
         return String::new();
     };
-    let mut text = format!("{}\n", look.heading("The loop, and the way there"));
+    let mut text = format!("{}\n", look.heading("The loop, and how it was estimated"));
     for (name, sentence) in facts(found, in_loop) {
         text += &look.paragraph("  - ", &format!("{name}: {sentence}"));
     }

@@ -63,7 +63,7 @@ impl fmt::Display for ExcitationWarning {
         match self {
             Self::Still { record } => write!(
                 f,
-                "{record}: the command never moves, so this record says nothing of how the process answers; the other fitted records have to"
+                "{record}: the command never moves, so this record does not show how the process responds; the other fitted records have to"
             ),
             Self::SingleStep {
                 record,
@@ -84,7 +84,7 @@ impl fmt::Display for ExcitationWarning {
                 unit,
             } => write!(
                 f,
-                "{record}: the output{} shows no trace of the command: its range of {} is that of noise (median change from row to row {}); \
+                "{record}: the output{} does not respond to the command: its range of {} is that of noise (median change from row to row {}); \
                  check the columns, or record an experiment with larger steps",
                 output
                     .as_ref()

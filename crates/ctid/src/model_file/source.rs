@@ -135,7 +135,7 @@ impl Source<'_> {
         }
         Err(self.at(
             number.span().start,
-            format!("{key} = {} has to be above zero; correct it, or delete the line where it is not known", shown(value)),
+            format!("{key} = {} has to be above zero; correct it, or delete the line if the value is not known", shown(value)),
         ))
     }
 

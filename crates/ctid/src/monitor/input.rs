@@ -132,7 +132,7 @@ impl<'a> Session<'a> {
         for (before, now) in pairs {
             if !now.is_empty() && !before.is_empty() && now != before {
                 return Err(Error::Usage(format!(
-                    "{INPUT}, row {}: the header comes again with [{}] where it was [{}], and the model was learned in that; convert the rows, or begin anew",
+                    "{INPUT}, row {}: the header comes again with [{}] where it was [{}], and the model was learned in that; convert the rows, or start again",
                     self.line,
                     quoted(now),
                     quoted(before)

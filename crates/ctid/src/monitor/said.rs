@@ -25,13 +25,13 @@ impl Session<'_> {
                 let (line, span) = (self.line, axis.span(*from, *to));
                 let what = if *bridged {
                     self.words(
-                        "the command is taken to have been held",
-                        "the inputs are taken to have been held",
+                        "the command is assumed to have been held",
+                        "the inputs are assumed to have been held",
                     )
                 } else {
                     self.words(
-                        "what the levels are is waited for",
-                        "what the states are is waited for",
+                        "the monitor waits for new levels",
+                        "the monitor waits for new states",
                     )
                 };
                 let name = self
@@ -54,7 +54,7 @@ impl Session<'_> {
             Notice::ClockSetBack { from, to } => {
                 self.next_estimate = *to;
                 format!(
-                    "the time goes back {} and stays there: the rows are followed from here on; what the {} are is waited for",
+                    "the time goes back {} and stays there: the rows are followed from here on; the monitor waits for new {}",
                     axis.span(*from, *to),
                     self.words("levels", "states")
                 )
@@ -82,7 +82,7 @@ impl Session<'_> {
             }
             Notice::LearnsAnew { why } => format!("learns anew: {why}"),
             Notice::IntervalChanged { time, from, to } => format!(
-                "the time steps by {} s instead of {} s since about {}: the noise is another then, and is learned anew",
+                "the time steps by {} s instead of {} s since about {}: the noise depends on the time step, and is learned again",
                 significant(*to, 4),
                 significant(*from, 4),
                 axis.at(*time)
@@ -96,7 +96,7 @@ impl Session<'_> {
             } => {
                 let deaf = if *threshold > DEAF {
                     format!(
-                        "; what the model leaves is so slow that only a large change will be seen (threshold {threshold:.1}): it may lack an effect"
+                        "; the residual is so slow that only a large change will be detected (threshold {threshold:.1}): it may lack an effect"
                     )
                 } else {
                     String::new()

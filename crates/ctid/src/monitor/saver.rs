@@ -44,7 +44,7 @@ impl Saver {
                 self.failed = true;
                 (!failed).then(|| {
                     one_line(&format!(
-                        "{error}; it goes on watching, and tries again every {} s",
+                        "{error}; the monitor continues, and tries again every {} s",
                         SAVED_EVERY.as_secs()
                     ))
                 })

@@ -46,7 +46,7 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
     let not_ours = |what: String| {
         Error::file(
             path,
-            format!("{what}; give --state another name, or delete the file to begin anew"),
+            format!("{what}; give --state another name, or delete the file to start again"),
         )
     };
     let metadata = match fs::metadata(path) {

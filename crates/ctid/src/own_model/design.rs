@@ -108,10 +108,10 @@ pub(crate) fn said(file: &OwnModelFile, design: &Design, look: Look) -> String {
     text
 }
 
-/// The two effects on the records that there are.
+/// The two effects on the existing records.
 fn alternatives(design: &Design, look: Look) -> String {
     let title = format!(
-        "{} or {}, on the records that there are, weighted by their noise",
+        "{} or {}, on the existing records, weighted by their noise",
         design.between[0].effect, design.between[1].effect
     );
     let mut rows = vec![
@@ -293,7 +293,7 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
     let decides = 100.0 * best.power.decides;
     all.push(match design.prospect {
         Prospect::Twins => format!(
-            "{} and {} show the same in every experiment that was tried within these limits: no experiment of this kind tells them apart. Another sensor, or a look at the plant, may.",
+            "{} and {} give the same response in every experiment that was tried within these limits: no experiment of this kind tells them apart. Another sensor, or an inspection of the plant, may.",
             words.placed(a),
             words.placed(b)
         ),
@@ -309,7 +309,7 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         .all(|alternative| alternative.bic_gain < NEEDED)
     {
         all.push(format!(
-            "These records ask for neither of the two: {a} and {b}, alone, do not lower the criterion by {NEEDED}. The experiments are reckoned with the small sizes above."
+            "These records support neither of the two: {a} and {b}, alone, do not lower the criterion by {NEEDED}. The experiments are evaluated with the small sizes above."
         ));
     }
     let held: Vec<String> = design
@@ -334,7 +334,7 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         all.push(format!("Hold {}.", held.join(", ")));
     }
     if let Some(times) = design.times_as_long.filter(|_| !design.twins()) {
-        all.push(format!("Played {times} times over it would decide."));
+        all.push(format!("Repeated {times} times it would decide."));
     }
     if !file.controllers.is_empty() && !design.twins() {
         all.push("The experiment is in open loop: switch the controller to manual.".to_string());

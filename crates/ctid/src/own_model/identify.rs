@@ -324,7 +324,7 @@ impl OwnTransferFunction {
         }
         if !self.others.is_empty() {
             notes.push(format!(
-                "{} {} no part here: what is identified is right where {} still",
+                "{} {} no part here: the identified model is right only if {} still",
                 self.others.join(", "),
                 if self.others.len() == 1 {
                     "has"

@@ -105,7 +105,7 @@ pub(crate) fn missing_term(words: &EffectWords, unknown: &Unknown) -> MissingTer
 
 /// What the report shows of a comparison.
 pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Document {
-    let source = "what the past of the model's residual does not predict";
+    let source = "innovation of the residual: the part that its past does not predict";
     let mut shown = document(file, records, (&found.steps, &found.noise), source);
     shown.effort.clone_from(&found.effort);
     shown.seconds = found.seconds;

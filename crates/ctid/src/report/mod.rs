@@ -118,7 +118,7 @@ fn verdict(diagnosis: &Diagnosis) -> String {
         Verdict::Undecided => "Something is missing; more than one effect fits these data",
         Verdict::Partial => return escape(&findings::partial_headline(diagnosis)),
         Verdict::Unexplained => {
-            "What is left is not noise, and no effect of the catalogue explains it"
+            "The residual is not noise, and no effect of the catalogue explains it"
         }
         Verdict::Adequate => "The model is adequate",
     }
@@ -267,8 +267,8 @@ fn fit(diagnosis: &Diagnosis) -> String {
         "fit",
         "Measured against model",
         &format!(
-            "{above}, below the input. Shaded: where the chosen model clearly fails \
-             on the first fitted record, the stronger the worse. Drag to zoom (on a touch screen choose the \
+            "{above}, below the input. Shaded: where the error of the chosen model clearly exceeds the noise on the \
+             first fitted record; a darker shade is a larger error. Drag to zoom (on a touch screen choose the \
              magnifier first), double-click to see all again; the names switch the curves on and off."
         ),
         &figures,
@@ -283,8 +283,8 @@ fn ranking(diagnosis: &Diagnosis) -> String {
         "ranking",
         "Which effect is missing?",
         "Each effect of the catalogue was added to the base model alone and everything was fitted again. \
-         The larger the fall of the Bayesian information criterion (BIC), the better; a fall below 6 \
-         is no evidence, and effects within 6 of each other are not told apart.",
+         The larger the fall of the Bayesian information criterion (BIC), the better; a fall below 6 is not significant, and effects within 6 \
+         of each other are not distinguished.",
         &format!(
             "{}{}{}{}{}",
             tables::groups(diagnosis),

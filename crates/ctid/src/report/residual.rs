@@ -66,13 +66,13 @@ pub(super) fn unknown(diagnosis: &Diagnosis) -> String {
     let mut figures = figure(
         "unknown-path",
         "The missing term against time",
-        "Smoothed, with its 95 % band, on the first fitted record; shaded where the band does not hold zero.",
+        "Smoothed, with its 95 % band, on the first fitted record; shaded where the band excludes zero.",
     );
     if unknown.variable != "time" {
         figures.push_str(&figure(
             "unknown-shape",
             &format!("Against the {}", variable(unknown.variable)),
-            "Fitted with all parameters of the plant, without what those imitate; with its 95 % band.",
+            "Fitted with all parameters of the plant; the part that these parameters explain as well is removed. With its 95 % band.",
         ));
     }
     section(
@@ -169,9 +169,9 @@ pub(super) fn residual_tests(diagnosis: &Diagnosis) -> String {
     );
     section(
         "tests",
-        "Is anything left in the residual?",
-        "A model that has taken all there is leaves noise: nearly all stems inside the band, \
-         which holds 95 % of them when nothing is left.",
+        "Is the residual noise?",
+        "The residual of a complete model is noise: nearly all stems are inside the \
+         band. The band contains 95 % of the stems of white noise.",
         &format!(
             "<div class=\"pairs\">{}{}</div>\n",
             figure_with(

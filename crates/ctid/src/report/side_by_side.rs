@@ -16,7 +16,7 @@ pub fn html(found: &SideBySide) -> String {
             "fit",
             "Measured against all simulations",
             "Drag to zoom, double-click to see all again; click a name to hide its curve.",
-            &figure("fit", "Output, what is left of it, and input", ""),
+            &figure("fit", "Output, residual, and input", ""),
         ),
         parameters(found),
         assumptions(found),

@@ -74,7 +74,7 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
             let tank = findings::tank(diagnosis, k)
                 .map_or(String::new(), |tank| format!(" ({})", escape(tank)));
             let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
-                "; in doubt: its size ends at the edge of what is plausible"
+                "; uncertain: its size is at a bound of its plausible range"
             } else {
                 ""
             };
@@ -119,7 +119,7 @@ pub(super) fn acceptance(diagnosis: &Diagnosis) -> String {
         let why = if diagnosis.effects.is_empty() {
             "Why they were refused:"
         } else {
-            "Why they are a part of the answer only:"
+            "Why they explain the error only in part:"
         };
         format!("<p>{why}</p>\n<ul>{reasons}</ul>\n")
     };
@@ -127,8 +127,8 @@ pub(super) fn acceptance(diagnosis: &Diagnosis) -> String {
         &escape(&findings::acceptance_title(diagnosis, test)),
         "<tr><th scope=\"col\">Measure</th><th scope=\"col\" class=\"number\">Found</th><th scope=\"col\">Required</th></tr>",
         &rows,
-        "The squared error above the floor is the mean squared simulation error less the variance of the noise. Effects that leave \
-         noise alone need no share of it.",
+        "The squared error above the floor is the mean squared simulation error less the variance of the noise. Effects whose residual is noise need \
+         no minimum share.",
     ) + &reasons
 }
 
@@ -185,14 +185,14 @@ pub(super) fn shares(unknown: &Unknown) -> String {
         "<tr><th>place</th><th>variable</th><th class=\"number\">predicted</th></tr>",
         &rows,
         "How much of it a curve in one variable predicts on parts of the data that were left out of its fit. \
-         What depends on a variable alone is predicted nearly in full; where none is, it is a function of time, as far as \
-         these data tell.",
+         A function of one variable is predicted nearly in full. Where no variable \
+         predicts it, it is a function of time, as far as these data show.",
     )
 }
 
 const SCORED: &str = "Simulation error: root mean square on the fitted data after the refit.";
-const SIGNATURES: &str = " Visible part: how much of the effect's signature the fitted parameters cannot imitate. Visible from: an effect of a smaller \
-     size would have stayed hidden in these data.";
+const SIGNATURES: &str = " Visible part: share of the effect's signature that the fitted parameters cannot compensate for. Visible \
+     from: minimum detectable size; a smaller effect would not be detected in these data.";
 
 /// The catalogue, best effect first.
 pub(super) fn scores(diagnosis: &Diagnosis) -> String {

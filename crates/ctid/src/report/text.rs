@@ -118,7 +118,7 @@ pub(super) fn input_test(p: f64) -> String {
     let finding = match p {
         p if !p.is_finite() => return "Residual against input was not tested.".to_owned(),
         p if p >= 0.05 => "No trace of the input is left in the residual",
-        p if p >= 0.01 => "It is doubtful whether the input is still seen in the residual",
+        p if p >= 0.01 => "It is doubtful whether the residual depends on the input",
         _ => "The input is still seen in the residual: the model misses part of how it acts",
     };
     format!("{finding} (cross-correlation test, {}).", p_value(p))

@@ -93,7 +93,7 @@ pub(super) async fn aside<T: Send + 'static>(
     let broke = |_| {
         Refusal::new(
             StatusCode::INTERNAL_SERVER_ERROR,
-            "the request broke off, which is a fault of ctid",
+            "the request failed because of an error in ctid",
         )
     };
     spawn_blocking(work).await.map_err(broke)?
@@ -291,7 +291,7 @@ async fn effect(
         let shape = match (way, unknown) {
             (Way::Keep, None) => {
                 return Err(Refusal::input(
-                    "nothing is unexplained that has a shape; diagnose first",
+                    "the residual shows no function of a variable; diagnose first",
                 ));
             }
             (Way::Keep, Some(unknown)) => Some(TermFile::from(unknown)),

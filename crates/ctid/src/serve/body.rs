@@ -45,10 +45,10 @@ async fn parts<'a>(
     let full = |_| {
         Refusal::new(
             StatusCode::SERVICE_UNAVAILABLE,
-            "too many files are on their way at once; drop it again when the others are there",
+            "too many files are being transferred at once; drop it again when the others have arrived",
         )
     };
-    let broken = |_| Refusal::input("the file broke off on its way; drop it again");
+    let broken = |_| Refusal::input("the transfer of the file was interrupted; drop it again");
     let mut content = Vec::new();
     let mut share = room.try_acquire_many(0).map_err(full)?;
     loop {
@@ -56,7 +56,7 @@ async fn parts<'a>(
         let next = timeout(silence, next).await.map_err(|_| {
             Refusal::new(
                 StatusCode::REQUEST_TIMEOUT,
-                "the file stopped on its way; copy it to this machine and drop it again",
+                "the transfer of the file stalled; copy it to this machine and drop it again",
             )
         })?;
         let Some(frame) = next.transpose().map_err(broken)? else {

@@ -112,7 +112,7 @@ impl Guard {
         let behind = self.behind_the_secret(request.uri());
         *request.uri_mut() = behind.ok_or_else(|| {
             forbidden(
-                "the address lacks the secret of this run of ctid; open the one that ctid printed",
+                "the address lacks the access key of this run of ctid; open the one that ctid printed",
             )
         })?;
         Ok(())

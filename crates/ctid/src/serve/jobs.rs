@@ -264,7 +264,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
         match outcome {
             Ok(Ok(outcome)) => settle(&mut session, work, outcome),
             Ok(Err(error)) => session.fail(error.to_string()),
-            Err(_) => session.fail("the computation broke off, which is a fault of ctid; what it said is in the terminal".into()),
+            Err(_) => session.fail("the computation failed because of an error in ctid; the terminal shows the message".into()),
         }
     };
     if let Err(error) = thread::Builder::new()

@@ -362,7 +362,7 @@ impl Session {
         self.stop();
         if let Some((what, button)) = what {
             self.fail(format!(
-                "{what} was stopped, because this page had not asked after it for three minutes, as one that sleeps does not; {button} starts it again"
+                "{what} was stopped, because this page sent no request for three minutes, for example because the computer slept; {button} starts it again"
             ));
         }
     }

@@ -120,7 +120,7 @@ fn head<'a>(name: &str, content: &'a [u8]) -> Result<&'a [u8], Refusal> {
     let end = first.iter().rposition(|byte| b"\r\n".contains(byte));
     let end = end.ok_or_else(|| {
         Refusal::input(format!(
-            "{name} is one line for its first {} MB; write one row for each sample, below a header",
+            "{name} is a single line over its first {} MB; write one row for each sample, below a header",
             LARGEST_HEAD >> 20
         ))
     })?;

@@ -169,7 +169,7 @@ fn headline(diagnosis: &Diagnosis) -> (String, &'static str) {
         ),
         Verdict::Partial => (findings::partial_headline(diagnosis), "open"),
         Verdict::Unexplained => (
-            "What is left is not noise, and no effect of the catalogue explains it".to_owned(),
+            "The residual is not noise, and no effect of the catalogue explains it".to_owned(),
             "open",
         ),
         Verdict::Adequate => ("The model is adequate".to_owned(), "good"),

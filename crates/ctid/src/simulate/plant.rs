@@ -189,7 +189,7 @@ fn simulated(
         .ok_or_else(|| {
             Error::file(
                 path,
-                "the plant comes to no rest under its first inputs, so nothing says where it begins; put the first readings of the output into the file: initial levels are fitted to them",
+                "the plant has no equilibrium under its first inputs, so its initial state is not known; put the first readings of the output into the file: initial levels are fitted to them",
             )
         })?;
     let mut x = parameters.to_vec();
@@ -204,7 +204,7 @@ fn simulated(
         Error::file(
             path,
             format!(
-                "the simulation does not go on behind {at}: a level grows without bound; correct the inputs there, or the model file"
+                "the simulation stops at {at}: a level grows without bound; correct the inputs there, or the model file"
             ),
         )
     };
@@ -232,7 +232,7 @@ fn simulated(
     let mut warnings = Vec::new();
     if lacking {
         warnings.push(
-            "the model leaves more than noise of the records that it is fitted to, and what it lacks is in no band: `ctid diagnose` names it".to_string(),
+            "the residual of the fit is not noise, and the band does not include this model error: `ctid diagnose` shows what is missing".to_string(),
         );
     }
     if states_from == StateSource::Rest && begins_with_readings(record) {

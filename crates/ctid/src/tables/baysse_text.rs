@@ -169,7 +169,7 @@ fn short(number: &str) -> String {
 fn summary(study: &Study, look: Look) -> String {
     let Study { inside, of, .. } = study;
     let verdict = look.strong(format!(
-        "{inside} of {of} figures of the runs inside the bands of a reproduction"
+        "{inside} of {of} figures of the runs inside the bands"
     ));
     let mut text = format!("{verdict}\n");
     text += &look.paragraph("  ", &printed_inside_bands(study));

@@ -8,11 +8,11 @@ use crate::numbers;
 pub(crate) const CONTRASTS: &str = "Differences between tables, run by run";
 
 /// What the differences tell.
-pub(crate) const CONTRASTS_MEANING: &str = "By Euler's rule. Two tables with one noise differ by their settings alone: that their cells lie inside one \
-     by one does not say that their differences do.";
+pub(crate) const CONTRASTS_MEANING: &str = "By Euler's rule. Two tables with the same noise differ by their settings alone: their cells \
+     can lie inside one by one while their differences do not.";
 
 /// Title of the runs with other settings.
-pub(crate) const OTHER_SETTINGS: &str = "What the comparison would not notice";
+pub(crate) const OTHER_SETTINGS: &str = "Changes that the comparison would not detect";
 
 /// Title of the constant gains.
 pub(crate) const CONSTANT_GAINS: &str =
@@ -58,8 +58,8 @@ pub(crate) fn contrast(contrast: &Contrast) -> String {
 pub(crate) fn other_settings(changed: &[Changed]) -> String {
     let unnoticed = changed.iter().filter(|changed| !changed.noticed).count();
     format!(
-        "The tables by Euler's rule with one setting changed: {unnoticed} of {} changes leave the tables \"consistent\", cell by cell. So \
-         much remains open after the comparison.",
+        "The tables by Euler's rule with one setting changed: {unnoticed} of {} changes leave the tables \"consistent\", cell by cell. The comparison cannot exclude \
+         these changes.",
         changed.len()
     )
 }

@@ -173,7 +173,7 @@ fn failures_of(diagnosis: &Diagnosis, step: &Step, output: &OutputStep, look: Lo
     let name = step_name(diagnosis, step);
     let title = match diagnosis.verdict {
         Verdict::Adequate if !compared(diagnosis) => {
-            format!("What is left in the residual of {name}")
+            format!("Tests of the residual of {name}")
         }
         _ => format!("Where {name} fails"),
     };
@@ -204,20 +204,17 @@ fn residual_tests(tests: &ResidualTests) -> String {
         }
     };
     let input = match tests.input_p {
-        value if value.is_nan() => "the input was not looked for in the residual".to_string(),
-        value if value < 0.01 => format!("the input is still seen in the residual ({})", p(value)),
+        value if value.is_nan() => "the residual was not tested for the input".to_string(),
+        value if value < 0.01 => format!("the residual depends on the input ({})", p(value)),
         value => format!(
-            "no linear trace of the input is left in the residual ({})",
+            "the residual has no significant linear dependence on the input ({})",
             p(value)
         ),
     };
     let white = match tests.whiteness_p {
         value if value.is_nan() => "its whiteness was not tested".to_string(),
         value if value < 0.01 => format!("it is not white noise (Ljung-Box {})", p(value)),
-        value => format!(
-            "it cannot be told from white noise (Ljung-Box {})",
-            p(value)
-        ),
+        value => format!("it is consistent with white noise (Ljung-Box {})", p(value)),
     };
     format!("{input}; {white}")
 }
@@ -256,7 +253,10 @@ pub(crate) fn parameters(diagnosis: &Diagnosis, step: &Step, look: Look) -> Stri
         text += &format!(
             "  {}\n",
             look.faint(match step.starts_agree {
-                0 => format!("none of {} starts around it came as low", step.starts),
+                0 => format!(
+                    "none of {} starts around it reached an equally low minimum",
+                    step.starts
+                ),
                 agree => format!("{agree} of {} starts ended in this minimum", step.starts),
             })
         );
@@ -340,7 +340,7 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
             look.warning(look.paragraph("", &part).trim_end())
         }
         Verdict::Unexplained => {
-            look.warning("What is left is not noise, and no effect of the catalogue explains it")
+            look.warning("The residual is not noise, and no effect of the catalogue explains it")
         }
     };
     let mut text = format!("{headline}\n");

@@ -50,7 +50,7 @@ pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
         .unwrap_or(&tables[6]);
 
     let title = match diagnosis.verdict {
-        Verdict::Adequate => "The catalogue, one effect at a time: none is called for",
+        Verdict::Adequate => "The catalogue, one effect at a time: none is needed",
         _ => "The catalogue, one effect at a time, refitted: simulation error on fitted data",
     };
     let mut text = format!("{}\n", look.heading(title));

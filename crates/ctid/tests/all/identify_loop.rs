@@ -296,7 +296,7 @@ fn no_condition_is_told_of_estimates_that_are_not_the_record_s() {
         ..Request::new(Method::RecursiveFcloe, Order { n: 1, m: 0 })
     };
     let found = identify(&drifting(60.0, 240.0, 6000), &request).unwrap();
-    let said = |w: &String| w.contains("the plant drifts, or the recursion went astray");
+    let said = |w: &String| w.contains("the plant drifts, or the recursion diverged");
     assert!(
         found.warnings.iter().any(said),
         "{:?} {} {:?}",

@@ -109,7 +109,7 @@ fn the_unknown_is_written_kept_and_taken_out() {
 
     let said = place.succeeds("remove my_wave --model tank.toml");
     assert!(
-        said.contains("[term.my_wave] stays for the day it is added again"),
+        said.contains("[term.my_wave] is kept in the file for when it is added again"),
         "{said}"
     );
     assert!(place.read("tank.toml").starts_with(&model));

@@ -61,7 +61,7 @@ fn fulfils_the_contract(json: &Value, held_out: bool) {
     assert_eq!(effects.len(), in_doubt.len());
     let sentences = texts(&json["sentences"]);
     for (said, doubted) in sentences.iter().zip(in_doubt) {
-        assert_eq!(said.contains("In doubt:"), doubted.as_bool().unwrap());
+        assert_eq!(said.contains("Uncertain:"), doubted.as_bool().unwrap());
     }
     let unexplained = json["residual_unexplained"].as_bool().unwrap();
     let remains = sentences

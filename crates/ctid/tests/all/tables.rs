@@ -40,7 +40,7 @@ fn the_result_holds_every_cell_for_both_rules() {
         "consistent",
         "Assumed, as the paper does not print it",
         "Table 3 - 2",
-        "What the comparison would not notice",
+        "Changes that the comparison would not detect",
         "diag(0.8, 0.008), 0.8",
         "Table 1 with larger P(0)",
         "block-diagonal  exact",

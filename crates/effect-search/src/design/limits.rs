@@ -76,7 +76,7 @@ pub enum Refused {
         high: f64,
     },
     /// What is applied never moved, and nobody says how far it may.
-    #[error("the records hold one value of {input}, {}, which says nothing of where it may go; give --input {input}=LOW..HIGH", shown(*value))]
+    #[error("the records hold one value of {input}, {}, so its permitted range is not known; give --input {input}=LOW..HIGH", shown(*value))]
     NoRange {
         /// The input.
         input: String,

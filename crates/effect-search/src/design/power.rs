@@ -29,7 +29,7 @@ pub enum Prospect {
     May,
     /// It will hardly, within these limits.
     Hardly,
-    /// The two show the same in every experiment that was tried.
+    /// The two give the same response in every experiment that was tried.
     Twins,
 }
 

@@ -11,11 +11,11 @@ use super::{Kind, Power, Prospect};
 pub struct Alternative {
     /// The effect, with its port.
     pub effect: String,
-    /// Its parameters on the records that there are, by the names that they have in the effect.
+    /// Its parameters on the existing records, by the names that they have in the effect.
     pub sizes: BTreeMap<String, f64>,
     /// By how much it lowers the criterion of the believed model.
     pub bic_gain: f64,
-    /// Simulation error of each output on the records that there are \[its unit\].
+    /// Simulation error of each output on the existing records \[its unit\].
     pub rmse_per_output: BTreeMap<String, f64>,
 }
 
@@ -108,7 +108,7 @@ pub struct Design {
     pub model: String,
     /// The two effects.
     pub between: [Alternative; 2],
-    /// By how much the criterion of the second is above that of the first on the records that there are.
+    /// By how much the criterion of the second is above that of the first on the existing records.
     pub bic_ahead: f64,
     /// What the best experiment can be expected to do.
     pub prospect: Prospect,

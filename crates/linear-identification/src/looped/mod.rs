@@ -280,7 +280,7 @@ impl Task<'_> {
         let best = rms(errors(&self.record.outputs[0], &simulated));
         (rmse > MUCH_WORSE * best).then(|| {
             format!(
-                "--method fcloe simulates the record with an error of {best:.3} {unit} instead of {rmse:.3}: the plant drifts, or the recursion went astray, {untold}"
+                "--method fcloe simulates the record with an error of {best:.3} {unit} instead of {rmse:.3}: the plant drifts, or the recursion diverged, {untold}"
             )
         })
     }
@@ -339,7 +339,7 @@ fn missed(mismatch: &Mismatch) -> Option<String> {
     let share = mismatch.systematic / mismatch.size;
     (share > MISSED).then(|| {
         format!(
-            "the controller misses {:.0} % of what the measured command does with the reference: its errors go straight into the estimates; check gain and integral_time",
+            "the controller does not explain {:.0} % of the response of the measured command to the reference: this error biases the estimates; check gain and integral_time",
             100.0 * share
         )
     })

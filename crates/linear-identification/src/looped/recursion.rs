@@ -49,7 +49,7 @@ impl Task<'_> {
             Ok(begun) => begun,
             Err(_) => {
                 warnings.push(
-                    "the first rows do not tell a start: it was taken from the whole record, so the recursion knows what it has not seen yet"
+                    "the first rows do not determine a start: the start was taken from the whole record, so the recursion uses future samples"
                         .to_owned(),
                 );
                 self.begun(record.clone())?

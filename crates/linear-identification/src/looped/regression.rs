@@ -72,13 +72,13 @@ impl Task<'_> {
             match start::standard_errors(records, &self.controller, &filter, &plant) {
                 Ok(errors) => {
                     std_errors = errors.into_iter().map(Some).collect();
-                    "the standard errors take the levels for exact: --method fcloe estimates them"
+                    "the standard errors assume that the levels are exact: --method fcloe estimates them"
                         .to_owned()
                 }
                 Err(error) => format!("no standard errors: {error}"),
             }
         } else {
-            "noise biases least squares by more than standard errors would say: none are shown; --method iv and fcloe have them".to_owned()
+            "noise biases least squares by more than standard errors show, so none are given; --method iv and fcloe have them".to_owned()
         };
         Ok(Found {
             levels: self.levels_of(&record),

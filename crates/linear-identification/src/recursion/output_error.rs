@@ -61,7 +61,7 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
     let (bounds, plausible) = filter_bounds(&a)?;
     if plausible.is_none() {
         path.warnings.push(format!(
-            "no bounds on the error filter make convergence sure for any plants around the start, for n = {N}; compare with --method ct-rls"
+            "no bounds on the error filter guarantee convergence for plants around the start, for n = {N}; compare with --method ct-rls"
         ));
     }
     let filters = StateVariableFilters::<N>::with_input(scaled.bandwidth, scaled.hold)?;
@@ -101,7 +101,7 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
     if held > 0 {
         path.held = true;
         path.warnings.push(format!(
-            "a time constant is too short to be seen: in the second half a bound held a coefficient of A above 0 (steps: {held}), and standard errors \
+            "a time constant is too short to be identified: in the second half a bound held a coefficient of A above 0 (steps: {held}), and standard errors \
              are not known; {}",
             lower_or_faster(order)
         ));
@@ -174,7 +174,7 @@ fn left_plausible<const N: usize>(
     Ok(match check_filter_bounds(&bounds, &about(&found, here)?, 0.5)? {
         FilterBounds::PositiveReal => None,
         _ => Some(
-            "the error filter's bounds do not make convergence sure for the plant that was found (C/A - 1/2 is not strictly positive real): \
+            "the error filter's bounds do not guarantee convergence for the plant that was found (C/A - 1/2 is not strictly positive real): \
              compare with --method ct-rls"
                 .to_owned(),
         ),

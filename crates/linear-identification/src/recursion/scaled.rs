@@ -85,13 +85,13 @@ impl Scaled {
         let bandwidth = request.bandwidth.unwrap_or((BANDWIDTH / unit).min(fastest));
         if bandwidth > 2.0 * fastest {
             warnings.push(format!(
-                "the filters' bandwidth of {bandwidth} 1/s is beyond what samples every {step} s show; take --bandwidth {fastest:.3} at most"
+                "the filters' bandwidth of {bandwidth} 1/s is too high for a sampling interval of {step} s; take --bandwidth {fastest:.3} at most"
             ));
         }
         let slowest = LEAST_BANDWIDTH / unit;
         if bandwidth < slowest {
             warnings.push(format!(
-                "the filters' bandwidth of {bandwidth} 1/s hides a time constant of {unit:.3} s: nothing is learnt of it, whatever the standard errors say; \
+                "the filters' bandwidth of {bandwidth} 1/s suppresses a time constant of {unit:.3} s: it cannot be identified, although its standard errors may be small; \
                  take --bandwidth {slowest:.3e} at least"
             ));
         }

@@ -28,7 +28,7 @@ pub(super) fn simulate(
     let lasting = fading.iter().rev().take(fading.len().div_ceil(10));
     let at_end = lasting.fold(0.0_f64, |most, x| most.max(x.abs()));
     let warning = (at_end > LASTING).then(|| {
-        "the model is so slow that its initial state is still seen at the end of the record: record longer".to_owned()
+        "the model is so slow that its initial state still matters at the end of the record: record longer".to_owned()
     });
     let simulated = forced
         .iter()

@@ -221,7 +221,7 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
     let deviation = rms(deviations.into_iter());
     if rmse > deviation {
         warnings.push(
-            "the model simulates worse than a constant does: the plant may be unstable without its controller, which these methods do not identify (--method fcloe does); the input may answer to the output alone, through a controller whose reference is not there or does not move; or order or --integrator do not belong".to_owned(),
+            "the model simulates worse than a constant does: the plant may be unstable without its controller, which these methods do not identify (--method fcloe does); the input may depend on the output alone, through a controller whose reference is missing or constant; or the order or --integrator is wrong".to_owned(),
         );
     }
     let input_names = first.inputs.iter();

@@ -80,7 +80,7 @@ impl Visible {
         };
         (p * (self.tests as f64) < UNLIKELY).then(|| {
             format!(
-                "\"{}\" shows in the simulation error: the order is too low{several}, there is a delay (try --delay auto), or the plant is not linear; the standard errors do not hold then",
+                "the simulation error depends on \"{}\": the order is too low{several}, there is a delay (try --delay auto), or the plant is not linear; the standard errors do not hold then",
                 quoted(&name)
             )
         })

@@ -45,18 +45,24 @@ impl Method {
     #[must_use]
     pub fn assumes(self) -> &'static str {
         match self {
-            Self::CtRls | Self::Ls => "hardly any noise: it is in the regressor",
-            Self::StabilizedOe => "noise that the input does not answer to",
-            Self::Iv => "instruments that the noise does not reach: in a loop its controller",
-            Self::Fcloe => "one plant over the record; in a loop its controller",
+            Self::CtRls | Self::Ls => {
+                "hardly any noise: noise in the regressor biases the estimates"
+            }
+            Self::StabilizedOe => "noise that is not fed back to the input",
+            Self::Iv => {
+                "instruments that are uncorrelated with the noise: in a loop, the controller has to be given"
+            }
+            Self::Fcloe => {
+                "a constant plant over the record; in a loop, the controller has to be given"
+            }
             Self::Srivc => {
-                "one plant over the record; in a loop an input that is held between samples; noise of any colour, though white noise is what it is best for"
+                "a constant plant over the record; in a loop an input that is held between samples; white or coloured noise, with the least variance for white noise"
             }
             Self::Rivc => {
-                "one plant over the record and autoregressive noise; in a loop an input that is held between samples"
+                "a constant plant over the record and autoregressive noise; in a loop an input that is held between samples"
             }
             Self::RecursiveFcloe => {
-                "a plant that drifts slower than the memory; in a loop its controller"
+                "a plant that drifts slower than the memory; in a loop, the controller has to be given"
             }
         }
     }
@@ -165,11 +171,11 @@ fn violated(
 ) -> Vec<String> {
     let mut violated = Vec::new();
     if in_loop && !method.is_of_loop() && !method.is_refined() {
-        violated.push("the input answers to the noise, through the controller".to_owned());
+        violated.push("the controller feeds the noise back to the input".to_owned());
     }
     if found.input_p < UNLIKELY {
         violated.push(
-            "the input shows in its error: the order is too low, there is a delay (srivc and rivc find one by --delay auto), or the plant is not linear"
+            "the simulation error depends on the input: the order is too low, there is a delay (srivc and rivc find one by --delay auto), or the plant is not linear"
                 .to_owned(),
         );
     }

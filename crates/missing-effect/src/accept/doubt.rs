@@ -116,7 +116,7 @@ pub(crate) fn doubt<'a>(
 fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Option<Node<'a>> {
     if confirmed
         .setup
-        .leaves_out("smaller sets in the place of the confirmed one")
+        .leaves_out("smaller sets as alternatives to the confirmed one")
     {
         return None;
     }

@@ -55,7 +55,7 @@ const JUMP_CLEARLY: f64 = 0.1;
 const PART_BY_SHAPE: f64 = 0.15;
 
 /// Why a narrow band of stiction is refused.
-const NARROW_BAND: &str = "in a loop that is not simulated a disturbance that comes back through the command looks like a narrow band";
+const NARROW_BAND: &str = "in a loop that is not simulated, a disturbance fed back through the command looks like a periodic effect";
 
 /// A set that was tested, and with what result.
 pub(crate) struct Tested<'a> {
@@ -263,14 +263,14 @@ fn test<'a>(
         bic_fall = own.gain_over(own_base);
         if node.added.len() > 1 && bic_fall <= BIC_MARGIN {
             reasons.push(
-                "several effects bend to much, and each with a noise model of its own the model without them is as probable"
+                "several effects together are very flexible, and with a separate noise model the model without them is as probable"
                     .to_string(),
             );
         }
         let outputs = own.fit.noise.iter().zip(own_base.fit.noise.iter());
         let mut rougher = outputs.map(|(own, base)| own.sigma() > ROUGHER * base.sigma());
         if rougher.any(|rougher| rougher) {
-            reasons.push("from sample to sample the record does not go as this has it".to_string());
+            reasons.push("the changes from sample to sample contradict it".to_string());
         }
         // A share that is no number is none.
         if carried_over(base, &node)?.max(0.0) < CARRIED_OVER {
@@ -282,19 +282,19 @@ fn test<'a>(
     let timeless = without_clock(&node, &node.setup.white_noise())?;
     if required > PART && node.added.len() > 1 {
         reasons.push(
-            "with an effect that follows time alone a set bends to any disturbance".to_string(),
+            "with an effect that is a function of time, the set fits any disturbance".to_string(),
         );
     }
     if required > PART && !beyond_random_walk(&node, &timeless, Walk::ANY)? {
         reasons.push("a random walk explains as much".to_string());
     }
     if !node.plausible() {
-        reasons.push("a size stands at a bound, or a state is not physical".to_string());
+        reasons.push("a size is at a bound, or a state is not physical".to_string());
     }
     // A jump at a free instant imitates much where set points step: it has to explain clearly more.
     let clearly = JUMP_CLEARLY * node.setup.samples() as f64;
     if jump + clearly < node.fit.bic() {
-        reasons.push("a single jump of the reading explains more".to_string());
+        reasons.push("a single level shift of the reading explains more".to_string());
     }
     Ok(Tested {
         node,

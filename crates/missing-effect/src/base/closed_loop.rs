@@ -23,7 +23,7 @@ const FEEDBACK: f64 = 1e-4;
 const OTHER_CONTROLLER: f64 = 0.05;
 
 /// What follows where a model runs on the measured command of a loop.
-const MEASURED: &str = "The model runs on the measured command, which holds the noise: where the noise has another colour than the one that was found, estimates and scores are biased, and the standard errors are made wider for it.";
+const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and scores are biased; the standard errors are enlarged for this.";
 
 /// Closes the loop around a fitted node where that is possible, and says what is known of the loop.
 pub(crate) fn enclose<'a>(
@@ -88,7 +88,7 @@ pub(crate) fn enclose<'a>(
     }
     let fit = fit_from(&setup, &[x], &node.fit.noise, STOPPING)?.continuing(&node.fit);
     let said = format!(
-        "The loop is simulated from its reference: no noise that came back through the command is in the model. The measured command agrees with the controller's to {mismatch:.4} {} rms.",
+        "The loop is simulated from its reference: so noise fed back through the command does not enter the model. The measured command agrees with the controller's to {mismatch:.4} {} rms.",
         problem.records[0].inputs[0].unit
     );
     let enclosed = Node { setup, fit, ..node };

@@ -105,7 +105,7 @@ pub enum Refused {
     },
     /// What is applied never moved, and nobody says how far it may.
     #[error(
-        "the records hold one {what} of {} alone, which says nothing of where it may go; give --range",
+        "the records hold one {what} of {} alone, so its permitted range is not known; give --range",
         shown(*value)
     )]
     NoRange {

@@ -16,7 +16,7 @@ pub struct Alternative {
     pub place: Option<String>,
     /// The size that the records give it.
     pub size: Option<Parameter>,
-    /// The size ends at the edge of what is plausible.
+    /// The size is at a bound of its plausible range.
     pub at_the_edge: bool,
     /// Root mean square of the simulation error with it on the records, in the output's unit.
     pub rmse: f64,
@@ -111,7 +111,7 @@ pub struct Design {
     pub schema: u32,
     /// The two effects.
     pub between: [Alternative; 2],
-    /// By how much the criterion of the second is above that of the first on the records that there are.
+    /// By how much the criterion of the second is above that of the first on the existing records.
     pub bic_ahead: f64,
     /// What the best experiment can be expected to do.
     pub prospect: Prospect,

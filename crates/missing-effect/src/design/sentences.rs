@@ -112,19 +112,19 @@ fn so_far(design: &Design) -> Vec<String> {
     };
     said.push(if design.bic_ahead.abs() > GROUP_MARGIN {
         format!(
-            "The records that there are decide for {}: the criterion of {} is higher by {ahead}.",
+            "The existing records decide for {}: the criterion of {} is higher by {ahead}.",
             sized(first, domain),
             sized(second, domain)
         )
     } else if design.bic_ahead.abs() < TWIN {
         format!(
-            "The records that there are leave it open: {} and {} fit alike.",
+            "The existing records leave it open: {} and {} fit alike.",
             sized(first, domain),
             sized(second, domain)
         )
     } else {
         format!(
-            "The records that there are leave it open: {} fits best, the criterion of {} is higher by {ahead} alone.",
+            "The existing records leave it open: {} fits best, the criterion of {} is higher by {ahead} alone.",
             sized(first, domain),
             sized(second, domain)
         )
@@ -148,7 +148,7 @@ fn so_far(design: &Design) -> Vec<String> {
                 ""
             };
             said.push(format!(
-                "They do not call for {}: {called}{edge}. What is hardly there is hardly told from anything.",
+                "They do not support {}: {called}{edge}. An effect that is hardly present cannot be distinguished from others.",
                 named(alternative, domain)
             ));
         }
@@ -172,7 +172,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     };
     if design.twins() {
         said.push(format!(
-            "{} tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters shows what {} would show.",
+            "{} tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters gives nearly the response of {}.",
             if design.effort.left_out.is_empty() {
                 "No experiment within these limits"
             } else {
@@ -256,7 +256,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     }
     if let Some(second) = &design.second_sensor {
         said.push(format!(
-            "With {} measured too, with the same noise: in records like those that there are {} (instead of {}), in the best experiment {}.",
+            "With {} measured too, with the same noise: in records like the existing ones {} (instead of {}), in the best experiment {}.",
             domain.level_words(&second.level),
             with_power(&second.existing_with),
             with_power(&second.existing_without),

@@ -66,7 +66,7 @@ pub struct Diagnosis {
     pub effects: Vec<String>,
     /// For each of them itself, then all that cannot be told apart from it on these data, best first.
     pub groups: Vec<Vec<String>>,
-    /// For each of them whether it is in doubt: its size ends at the edge of what is plausible, so that it describes the data
+    /// For each of them whether it is uncertain: its size is at a bound of its plausible range, so that it describes the data
     /// rather than explains them.
     pub in_doubt: Vec<bool>,
     /// For each of them the places where it may act, most likely first; one where there is no choice.

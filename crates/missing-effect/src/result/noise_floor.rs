@@ -58,7 +58,10 @@ impl Floors {
     pub fn of_what_is_new(mut self) -> Self {
         for floor in &mut self.0 {
             floor.level = floor.innovation;
-            floor.source = format!("what the past of {} does not predict", floor.source);
+            floor.source = format!(
+                "innovation of {}: the part that its past does not predict",
+                floor.source
+            );
         }
         self
     }

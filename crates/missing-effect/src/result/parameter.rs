@@ -13,7 +13,7 @@ pub struct Parameter {
     /// The estimate, in `unit`.
     #[serde(deserialize_with = "crate::result::number")]
     pub value: f64,
-    /// Its standard error, in `unit`; `None` where the data do not determine it or it sits at a bound.
+    /// Its standard error, in `unit`; `None` where the data do not determine it or it is at a bound.
     pub std_error: Option<f64>,
     /// Unit, for example `cm^2.5/s`.
     pub unit: String,

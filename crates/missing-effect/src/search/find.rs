@@ -120,11 +120,7 @@ pub(crate) fn find<'a>(
     let wandering = wanders(&richest, &noise);
     let by_simulation = wandering && !confirmed.added.is_empty();
     let mut prewhitened = None;
-    if noise.order() > 0
-        && !base
-            .setup
-            .leaves_out("the search in the weighting of the noise")
-    {
+    if noise.order() > 0 && !base.setup.leaves_out("the prewhitened search") {
         // The noise's colour is known now: the search is repeated in its metric. Where the residual wanders this is no less
         // called for: to the simulation error a slow noise looks like many effects, and the true one may not be among the
         // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken; and of many

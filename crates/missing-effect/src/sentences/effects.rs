@@ -41,7 +41,7 @@ pub(super) fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
                     }),
             };
             let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
-                " In doubt: its size stands at a bound of what is plausible, so it describes the data rather than explains them."
+                " Uncertain: its size is at a bound of its plausible range, so it may describe the data without being the cause."
             } else {
                 ""
             };
@@ -95,7 +95,7 @@ pub(super) fn of_acceptance(acceptance: &Acceptance) -> Option<String> {
         format!(", {:.0} % on held-out data", 100.0 * share)
     });
     Some(format!(
-        "That is {:.0} % of the squared error above the noise floor{held_out}; {:.0} % would make it the whole answer.",
+        "That is {:.0} % of the squared error above the noise floor{held_out}; {:.0} % are needed to accept it as the explanation.",
         100.0 * share,
         100.0 * acceptance.required
     ))

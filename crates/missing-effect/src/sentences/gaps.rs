@@ -53,7 +53,7 @@ pub(crate) fn of_gaps(mended: &MendedGaps) -> Option<String> {
     }
     if cut > 0 {
         text += &format!(
-            "; the simulation begins anew behind {cut}, where holding would take longer than {:.0} % of the fastest time constant ({})",
+            "; the simulation restarts after {cut}, where the input would have to be held longer than {:.0} % of the fastest time constant ({})",
             100.0 * LONGEST_HOLD,
             duration(mended.time_constant)
         );

@@ -26,7 +26,7 @@ pub(crate) fn of_a_part(last: &Node) -> String {
         .map(|placed| placed.effect.id.to_string())
         .collect();
     format!(
-        "What comes nearest by more than chance, a course of time aside, is {}, which leaves {}: too much would be left that is not noise, so it is not taken for the answer.",
+        "The best significant effect, apart from functions of time, is {}, with a residual of {}: this residual is not noise, so the effect is not accepted.",
         list(&names, "and"),
         rms(&PerOutput::of(outputs, &last.fit.rmse), &outputs[0].unit)
     )
@@ -58,7 +58,7 @@ pub(crate) fn of_rankings(rankings: &Rankings) -> Option<String> {
     let (white, prewhitened) = (rankings.white.first()?, rankings.prewhitened.first()?);
     rankings.disagree.then(|| {
         format!(
-            "The weightings disagree: by the simulation error {white} is the best single effect, prewhitened by the noise model {prewhitened}; the second one looks at fast changes more."
+            "The weightings disagree: by the simulation error {white} is the best single effect, prewhitened by the noise model {prewhitened}; the prewhitened fit gives more weight to fast changes."
         )
     })
 }
@@ -71,7 +71,7 @@ pub(crate) fn of_courses(dropped: &[Placed]) -> Option<String> {
         .collect();
     (!names.is_empty()).then(|| {
         format!(
-            "{} would explain more, but so would some course of time, and something is left that is not noise: not taken for an answer.",
+            "{} would explain more, but so would a function of time, and the residual is not noise: not accepted.",
             list(&names, "and")
         )
     })
@@ -85,7 +85,7 @@ pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
             "Of {} starts {} the minimum that is shown: there may be a better one, and other values of the parameters.",
             step.starts,
             if step.starts_agree == 0 {
-                "around it none came as low as"
+                "no start around it came as low as"
             } else {
                 "one alone ended in"
             }
@@ -102,7 +102,7 @@ pub(crate) fn of_held_out(diagnosis: &Diagnosis) -> Option<String> {
     let times = step.weighted_rmse_test? / step.weighted_rmse;
     (times > CARRIES_OVER).then(|| {
         format!(
-            "On held-out data the simulation error is {} times as large: what was fitted does not carry over to that record.",
+            "On held-out data the simulation error is {} times as large: the fitted model does not hold for that record.",
             significant(times, 2)
         )
     })
@@ -122,7 +122,7 @@ pub(crate) fn of_terms(problem: &Problem) -> Option<String> {
 /// What the colour of the noise costs, where it costs something.
 pub(crate) fn of_the_colour(price: f64) -> Option<String> {
     (price >= 1.2).then(|| format!(
-        "The noise is coloured, and hides what white noise of the same size would show: an effect has to be about {} times larger to be seen. Smaller ones than the sizes under \"visible from\" may be there.",
+        "The noise is coloured: an effect has to be about {} times larger to be detected than in white noise of the same variance. Effects smaller than the sizes under \"visible from\" may be present.",
         significant(price, 2)
     ))
 }

@@ -46,13 +46,13 @@ pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> Strin
         name.map_or(String::new(), |record| format!(" (in {})", record.name))
     );
     match left.what {
-        Remains::Input => format!("the input still shows in {residual}"),
+        Remains::Input => format!("{residual} depends on the input"),
         Remains::Period(period) => format!(
-            "{residual} swings with a period of about {}, which noise does not: it may be a disturbance or {effect}",
+            "{residual} oscillates with a period of about {}, which noise does not explain: it may be a disturbance or {effect}",
             about(period)
         ),
         Remains::Instant(at, length) => format!(
-            "{residual} holds something sudden, {}, which noise does not: it may be a disturbance, a fault of the sensor or {effect}",
+            "{residual} has an abrupt change, {}, which noise does not explain: it may be a disturbance, a fault of the sensor or {effect}",
             if length > 0.0 {
                 diagnosis.clock.span(at, at + length)
             } else {
@@ -60,11 +60,11 @@ pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> Strin
             }
         ),
         Remains::Level => format!(
-            "{residual} follows the {}, which noise does not: the balance lacks {effect}",
+            "{residual} depends on the {}, which noise does not explain: the balance lacks {effect}",
             diagnosis.domain().level_words("level")
         ),
         Remains::Slow(wander, process) => format!(
-            "{residual} wanders as slowly as the process, or more: its correlation lasts {}, the slowest time constant is {}; it may be a disturbance or {effect}",
+            "{residual} drifts: its correlation time of {} reaches the slowest time constant, {}; it may be a disturbance or {effect}",
             if wander < record {
                 about(wander)
             } else {

@@ -35,7 +35,7 @@ pub(crate) fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> St
         );
     }
     if unknown.variable == "time" {
-        said += " and follows no variable of the plant, so that it is a function of time";
+        said += " and depends on no variable of the plant, so it is a function of time";
         if let Some(window) = unknown.windows.first() {
             said += &format!(
                 ": most {}, {} {} on average",

@@ -26,7 +26,7 @@ pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<St
             rms(&step.rmse_per_output, unit)
         ),
         (_, None) => format!(
-            "The model does not explain the data: its simulation error of {} holds more than noise.",
+            "The model does not explain the data: its simulation error of {} is more than noise.",
             rms(&step.rmse_per_output, unit)
         ),
         (_, Some(left)) => format!(
@@ -88,7 +88,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
             // A right model under a slow disturbance leaves this too.
             Some(left) if matches!(left.what, Remains::Slow(..)) => {
                 said.push(format!(
-                    "Nothing in the catalogue is called for, but what is left is not noise: {}.",
+                    "No effect of the catalogue is significant, but the residual is not noise: {}.",
                     left_over(left, first, diagnosis)
                 ));
                 let visible = visible(diagnosis);
@@ -100,7 +100,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
                 "Something is missing, and nothing in the catalogue explains it: {}.",
                 left.map_or_else(
                     || format!(
-                        "the residual of {} holds more than noise",
+                        "the residual of {} is more than noise",
                         rms(&first.rmse_per_output, unit)
                     ),
                     |left| left_over(left, first, diagnosis)

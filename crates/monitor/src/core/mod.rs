@@ -31,7 +31,7 @@ const STRETCH: usize = 2048;
 /// Half the width of the interval that holds a Gaussian value with a probability of 95 %.
 const BAND: f64 = 1.96;
 
-const OTHER_NUMBERS: &str = "its numbers are not those of this model";
+const OTHER_NUMBERS: &str = "its numbers do not belong to this model";
 
 /// Where the watching is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -33,7 +33,7 @@ impl Core<'_> {
             let every = self.now.every;
             self.begin(every);
             return Some(Notice::LearnsAnew {
-                why: "what was gathered before the long gap is no record with what follows",
+                why: "the rows before the long gap and the rows after it do not form one record",
             });
         };
         if let Phase::Alarmed(following) = &mut self.now.phase {
@@ -74,7 +74,7 @@ impl Core<'_> {
             let every = self.now.every;
             self.begin(every);
             fed.notice = Some(Notice::LearnsAnew {
-                why: "under these inputs the learned model leaves all bounds",
+                why: "under these inputs the learned model diverges",
             });
             fed.said = Some(said);
             return fed;

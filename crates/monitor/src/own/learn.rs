@@ -57,7 +57,7 @@ pub(super) fn learn(
         && !still.is_empty()
     {
         return Err(format!(
-            "every input has stood still ({}), which says nothing about the plant: move one",
+            "every input has stood still ({}), which does not excite the plant: move one",
             still.join(", ")
         ));
     }
@@ -75,10 +75,10 @@ pub(super) fn learn(
         let silent = (0..free.len()).filter(|&i| fit.triangle.column_norm(i) <= f64::MIN_POSITIVE);
         let silent: Vec<&str> = silent.map(|i| setup.names()[free[i]].as_str()).collect();
         return Err(if silent.is_empty() {
-            "the rows do not determine the parameters one without the other: give one of them under [known], give a [prior], or move the inputs more".into()
+            "the rows determine the parameters only in combination: give one of them under [known], give a [prior], or move the inputs more".into()
         } else {
             format!(
-                "{} leaves no trace in the rows: give it under [known], or move the inputs more",
+                "{} has no effect on the readings: give it under [known], or move the inputs more",
                 silent.join(", ")
             )
         });

@@ -1,4 +1,4 @@
-//! Tables I and II with few noises: all figures of the runs inside the bands of a reproduction, and what the paper's own text implies.
+//! Tables I and II with few noises: all figures of the runs inside the bands, and what the paper's own text implies.
 
 use paper_tables::Error;
 use paper_tables::baysse::{TRUTH, study};

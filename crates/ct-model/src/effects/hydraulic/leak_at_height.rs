@@ -27,7 +27,7 @@ end leak_at_height;
             Starts::Quantiles(&[0.9, 0.75, 0.5, 0.25, 0.1]),
         ),
     ],
-    physics: "A hole in the wall or a second outlet: above its height liquid leaves as Torricelli's law has it.",
+    physics: "A hole in the wall or a second outlet: liquid above its height leaves according to Torricelli's law.",
     confused_with: &["limit(h)", "varies_with(p,h)", "loss(h)"],
     confirm: "Fill the tank with the outlet closed: does the level fall, and where does it stop?",
     symptoms: &[

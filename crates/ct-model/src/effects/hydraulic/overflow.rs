@@ -22,7 +22,7 @@ end overflow;
         Role::Threshold,
         Starts::Quantiles(&[0.97, 0.9, 0.8, 0.65, 0.5, 0.35]),
     )],
-    physics: "The tank is full: what comes in beyond spills over the rim, into the tank below.",
+    physics: "The tank is full: further inflow spills over the rim, into the tank below.",
     confused_with: &["limit(h)", "saturation(y)", "leak_at_height(h)"],
     confirm: "Fill the upper tank and look.",
     symptoms: &["overflows", "spills into the tank below"],

@@ -48,7 +48,7 @@ impl Builder<'_> {
                 }
                 ("start" | "fixed", Attribute::Value(_)) => {
                     let what = format!(
-                        "{name} is of states; {} is none: write its value behind `=`, or delete {name}",
+                        "{name} is an attribute of states, and {} is not a state: write its value behind `=`, or delete {name}",
                         shown(&declaration.name)
                     );
                     return self.error(*from, what);
@@ -187,7 +187,8 @@ impl Builder<'_> {
                 _ => "",
             };
             if !matches!(self.names.all.get(name), Some(Variable::State(_))) {
-                let what = "on the left of an initial equation stands one state: write `x = ...;`";
+                let what =
+                    "the left side of an initial equation must be one state: write `x = ...;`";
                 return self.error(left.from, what);
             }
             if all.insert(name, right).is_some() {

@@ -47,8 +47,9 @@ impl<'a> Scope<'a> {
         let mut builder = self.builder(text);
         let Some((_, coefficient)) = differentiated(&left).filter(|(name, _)| *name == state)
         else {
-            let what =
-                format!("on the left of this equation stands `der({state})` or `c*der({state})`");
+            let what = format!(
+                "the left side of this equation must be `der({state})` or `c*der({state})`"
+            );
             return builder.error(left.from, what);
         };
         let coefficient = coefficient

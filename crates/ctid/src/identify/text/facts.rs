@@ -151,8 +151,8 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
         };
         let noise = match batch.noise {
             _ if open => "",
-            NoisePath::Loop => "; the noise circulates in the loop",
-            NoisePath::Record => "; the noise is on the record alone",
+            NoisePath::Loop => "; the controller feeds the noise back",
+            NoisePath::Record => "; the noise is added to the output only",
         };
         facts.push((
             "fit",
@@ -189,13 +189,13 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
 pub(crate) fn condition(condition: &Condition) -> String {
     let verdict = match condition.verdict {
         Verdict::Holds => {
-            "it holds if these estimates are the plant: then a recursion that keeps the filter of this start converges"
+            "it holds if these estimates are the true plant: then a recursion that keeps the filter of this start converges"
         }
         Verdict::Positive => {
-            "if these estimates are the plant it fails, but the real part stays above 0: a recursion that keeps the filter of this start usually converges"
+            "if these estimates are the true plant it fails, but the real part stays above 0: a recursion that keeps the filter of this start usually converges"
         }
         Verdict::Negative => {
-            "if these estimates are the plant it fails, and the real part falls below 0: a recursion that keeps the filter of this start may go the wrong way; renew the filter"
+            "if these estimates are the true plant it fails, and the real part falls below 0: a recursion that keeps the filter of this start may diverge; update the filter with the estimates"
         }
         Verdict::Unstable => "the loop of the estimates is not stable",
     };

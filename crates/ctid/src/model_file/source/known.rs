@@ -223,7 +223,7 @@ impl Source<'_> {
             self.at(
                 at,
                 format!(
-                    "disturbance = \"{}\" says nothing of where it flows in; write {}",
+                    "disturbance = \"{}\" is no tank; write {}",
                     quoted(name),
                     disturbed(plant).join(" or ")
                 ),
@@ -239,7 +239,7 @@ impl Source<'_> {
                 if !area_known {
                     return Err(self.at(
                         pipe.span().start,
-                        "pipe_area says nothing of the levels without the area of the tanks; give area too, in the same unit",
+                        "pipe_area has no effect on the levels without the area of the tanks; give area too, in the same unit",
                     ));
                 }
                 let section = self.positive("pipe_area", pipe)?;

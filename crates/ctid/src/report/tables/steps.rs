@@ -71,7 +71,7 @@ pub(crate) fn parameters(diagnosis: &Diagnosis) -> String {
         &format!("<tr><th scope=\"col\">Parameter</th><th scope=\"col\">Unit</th>{heads}</tr>"),
         &rows,
         &format!(
-            "The last model first. Estimate ± standard error; * : the data do not determine it, or it sits at a bound. \
+            "The last model first. Estimate ± standard error; * : the data do not determine it, or it is at a bound. \
              A minimum that one start alone has reached may not be the best one.{held_out}"
         ),
     )

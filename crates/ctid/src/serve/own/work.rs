@@ -167,7 +167,8 @@ impl Work {
         let id = session.number();
         let json = serde_json::to_string(found).unwrap_or_default();
         let Ok(findings) = Findings::of_text(&json) else {
-            return session.fail("the diagnosis cannot be kept, which is a fault of ctid".into());
+            return session
+                .fail("the diagnosis cannot be saved because of an error in ctid".into());
         };
         let diagnosed = Diagnosed {
             id,

@@ -250,9 +250,9 @@ function words() {
   $("own-weighted").textContent = `Root mean square; the model is simulated, and never corrected by a reading.${body.outputs.length > 1 ? ` Together ${body.weighted} times the noise's innovations.` : ""}`;
   table($("own-parameters"), [["Parameter"], ["Estimate", true], ["± standard error", true], ["Unit"]],
     body.parameters.map((one) => [make("code", {}, one.name), one.value, one.error ?? (one.known ? "known" : "–"), units(one.unit)]));
-  $("own-starts").textContent = `${body.starts_agree} of ${body.starts} starts ended in this minimum. –: the data do not determine it, or it sits at a bound.`;
+  $("own-starts").textContent = `${body.starts_agree} of ${body.starts} starts ended in this minimum. –: the data do not determine it, or it is at a bound.`;
   fill($("own-untold"), body.not_determined.map((of) => make("p", { className: "warning" },
-    of.includes(",") ? `These records do not tell ${of} one without the other: give one of them under [known], or a [prior].` : `${of} leaves no trace in these records: give it under [known], or excite the plant more.`)));
+    of.includes(",") ? `These records do not tell ${of} one without the other: give one of them under [known], or a [prior].` : `${of} has no effect on the readings of these records: give it under [known], or excite the plant more.`)));
 }
 
 const inUnit = (name, unit) => plots.named(plots.plain(name), plots.pretty(unit));

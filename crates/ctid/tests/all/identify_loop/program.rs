@@ -42,7 +42,10 @@ fn the_program_writes_what_it_prints() {
         let text = place.succeeds(&format!(
             "identify loop.csv --model loop.toml --method {method} --json out.json --report out.html"
         ));
-        assert!(text.contains("The loop, and the way there"), "{text}");
+        assert!(
+            text.contains("The loop, and how it was estimated"),
+            "{text}"
+        );
         for line in text.lines() {
             assert!(line.chars().count() <= 80, "wider than 80: {line}");
         }

@@ -47,7 +47,7 @@ fn what_three_tanks_lack_is_said() {
         ),
         (
             three("pipe_area = 0.5\ngravity = 981"),
-            "tank.toml:4: pipe_area says nothing of the levels without the area of the tanks",
+            "tank.toml:4: pipe_area has no effect on the levels without the area of the tanks",
             "give area too",
         ),
         (

@@ -74,7 +74,7 @@ pub(super) fn sentences(located: &Located, residual: &[f64], failures: &Failures
     }
     if sentences.is_empty() {
         sentences.push(format!(
-            "nowhere in particular: no window, {level}, flow or direction stands out of the noise"
+            "no region stands out: in no window, {level}, flow or direction does the error exceed the noise"
         ));
     }
     sentences

@@ -48,7 +48,7 @@ fn place_name(structure: &Structure, spot: Spot) -> String {
 }
 
 /// What is left out where the time limit has passed.
-pub(crate) const PART: &str = "the shape of what is not explained";
+pub(crate) const PART: &str = "the shape of the unexplained error";
 
 /// The missing term beside a fitted node; `None` where nothing moves, and where the time limit of its setup passes: what was looked at by
 /// then says nothing of the other places and variables.

@@ -6,18 +6,19 @@ use nalgebra::SVector;
 use crate::projection::check_box;
 use crate::{Error, Relation, Row, project_box};
 
-/// How estimates are kept to their bounds.
+/// How the estimates are kept within their bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Keep {
     /// Moved to the nearest point of the box, in the metric of what is known: [`project_box`].
     Projection,
-    /// Each entry that is outside is set to its bound, and the others stay. Simple, as simulations in the literature have it; but the
-    /// Lyapunov function may grow, and correlated parameters are left where they do not belong.
+    /// Clipping: each entry outside its bounds is set to the bound, and the others do not change. Literature on simulations uses this rule.
+    /// The Lyapunov function may grow, and correlated parameters are not corrected.
     Clamp,
     /// Pulled back where outside: a row's penalty for each bound that is violated, relaxed exactly over the step.
     Penalty {
-        /// As of a [`Row`]: well above the mean squared error of the output; 1e3 of it does, 1 of it is useless.
+        /// Weight of the penalty, as of a [`Row`]: choose it well above the mean squared error of the output. For example 1e3 times this
+        /// error works, and 1 times does not.
         weight: f64,
     },
 }
@@ -54,7 +55,7 @@ impl<const P: usize> Bounds<P> {
         }
     }
 
-    /// The same box, kept to in this way.
+    /// The same box with the given way of enforcing it.
     ///
     /// # Errors
     /// [`Error::Weight`] for a penalty's.

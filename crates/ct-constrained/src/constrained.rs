@@ -66,7 +66,7 @@ pub struct ConstrainedRls<const P: usize, const R: usize> {
     free_gamma: bool,
 }
 
-/// `b` of the last step, kept while `eta` and `h` stay as they are.
+/// `b` of the last step; valid while `eta` and `h` do not change.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     eta: f64,

@@ -1,10 +1,10 @@
-//! What can be wrong with a constraint: each message carries the numbers that disagree and the mend.
+//! Errors of constraints: each message contains the numbers that disagree and the correction.
 
 /// Everything this crate can refuse.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// From the estimator inside.
+    /// An error of the recursive least-squares estimator inside.
     #[error(transparent)]
     Rls(#[from] ct_rls::Error),
     /// The weights of the data are no least squares, so that constraints would bias the estimates.

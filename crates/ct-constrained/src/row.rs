@@ -1,4 +1,4 @@
-//! One linear statement about the parameters, `f' theta = chi` or `f' theta <= chi`, and its weight.
+//! One linear constraint on the parameters, `f' theta = chi` or `f' theta <= chi`, and its weight.
 
 use ct_rls::{ContinuousRls, Integrator, MAX_REGRESSOR, RecursiveEstimator};
 use nalgebra::SVector;
@@ -8,7 +8,7 @@ use crate::Error;
 /// A tenth of what the estimator takes for an output error.
 const MAX_CHI: f64 = 1e99;
 
-/// What a row says.
+/// Equality or inequality.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Relation {
@@ -20,7 +20,7 @@ pub enum Relation {
     AtLeast,
 }
 
-/// One linear statement about `P` parameters. `f` and `chi` may vary in time: give the row again.
+/// One linear constraint on `P` parameters. `f` and `chi` may vary in time: then pass the row again at each sample.
 ///
 /// How large a weight? A row is soft. Over a second it pulls as `w`, the data as `c`, so an equality row wants `w` well above
 /// `c |phi|^2/|f|^2`. A penalty, which leaves `P` as it is, wants `w` much above the mean squared error of the output: at 1 it
@@ -151,7 +151,7 @@ impl<const P: usize> Row<P> {
         self.gamma == Self::least_squares_gamma(self.relation, self.weight)
     }
 
-    /// What the row says.
+    /// Whether the row is an equality or an inequality.
     pub fn relation(&self) -> Relation {
         self.relation
     }
@@ -166,7 +166,7 @@ impl<const P: usize> Row<P> {
         }
     }
 
-    /// Where the row is violated, pulls the estimates towards it for `dt` seconds with its weight, exactly, and leaves `P` as it is.
+    /// If the row is violated, pulls the estimates towards it for `dt` seconds with its weight, exactly. `P` does not change.
     pub fn penalize<I: Integrator>(&self, rls: &mut ContinuousRls<P, I>, dt: f64) {
         if self.violation(rls.theta()) != 0.0 {
             rls.relax(&self.f, self.chi, self.weight * dt);

@@ -1,5 +1,4 @@
-//! What can be wrong with a system, a setting or a sample: each message names what it is about, the numbers that
-//! disagree and the mend, in one line.
+//! Errors of systems, settings and samples: each message names the object, the numbers that disagree and the correction, in one line.
 
 /// Everything this crate can refuse.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -8,7 +7,7 @@ pub enum Error {
     /// NaN or an infinity where a number is needed.
     #[error("{what}: entry {index} is {value}; give finite numbers")]
     NotFinite {
-        /// What was given.
+        /// The object that was given.
         what: &'static str,
         /// Which entry of it, from 0.
         index: usize,
@@ -102,7 +101,7 @@ pub enum Error {
     Overflow {
         /// What was being computed.
         what: &'static str,
-        /// What to do.
+        /// The correction, in words.
         mend: &'static str,
     },
     /// The roots were not found.

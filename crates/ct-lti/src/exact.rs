@@ -235,7 +235,7 @@ fn negative_remainder(mut a: Vec<BigInt>, b: &[BigInt]) -> Vec<BigInt> {
     primitive(a.iter().map(|a| -a).collect())
 }
 
-/// The same over the greatest common divisor of its entries.
+/// The polynomial divided by the greatest common divisor of its coefficients.
 fn primitive(c: Vec<BigInt>) -> Vec<BigInt> {
     let mut divisor = BigUint::ZERO;
     for c in &c {

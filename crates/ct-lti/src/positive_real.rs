@@ -26,7 +26,7 @@ use crate::error::finite;
 use crate::exact::Exact;
 use crate::{Error, Polynomial, TransferFunction};
 
-/// What [`TransferFunction::exceeds`] found.
+/// Result of [`TransferFunction::exceeds`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Positivity {
@@ -54,7 +54,7 @@ impl Positivity {
         matches!(self, Self::Strict | Self::StrictBelowInfinity)
     }
 
-    /// Whether the condition holds with something to spare at infinity too: [`Positivity::Strict`].
+    /// Whether the condition holds with a positive margin at infinite frequency too: [`Positivity::Strict`].
     pub fn is_strict(self) -> bool {
         self == Self::Strict
     }
@@ -131,7 +131,7 @@ fn real_part(p1: &Exact, p2: &Polynomial, d: f64, scale: i64) -> Exact {
 
 /// Whether every coefficient of N, up to the order, is above 0 beyond the rounding of `f64`.
 fn positive_by_signs(p1: &Polynomial, p2: &Polynomial, d: f64, order: usize) -> bool {
-    // No product of three of these loses digits at the ends of the range.
+    // With coefficients in this range, a product of three of them neither overflows nor underflows.
     let moderate = |c: &f64| *c == 0.0 || (1e-90..1e90).contains(&c.abs());
     let mut all = p1
         .coefficients()
@@ -194,7 +194,7 @@ fn witness(n: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// What is far from the border is decided without long integers; what is not is left to them.
+    /// Cases far from the boundary are decided in floating point; only the others use long integers.
     #[test]
     fn signs_decide_what_is_clear() {
         let poly = |c: &[f64]| Polynomial::new(c).unwrap();

@@ -14,7 +14,7 @@
 
 use crate::{Error, StateVariableFilter};
 
-/// What is left of a gap where it counts as forgotten.
+/// A gap is forgotten when its influence on the filter's states has decayed to this share.
 const FORGOTTEN: f64 = 0.01;
 
 /// Filters readings, NaN among them.
@@ -24,7 +24,7 @@ pub struct ReadingFilter {
     /// The longest line, and the filter's memory \[time\].
     longest: f64,
     memory: f64,
-    /// Since the last reading, and whether one was missing.
+    /// Time since the last reading, and whether a reading was missing.
     since: f64,
     missed: bool,
     /// Time for which rows are left out yet.
@@ -32,7 +32,7 @@ pub struct ReadingFilter {
 }
 
 impl ReadingFilter {
-    /// Of a filter of the output.
+    /// For a filter of the output.
     #[must_use]
     pub fn new(filter: StateVariableFilter) -> Self {
         let n = filter.order();
@@ -134,7 +134,7 @@ mod tests {
         }
     }
 
-    /// Behind a gap of 6 at a bandwidth of 0.3: rows come again after 6.64/0.3 = 22.1.
+    /// After a gap of 6 at a bandwidth of 0.3, rows are used again after 6.64/0.3 = 22.1.
     #[test]
     fn rows_behind_a_long_gap_are_left_out() {
         let mut readings = ReadingFilter::new(filter(2, 0.3));

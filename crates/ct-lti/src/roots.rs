@@ -221,12 +221,12 @@ fn aberth(c: &[f64]) -> Result<Vec<Complex64>, Error> {
             iterations: ITERATIONS,
         });
     }
-    // Then on with twice the digits. Steps may go on in the last digit of z for ever; more than these are never needed.
+    // Then continue with twice the digits. Steps may alternate in the last digit of z for ever; this number of steps is always enough.
     settle(true, 30);
     Ok(conjugate(roots))
 }
 
-/// One step of one root; whether it is worth another.
+/// One iteration of one root; returns whether another iteration is worthwhile.
 fn improve(c: &[f64], roots: &mut [Complex64], i: usize, fine: bool) -> bool {
     let z = roots[i];
     let Some(step) = newton(c, z, fine) else {
@@ -271,10 +271,10 @@ fn starts(c: &[f64]) -> Vec<Complex64> {
     starts
 }
 
-/// Each root beside the one that is nearest to its conjugate, itself included: real, or a pair.
+/// Pairs each root with the root nearest to its conjugate. A root that is paired with itself is real.
 fn conjugate(mut open: Vec<Complex64>) -> Vec<Complex64> {
     let mut roots = Vec::with_capacity(open.len());
-    // Those farthest from the axis first: they cannot be mistaken for real ones.
+    // Roots with the largest imaginary part first: they cannot be mistaken for real ones.
     open.sort_by(|a, b| a.im.abs().total_cmp(&b.im.abs()));
     while let Some(z) = open.pop() {
         let partner = (0..open.len())

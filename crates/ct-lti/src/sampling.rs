@@ -95,7 +95,7 @@ pub(crate) struct Sampler {
     b: Vec<f64>,
     hold: Hold,
     remembered: [Sampled; REMEMBERED],
-    /// Which is overwritten next.
+    /// Index of the entry that is overwritten next.
     oldest: usize,
     /// The state being computed; between steps the one before the last step.
     next_state: Vec<f64>,
@@ -177,7 +177,7 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// With all states at 0 and no sample seen.
+    /// Starts with all states at 0 and no sample.
     pub fn new(system: StateSpace, hold: Hold) -> Self {
         Self {
             sampler: Sampler::new(system.a(), system.b(), hold),

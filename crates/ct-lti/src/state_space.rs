@@ -134,7 +134,7 @@ impl StateSpace {
         Self::connected(a, b.collect(), c.collect(), next.d * self.d)
     }
 
-    /// One input drives both, the outputs are added; states are those of self, then those of other.
+    /// Parallel connection: one input drives both systems, and the outputs are added. The states of self come first, then those of other.
     ///
     /// # Errors
     /// [`Error::Overflow`].
@@ -161,7 +161,7 @@ impl StateSpace {
         let (e, y) = (join(-k * back.d, -k), join(k, -k * self.d));
         let mut a = self.beside(back);
         for i in 0..order {
-            // What drives state i: e for those of self, y for those of back.
+            // Input of state i: e for the states of self, y for the states of back.
             let (gain, drive) = if i < n {
                 (self.b[i], &e)
             } else {

@@ -110,7 +110,7 @@ impl StateVariableFilter {
         Self::new(&factor.pow(order), hold)
     }
 
-    /// The same, with this past before its first sample.
+    /// The same filter with the given past before its first sample.
     #[must_use]
     pub fn starting(mut self, start: Start) -> Self {
         self.start = start;

@@ -71,7 +71,7 @@ impl Function {
         Self::Quantise,
     ];
 
-    /// Its name in a text.
+    /// Name of the function in a model text.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -93,7 +93,7 @@ impl Function {
         }
     }
 
-    /// How many arguments it takes.
+    /// Number of arguments of the function.
     #[must_use]
     pub fn arguments(self) -> usize {
         match self {
@@ -103,7 +103,7 @@ impl Function {
     }
 }
 
-/// How two numbers compare.
+/// Comparison of two numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Comparison {
     /// `a < b`.
@@ -120,7 +120,7 @@ pub enum Comparison {
     NotEqual,
 }
 
-/// Something that is true or false.
+/// A Boolean expression.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Condition {
     /// `true` or `false`.
@@ -157,7 +157,7 @@ pub enum Expression {
 }
 
 impl Expression {
-    /// Shows every variable, each as often as it stands.
+    /// Calls `each` for every occurrence of a variable.
     pub fn each_variable(&self, each: &mut impl FnMut(Variable)) {
         match self {
             Self::Number(_) | Self::Time => {}
@@ -188,7 +188,7 @@ impl Expression {
             }
     }
 
-    /// The same with other expressions in the place of variables.
+    /// The expression with other expressions substituted for its variables.
     #[must_use]
     pub fn with(&self, of: &impl Fn(Variable) -> Self) -> Self {
         let part = |a: &Self| Box::new(a.with(of));
@@ -228,7 +228,7 @@ impl Expression {
                 let a = argument(0);
                 match function {
                     Function::Abs => a.abs(),
-                    // Of zero it is zero, as Modelica has it.
+                    // The sign of zero is zero, as in Modelica.
                     Function::Sign if a == 0.0 => 0.0,
                     Function::Sign => a.signum(),
                     Function::Sqrt => a.sqrt(),
@@ -309,7 +309,7 @@ impl Condition {
         }
     }
 
-    /// Whether it holds where variables have these values.
+    /// Whether the condition is true for these values of the variables.
     #[must_use]
     pub fn holds(&self, time: f64, of: &impl Fn(Variable) -> f64) -> bool {
         match self {

@@ -27,7 +27,7 @@ pub struct LinearForm {
     pub d: Vec<Vec<f64>>,
     /// Slope of each state where states and inputs are zero, `e`.
     pub state_offset: Vec<f64>,
-    /// Each output where states and inputs are zero, `f`.
+    /// Value of each output when states and inputs are zero, `f`.
     pub output_offset: Vec<f64>,
 }
 
@@ -122,7 +122,7 @@ impl Model {
         if !tape.delays.is_empty() {
             return None;
         }
-        // One direction at a time: the derivatives by the state or the input at this position.
+        // One direction at a time: the derivatives with respect to the state or the input at this position.
         let column = |moved: Option<Register>| -> (Vec<Dual<1>>, Vec<Dual<1>>) {
             let parameters: Vec<_> = parameters.iter().map(|p| Dual::constant(*p)).collect();
             let mut registers = tape.registers(&parameters);

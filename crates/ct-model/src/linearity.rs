@@ -15,7 +15,7 @@ pub enum Linearity {
     },
 }
 
-/// How something depends on states, inputs and time.
+/// How an expression depends on states, inputs and time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Degree {
     /// Parameters alone.
@@ -34,7 +34,7 @@ impl ModelSpec {
             flows[i] = degree(&self.flows[i].value, &flows);
             if flows[i] == Degree::Other {
                 equations.push(Variable::Flow(i));
-                // What uses it is no less linear for it: only the first place is named.
+                // Expressions that use this flow still count as linear: only the first nonlinear place is reported.
                 flows[i] = Degree::Linear;
             }
         }
@@ -56,7 +56,7 @@ impl ModelSpec {
 /// Whether the states can be computed exactly from row to row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ExactSteps {
-    /// Not linear, or they change with time.
+    /// Not linear, or time-varying.
     No,
     /// A constant matrix, and any function of the inputs: linear where these are held.
     HeldInputs,
@@ -100,7 +100,7 @@ impl ModelSpec {
     }
 }
 
-/// What a part of an equation is made of, with inputs that are held.
+/// Variables that a part of an equation depends on, with inputs held constant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Part {
     Parameters,
@@ -175,7 +175,7 @@ fn degree(expression: &Expression, flows: &[Degree]) -> Degree {
                 _ => constant_or_other(a.max(b)),
             }
         }
-        // It remembers, whatever goes into it.
+        // The function has memory, whatever its arguments are.
         Expression::Call(Function::Play, _) => Other,
         Expression::Call(_, arguments) => {
             constant_or_other(arguments.iter().map(of).max().unwrap_or(Constant))

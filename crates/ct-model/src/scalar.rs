@@ -2,8 +2,8 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What the simulator needs of a number. Comparisons are made on [`Scalar::value`], so a branch is
-/// taken by the value alone and the derivative follows the branch.
+/// Number type of the simulator. Comparisons use [`Scalar::value`]: the value alone selects a branch, and the derivative is that of the
+/// selected branch.
 pub trait Scalar:
     Copy
     + Send

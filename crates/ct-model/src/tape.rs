@@ -15,7 +15,7 @@ pub(crate) use self::guard::Guard;
 use self::operation::{Operation, run};
 use crate::scalar::Scalar;
 
-/// Where a number stands.
+/// Index of a value in the registers.
 pub(crate) type Register = usize;
 
 /// The operations of a model.
@@ -28,7 +28,7 @@ pub(crate) struct Tape {
     pub states: usize,
     constants: Vec<f64>,
     operations: Vec<Operation>,
-    /// So many of the first operations need parameters alone.
+    /// Number of operations at the beginning that depend on parameters alone.
     once: usize,
     branches: Vec<Branch>,
     pub guards: Vec<Guard>,
@@ -38,18 +38,18 @@ pub(crate) struct Tape {
     pub outputs: Vec<Register>,
     /// The initial value of each state as the text has it.
     pub starts: Vec<Register>,
-    /// What is delayed, and by how much.
+    /// Delayed signals and their dead times.
     pub delays: Vec<(Register, Register)>,
     pub plays: Vec<Play>,
     /// States whose initial value is that of their start at the first row.
     pub settled: Vec<usize>,
-    /// Something reads the time.
+    /// Whether an operation reads the time.
     pub reads_time: bool,
-    /// What guards read.
+    /// Registers that guards read.
     read_by_guards: Vec<Register>,
     /// Registers that are made of parameters and inputs alone.
     pub of_inputs: Vec<bool>,
-    /// What anything reads.
+    /// Registers that any operation reads.
     read_by_all: Vec<Register>,
     first_delayed: Register,
     first_constant: Register,
@@ -59,14 +59,14 @@ pub(crate) struct Tape {
 /// A play: `min(max(held, x - b), x + b)`, where `held` is what it gave at the last row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Play {
-    /// What goes in.
+    /// Register of the delay's input.
     pub from: Register,
     pub held: Register,
-    /// What it gives.
+    /// Register of the delay's output.
     pub to: Register,
 }
 
-/// What a tape computes with.
+/// Registers of a tape, with their values.
 #[derive(Debug, Clone)]
 pub(crate) struct Registers<T> {
     pub values: Vec<T>,
@@ -75,15 +75,15 @@ pub(crate) struct Registers<T> {
     taken: Vec<bool>,
     /// The operations, and where their results go, that the taken branches leave: those that slopes need, ...
     slopes: Vec<(Operation, Register)>,
-    /// ... of these what moves where all inputs are held, ...
+    /// ... the operations whose results change although all inputs are held, ...
     moving: Vec<(Operation, Register)>,
-    /// ... what guards need beside the slopes, what outputs need beside both, and all.
+    /// ... the operations that guards need in addition to the slopes, those that outputs need in addition to both, and all.
     guards: Vec<(Operation, Register)>,
     outputs: Vec<(Operation, Register)>,
     all: Vec<(Operation, Register)>,
     /// Numbers that have no derivatives: parameters, numbers of the text, and what is made of them.
     plain: Vec<bool>,
-    /// All inputs are held, and what is made of them and of parameters stands computed.
+    /// All inputs are held, and the results that depend on inputs and parameters only are computed.
     pub held: bool,
     /// Roots, powers and logarithms that have no value are zero: beyond a branch that a step has to end at.
     pub extended: bool,
@@ -130,7 +130,7 @@ impl Tape {
         registers
     }
 
-    /// Which registers are read once everything has its place.
+    /// Finds which registers are read, after all operations have their final order.
     fn note_results(&mut self) {
         let guards = self.guards.iter().map(|guard| guard.difference);
         self.read_by_guards = guards.collect();
@@ -224,14 +224,14 @@ impl Tape {
         into.reverse();
     }
 
-    /// Of each delay, whether what is delayed is made of inputs, parameters and the time alone.
+    /// For each delay, whether its signal depends on inputs, parameters and time alone.
     pub fn known_ahead(&self) -> Vec<bool> {
         let by_states = self.state(0)..self.first_constant;
         let known = self.made_of(|register| !by_states.contains(&register));
         self.delays.iter().map(|&(what, _)| known[what]).collect()
     }
 
-    /// Which registers are made of these alone, whatever branches are taken.
+    /// Registers that depend on these variables alone, for every choice of branches.
     fn made_of(&self, these: impl Fn(Register) -> bool) -> Vec<bool> {
         let mut made: Vec<bool> = (0..self.first_operation + self.operations.len())
             .map(these)
@@ -244,17 +244,17 @@ impl Tape {
         made
     }
 
-    /// Where inputs stand.
+    /// Register of an input.
     pub fn input(&self, i: usize) -> Register {
         1 + self.parameters + i
     }
 
-    /// Where states stand.
+    /// Register of a state.
     pub fn state(&self, i: usize) -> Register {
         1 + self.parameters + self.inputs + i
     }
 
-    /// Where delayed values stand.
+    /// Register of a delayed value.
     pub fn delayed(&self, i: usize) -> Register {
         self.first_delayed + i
     }
@@ -264,7 +264,7 @@ impl Tape {
         run(&registers.all, &mut registers.values, registers.extended);
     }
 
-    /// The same for the slopes of the states alone.
+    /// Evaluates the slopes of the states alone.
     pub fn evaluate_slopes<T: Scalar>(&self, registers: &mut Registers<T>) {
         let operations = if registers.held {
             &registers.moving
@@ -288,7 +288,7 @@ impl Tape {
         );
     }
 
-    /// The same, where every guard answers by its difference.
+    /// Evaluates the tape with the branch of every guard chosen by its present difference.
     pub fn evaluate_with_guards<T: Scalar>(&self, registers: &mut Registers<T>) {
         // A guard may stand on what another one decides: after as many rounds as there are guards none changes any more.
         for _ in 0..=self.guards.len() {
@@ -319,7 +319,7 @@ impl Tape {
         }
     }
 
-    /// Has the guards that stand on a difference answer for one of its sides.
+    /// Lets the guards whose difference is near zero choose one side.
     pub fn answer<T: Scalar>(
         &self,
         registers: &mut Registers<T>,
@@ -360,7 +360,7 @@ impl Tape {
         }
     }
 
-    /// Takes over the answers of other registers.
+    /// Copies the answers of the guards from other registers.
     pub fn copy_answers<T: Scalar, S>(&self, from: &Registers<S>, to: &mut Registers<T>) {
         to.answers.copy_from_slice(&from.answers);
         self.answers_changed(to);

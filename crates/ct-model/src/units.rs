@@ -17,12 +17,12 @@ pub struct UnitWarning {
     pub what: String,
 }
 
-/// What is known of a dimension.
+/// Knowledge of a dimension.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Known {
     /// A number: in a sum it takes that of the others.
     Number,
-    /// No unit is given, or it is not understood.
+    /// No unit is given, or the unit is unknown.
     Open,
     Is(Dimension),
 }
@@ -30,7 +30,7 @@ enum Known {
 const NONE: Dimension = Dimension::NONE;
 const TIME: Dimension = Dimension::TIME;
 
-/// All places at which units do not fit together, in the order of the equations.
+/// All places with inconsistent units, in the order of the equations.
 #[must_use]
 pub fn unit_warnings(model: &ModelSpec) -> Vec<UnitWarning> {
     let mut walk = Walk {
@@ -129,7 +129,7 @@ impl Walk<'_> {
         self.compare((&a, of_a), (&b, of_b))
     }
 
-    /// Of the argument of a function that takes pure numbers, and angles.
+    /// Dimension of the argument of a function that takes pure numbers or angles.
     fn pure(&mut self, function: Function, argument: &Expression) {
         if let Known::Is(dimension) = self.dimension(argument)
             && dimension != NONE

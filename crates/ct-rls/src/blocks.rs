@@ -168,7 +168,7 @@ const POINTS: [(f64, f64); 4] = [
 /// Pieces of the range where the error does not decay as for least squares.
 const PIECES: u32 = 8;
 
-/// What multiplies `P_i phi_i eps(0)` over the step.
+/// Factor of `P_i phi_i eps(0)` over the step.
 fn shares(
     (w1, step1, s1): (&Weights, &Step, f64),
     (w2, step2, s2): (&Weights, &Step, f64),

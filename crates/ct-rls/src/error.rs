@@ -1,4 +1,4 @@
-//! What can be wrong with a setting or a run: each message carries the numbers that disagree and the mend.
+//! Errors of settings and runs: each message contains the numbers that disagree and the correction.
 
 use crate::Outcome;
 
@@ -63,7 +63,7 @@ pub enum Error {
     NotPositiveDefinite {
         /// Which pivot of `P = U D U'`, from 0.
         index: usize,
-        /// Its value; it has to exceed the diagonal's rounding.
+        /// Value of the pivot; it has to exceed the rounding error of the diagonal.
         pivot: f64,
         /// The diagonal entry of `P(0)` in the same place.
         diagonal: f64,
@@ -93,7 +93,7 @@ pub enum Error {
         guard: &'static str,
         /// The value that was given.
         value: f64,
-        /// What would do.
+        /// The allowed range.
         range: &'static str,
     },
     /// `P(0)` is above the cap on its own trace.
@@ -111,7 +111,7 @@ pub enum Error {
         "{what} has {found} entries a side, but {expected} parameters are estimated; give it that size"
     )]
     Size {
-        /// What has the wrong size.
+        /// The quantity with the wrong size.
         what: &'static str,
         /// Its size.
         found: usize,

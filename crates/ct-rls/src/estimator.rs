@@ -1,4 +1,4 @@
-//! What every recursive estimator offers.
+//! Interface of every recursive estimator.
 
 use crate::Error;
 
@@ -10,7 +10,7 @@ pub trait RecursiveEstimator {
     type Theta: ?Sized;
     /// The matrix that stands for their covariance.
     type Covariance;
-    /// Why a run has stopped.
+    /// Reason why a run has stopped.
     type Error;
 
     /// Advances the estimates by `dt` seconds (above 0) over which `sample` is held.
@@ -25,14 +25,14 @@ pub trait RecursiveEstimator {
     /// The matrix `P`, symmetric.
     fn covariance(&self) -> Self::Covariance;
 
-    /// How the estimator fares. Costs an eigenvalue problem: call it now and then.
+    /// State of the estimator. The call solves an eigenvalue problem: use it only now and then.
     ///
     /// # Errors
     /// Why the run has stopped, where it has.
     fn health(&self) -> Result<Health, Self::Error>;
 }
 
-/// What one sample said.
+/// Result of one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Innovation {
@@ -40,12 +40,12 @@ pub struct Innovation {
     pub epsilon: f64,
     /// `s = phi' P phi` before the update; times `gamma h` it says how much is learnt: above 1, much.
     pub s: f64,
-    /// What was done with the sample.
+    /// Whether and how the sample was used.
     pub outcome: Outcome,
 }
 
 impl Innovation {
-    /// The same where the sample was used; where it was refused, the refusal as an error, for `?`.
+    /// The innovation if the sample was used; the reason as an error if it was rejected, for `?`.
     ///
     /// # Errors
     /// [`Error::Refused`]; the estimates are as before the sample.
@@ -68,7 +68,7 @@ impl Innovation {
     }
 }
 
-/// What an update did.
+/// Outcome of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -112,7 +112,7 @@ impl Outcome {
     }
 }
 
-/// How an estimator fares.
+/// Numerical state of an estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Health {

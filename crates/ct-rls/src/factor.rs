@@ -148,7 +148,7 @@ pub(crate) fn absorb(u: &mut [f64], d: &mut [f64], f: &[f64], a: f64, growth: f6
     }
 }
 
-/// One exact step on `theta` and the factors; `None`, and nothing changed, where a number leaves the range.
+/// One exact step of `theta` and the factors; `None`, with no change, if a number overflows.
 #[inline(always)]
 pub(crate) fn exact_step(
     (u, d, theta): (&mut [f64], &mut [f64], &mut [f64]),
@@ -222,7 +222,7 @@ pub(crate) fn largest_eigenvalue(m: &mut [f64], p: usize) -> f64 {
 /// For estimators built on top of this crate's; a user reads [`covariance`](crate::RecursiveEstimator::covariance).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UdFactor<const P: usize> {
-    /// By columns; only the part above the diagonal counts.
+    /// Stored by columns; only the part above the diagonal is used.
     pub(crate) u: [[f64; P]; P],
     pub(crate) d: [f64; P],
 }

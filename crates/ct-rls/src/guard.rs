@@ -1,4 +1,4 @@
-//! What stands around every step, however `P` is kept: the guards, the counts, and why a run has stopped.
+//! Checks around every step for every representation of `P`: the guards, the counts, and the reason why a run has stopped.
 
 use crate::Error;
 use crate::estimator::{Health, Outcome};
@@ -25,7 +25,7 @@ pub(crate) struct Guard {
     silent: u64,
 }
 
-/// How often what happened.
+/// Counts of events.
 #[cfg(feature = "serde")]
 #[derive(Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Counts {

@@ -35,7 +35,7 @@ impl Rule for Rk4 {
             return Err(Refusal::NotFinite);
         }
         let (eta, gamma, c, h) = (step.eta(), weights.gamma(), weights.c(), step.dt);
-        // theta^ moves by `shift`, so that eps - shift' phi is the error along the way
+        // theta^ changes by `shift`, so eps - shift' phi is the error at the intermediate points.
         let (mut at, mut shift) = (*state, [0.0; P]);
         let (mut next, mut moved) = (state.0, [0.0; P]);
         for (reach, share) in [

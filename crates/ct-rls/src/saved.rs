@@ -21,7 +21,7 @@ use crate::{ContinuousRls, Error, FactoredIntegrator, Guards, UdFactor, Weights}
 /// A `bound` of the guards may be below the trace by as much, relative to it, by rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// What is written, in vectors of any kind.
+/// The saved fields, in vectors of any type.
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "Rls")]
 #[serde(bound(
@@ -34,7 +34,7 @@ struct Saved<V, U, I> {
     /// Above the diagonal, by columns.
     u: U,
     d: V,
-    /// Of the random walk; `None` of an integrator without one.
+    /// Intensity of the random walk; `None` for an integrator without one.
     intensity: Option<V>,
     weights: Weights,
     guards: Guards,
@@ -73,7 +73,7 @@ impl<I: FactoredIntegrator> Visitor<'_> for Name<I> {
     }
 }
 
-/// As many numbers as `N`.
+/// An array of `N` numbers.
 struct Entries<const N: usize>([f64; N]);
 
 /// The part of a matrix above its diagonal, by columns.

@@ -180,20 +180,20 @@ pub struct Step {
 /// A longer regressor is taken for a fault: within this and the other limits no number of updates leaves the floating-point range.
 pub const MAX_REGRESSOR: f64 = 1e30;
 pub(crate) const MAX_PHI_SQUARED: f64 = MAX_REGRESSOR * MAX_REGRESSOR;
-/// As above, for the output error.
+/// Largest output error.
 pub(crate) const MAX_EPSILON: f64 = 1e100;
-/// As above, for the step, s.
+/// Longest step, s.
 const MAX_DT: f64 = 1e30;
-/// As above, for `c`.
+/// Largest `c`.
 const MAX_C: f64 = 1e40;
-/// As above, for the trace of P; its pivots start above the inverse of it.
+/// Largest trace of P; its pivots start above the inverse of it.
 pub(crate) const MAX_TRACE: f64 = 1e100;
 
 /// Beyond this, one step forgets everything, and `e^{eta h}` leaves the floating-point range.
 const MAX_ETA_DT: f64 = 300.0;
 
 impl Step {
-    /// No step yet: matches none.
+    /// No step yet: equal to no step.
     pub fn none() -> Self {
         Self {
             eta: f64::NAN,

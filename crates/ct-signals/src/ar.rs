@@ -149,7 +149,7 @@ impl ArModel {
             let terms = self.coefficients.iter().zip(powers);
             terms.map(|(a, power)| a * power).collect()
         };
-        // All poles lie within a radius where the process with its poles divided by the radius is stationary.
+        // All poles are inside a radius if the process with its poles divided by the radius is stationary.
         let within = |factor: f64| {
             Self::from_coefficients(&scaled(factor / radius.max(f64::MIN_POSITIVE)), 1.0).is_ok()
         };
@@ -169,7 +169,7 @@ impl ArModel {
             .unwrap_or_else(|_| ArModel::white(self.sigma))
     }
 
-    /// The same colour with innovations of another standard deviation, `>= 0`.
+    /// The same autoregression with innovations of another standard deviation, `>= 0`.
     #[must_use]
     pub fn with_sigma(&self, sigma: f64) -> Self {
         ArModel {
@@ -178,7 +178,7 @@ impl ArModel {
         }
     }
 
-    /// Of partial correlations that are within -1..1.
+    /// Autoregression with these partial correlations, all within -1..1.
     pub(crate) fn of_stationary(reflections: &[f64], sigma: f64) -> Self {
         ArModel {
             reflections: reflections.to_vec(),
@@ -221,8 +221,9 @@ impl ArModel {
             .fold(self.sigma, |std, k| std / (1.0 - k * k).sqrt())
     }
 
-    /// How large a slow move of the signal is in the whitened signal, over the innovations' standard deviation, where the move is as large
-    /// as the process: `(1 - sum a_i) / sqrt(prod (1 - k_i^2))`. White noise: 1; noise with a long memory: less.
+    /// Gain of the whitening filter for a slow change of the signal: size of the change in the whitened signal over the innovations'
+    /// standard deviation, for a change as large as the standard deviation of the process. `(1 - sum a_i) / sqrt(prod (1 - k_i^2))`. White
+    /// noise: 1; noise with a long memory: less.
     pub fn slow_gain(&self) -> f64 {
         let at_zero = 1.0 - self.coefficients.iter().sum::<f64>();
         self.reflections

@@ -30,7 +30,7 @@ use crate::{ArModel, StationaryNoise};
 const STEP: f64 = 1e-6;
 /// Steps go at most so far towards the end of a partial correlation's range.
 const TO_BOUND: f64 = 0.9;
-/// Where fewer than this share of the samples have another one at some lag, the pairs of this lag give no start.
+/// If less than this share of the samples has a partner at some lag, the pairs of this lag give no start.
 const FEW_PAIRS: f64 = 0.1;
 /// Starts without pairs.
 const STARTS: [f64; 5] = [0.8, 0.4, 0.95, -0.8, -0.4];
@@ -72,8 +72,8 @@ pub(crate) fn fit(segments: &[&[f64]], n: usize, max_order: usize) -> ArModel {
     )
 }
 
-/// The same where each segment is the autoregression behind a system: `process` makes the process of both from an autoregression whose
-/// innovations have variance 1 and the segment's number.
+/// Fits the autoregression when each segment is the output of a system driven by it. `process` returns the process of both, given an
+/// autoregression with innovation variance 1 and the number of the segment.
 pub(crate) fn fit_behind(
     segments: &[&[f64]],
     n: usize,

@@ -1,9 +1,8 @@
-//! What can be wrong with the columns of a file. The mend depends on where the columns were named, which a caller may know
-//! better.
+//! Errors in the columns of a file. The correction depends on where the columns were named, which the caller knows.
 
 use crate::unit;
 
-/// What is wrong with a column, without the mend.
+/// An error of a column, without the correction.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum ColumnFault {
@@ -90,7 +89,7 @@ impl ColumnFault {
         }
     }
 
-    /// With the mend for a model file, whose `[columns]` names them.
+    /// The message with the correction for a model file, whose `[columns]` names the columns.
     pub(crate) fn in_model(&self) -> String {
         let mend = match self {
             Self::Missing { role, .. } => format!("set {role} = \"...\" under [columns]"),

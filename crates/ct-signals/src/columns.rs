@@ -27,17 +27,17 @@ pub struct Columns {
     pub outputs: Vec<String>,
     /// The set points. Guessed, one: `r`, `r_...`, `ref`, `reference`, `setpoint`; may be missing when none is named.
     pub references: Vec<String>,
-    /// How dates and times are written, as `strftime` has it: `%d.%m.%Y %H:%M:%S`. Without one it is found from the column.
+    /// Format of dates and times in the notation of `strftime`: `%d.%m.%Y %H:%M:%S`. Without it the format is found from the column.
     pub time_format: Option<String>,
     /// The zone of dates that do not say: `Europe/Berlin`, `UTC`, `+01:00`. UTC where it is absent.
     pub time_zone: Option<String>,
-    /// Words and numbers that stand in cells whose sample is missing, beside the usual ones: `-999`, `Offline`.
+    /// Words and numbers that mark a missing sample, in addition to the usual ones: `-999`, `Offline`.
     pub missing: Vec<String>,
     /// The model has no inputs: none is guessed. It follows from the model and is not written down.
     pub without_inputs: bool,
 }
 
-/// The same as a model file writes it: one name or a list of them.
+/// A column name as a model file writes it: one name or a list of names.
 #[derive(Deserialize, Serialize, Default)]
 #[serde(deny_unknown_fields, default)]
 struct Named {
@@ -137,19 +137,19 @@ impl From<Columns> for Named {
     }
 }
 
-/// What stands above a column.
+/// The header of a column.
 #[derive(Serialize, Clone, Debug, PartialEq, Eq)]
 pub struct Heading {
-    /// All of it.
+    /// The whole header.
     pub header: String,
-    /// Without the unit.
+    /// The header without the unit.
     pub name: String,
     /// The unit; empty where the header does not say.
     pub unit: String,
 }
 
 impl Heading {
-    /// From a header.
+    /// Splits a header.
     #[must_use]
     pub fn of(header: &str) -> Self {
         let (name, unit) = unit::split(header);
@@ -161,7 +161,7 @@ impl Heading {
     }
 }
 
-/// One column that was found.
+/// A column that was found.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Found {
     pub index: usize,
@@ -173,7 +173,7 @@ pub(crate) struct Found {
     pub converted: Option<(String, Conversion)>,
 }
 
-/// Where everything is.
+/// The position of every column.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layout {
     pub time: Found,
@@ -186,7 +186,7 @@ pub(crate) struct Layout {
     pub absent: Vec<(usize, String)>,
 }
 
-/// What a record is read for.
+/// Purpose of reading a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// A fit, which needs every output.
@@ -337,7 +337,7 @@ impl Columns {
             }
         }
         let time = time.swap_remove(0);
-        // Nobody has to have a reference: where it is not plain which column it is, there is none.
+        // A reference is optional: if several columns could be the reference, there is none.
         if references.is_empty() {
             references.extend(header.guess(&REFERENCE, &taken).ok().flatten());
         }

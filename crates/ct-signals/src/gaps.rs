@@ -14,35 +14,35 @@ use crate::{Channel, Hold, Record};
 const GAP: f64 = 1.5;
 /// Steps of an evenly sampled record differ from whole intervals by at most this part of one ...
 const EVEN: f64 = 0.25;
-/// ... at this share of them.
+/// ... if this share of the steps are multiples of it.
 const MOST: f64 = 0.98;
-/// ... and rows are missing, instead of steps being uneven, where this share of them is one interval.
+/// Rows are missing, and steps are not uneven, if this share of the steps equals one interval.
 const SINGLE: f64 = 0.6;
 /// Rounded stamps make steps of two intervals at more than this share; rows that are lost so often leave longer steps too.
 const ROUNDED: f64 = 0.05;
-/// Of uneven steps a gap is one that is longer than 1.5 times the one that this share of them does not exceed.
+/// With uneven steps, a gap is a step longer than 1.5 times this quantile of the steps.
 const USUAL: f64 = 0.95;
 /// Steps that belong to one rate of a logger with several differ by at most this part of each other ...
 const SAME_RATE: f64 = 0.2;
-/// ... and stand side by side, so many at least: rows that are lost leave steps of any length, one by one.
+/// ... and at least this many occur one after the other: lost rows cause steps of any length, one at a time.
 const STAYS: usize = 3;
 /// A logger has several rates where this share of the long steps stands in such a row.
 const OF_A_RATE: f64 = 0.5;
 /// More rows are never put in.
 const MOST_PUT_IN: usize = 100_000;
-/// A part with fewer samples of an output says less than its initial states take.
+/// A part with fewer samples of an output contains less information than its initial states need.
 const SHORTEST: usize = 8;
 
-/// What was done about rows and samples of inputs that are missing.
+/// How missing rows and missing samples of inputs were handled.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Gaps {
     /// Rows that are missing between the first and the last.
     pub rows: usize,
     /// Stretches in which rows are missing, or samples of an input.
     pub places: usize,
-    /// Of these places those through which the inputs were held.
+    /// Number of these gaps through which the inputs were held.
     pub held: usize,
-    /// Of these places those where the record is cut, and begins anew behind.
+    /// Number of these gaps where the record was cut; a new part begins after the gap.
     pub cut: usize,
     /// Rows of parts that were too short to be used.
     pub unused: usize,
@@ -98,7 +98,7 @@ impl Sampling {
         };
         let even = steps(time).filter(whole).count() as f64;
         let all = time.len().saturating_sub(1) as f64;
-        // Where more than a few steps are two intervals long and none is longer, stamps were rounded.
+        // If more than a few steps are two intervals long and no step is longer, the time stamps were rounded.
         let double = all - near.len() as f64;
         let longest = steps(time).fold(0.0, f64::max);
         let rounded = double > ROUNDED * all && longest < 2.5 * interval;
@@ -203,7 +203,7 @@ impl Record {
 
     /// Puts rows without a sample where rows are missing for at most `longest`.
     fn with_missing_rows(&self, sampling: Sampling, longest: f64, gaps: &mut Gaps) -> Record {
-        // Of every row the one that it was, none for one that is put in.
+        // For every row the index of the original row; none for an inserted row.
         let mut from: Vec<Option<usize>> = Vec::with_capacity(self.len());
         let mut time = Vec::with_capacity(self.len());
         for (k, &t) in self.time.iter().enumerate() {
@@ -284,7 +284,7 @@ impl Record {
                 }
             }
             if end {
-                // Behind the last known input: what follows from it, and no more.
+                // The first row after the last known input: its output depends on the known input, later ones do not.
                 let next = last + 1;
                 let acts = !lines && next < self.len();
                 stretches.push(begin..next + usize::from(acts));

@@ -1,4 +1,4 @@
-//! What a file says, as a message may quote it: short, and without what steers a terminal or turns the direction of the text.
+//! Quotes text from a file in a message: shortened, and without control characters or characters that change the text direction.
 
 use std::borrow::Cow;
 

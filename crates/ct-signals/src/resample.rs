@@ -128,7 +128,7 @@ mod tests {
         let coarse = record.resampled(2.0).unwrap();
         assert_eq!(coarse.time, [0.0, 2.0, 4.0, 6.0, 8.0]);
         assert_eq!(coarse.inputs[0].values[..2], [2.0, 5.0]);
-        // What the command did between 5.5 and 8 is not known.
+        // The command between 5.5 and 8 is not known.
         assert!(coarse.inputs[0].values[2..4].iter().all(|u| u.is_nan()));
         assert_eq!(coarse.inputs[0].values[4], 0.0);
         // Between 4 and 8 nothing was read.

@@ -72,7 +72,7 @@ pub fn cross_correlation(u: &[f64], e: &[f64], max_lag: usize) -> Vec<f64> {
         .collect()
 }
 
-/// How many pairs `u[k]`, `e[k + lag]` are there at lags `0..=max_lag`: `n - lag` where no sample is missing (NaN).
+/// Number of pairs `u[k]`, `e[k + lag]` at lags `0..=max_lag`: `n - lag` if no sample is missing (NaN).
 pub fn pairs(u: &[f64], e: &[f64], max_lag: usize) -> Vec<usize> {
     let n = u.len().min(e.len());
     let (u, e) = (&u[..n], &e[..n]);

@@ -28,7 +28,7 @@ pub struct StationaryWhitener<'a> {
     /// Row by row, the entries of A that are not 0.
     a: Vec<Vec<(usize, f64)>>,
     lanes: usize,
-    /// x^, lane by lane.
+    /// x^, signal by signal.
     states: Vec<f64>,
     next: Vec<f64>,
     /// S, and `A S`.
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
     use crate::ArModel;
 
-    /// Of an autoregression it is the exact whitening of [`ArModel`], whichever rows are missing.
+    /// For an autoregression the result equals the exact whitening of [`ArModel`], whichever rows are missing.
     #[test]
     fn an_autoregression_is_whitened_as_by_its_own_filter() {
         let ar = ArModel::from_coefficients(&[1.2, -0.5, 0.1], 1.0).unwrap();

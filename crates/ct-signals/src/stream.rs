@@ -21,23 +21,23 @@ use crate::{
 /// The names of the columns in use, where they have no header.
 const ROLES: [&str; 3] = ["time", "input", "output"];
 
-/// How the times of rows are written.
+/// Format of the times of rows.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RowTimes {
     /// As numbers.
     Numbers,
-    /// As times of day, which say no day; they count from the first row.
+    /// Times of day without a date; they count from the first row.
     TimesOfDay,
     /// As dates.
     Dates {
-        /// Where the times count from.
+        /// Origin of the times.
         calendar: Calendar,
         /// The first cell has no offset from UTC: what it means follows from the zone.
         civil: bool,
     },
 }
 
-/// How rows are read.
+/// Format of rows.
 #[derive(Debug, Clone)]
 pub struct Rows {
     delimiter: u8,
@@ -47,34 +47,34 @@ pub struct Rows {
     fields: usize,
     /// Positions of time, inputs and outputs.
     at: Vec<usize>,
-    /// How many of them are inputs, one at least.
+    /// Number of inputs, at least one.
     inputs: usize,
     /// Their headers.
     names: Vec<String>,
     /// Units of inputs and outputs.
     units: Vec<String>,
-    /// How inputs and outputs are converted to these, where the header has other ones.
+    /// Conversion of each input and output from the header's unit.
     conversions: Vec<Option<Conversion>>,
     /// The cells of the latest row: time, inputs, outputs.
     values: Vec<Result<f64, BadLine>>,
     /// Seconds in one unit of the time, where it is a number.
     seconds: f64,
     columns: Columns,
-    /// How the time is written; `None` until a row has been read.
+    /// Format of the time; `None` before the first row.
     times: Option<Times>,
-    /// Where dates count from and what they follow, where this is known beforehand.
+    /// Origin of dates and the date before it, if known beforehand.
     start: Option<(Timestamp, Timestamp)>,
     /// Dates of this stream have no offset.
     civil: bool,
     numbers: Numbers,
 }
 
-/// What a line holds.
+/// Content of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Line {
     /// Time \[s\] and the first input, NaN where there is none; all inputs are in [`Rows::inputs`], the outputs in [`Rows::outputs`].
     Row([f64; 2]),
-    /// Nothing: it is blank, a comment, or the header again.
+    /// No data: blank line, comment, or repeated header.
     Nothing,
 }
 
@@ -113,7 +113,7 @@ impl Rows {
         };
         if is_row(&cells, columns) {
             let outputs = columns.outputs.len().max(1);
-            // Where the first channel stands: behind the time, or behind the reference that follows it.
+            // Position of the first channel: after the time, or after the reference.
             let inputs = usize::from(!columns.without_inputs);
             let first = match cells.len().checked_sub(outputs + inputs) {
                 Some(1) => 1,
@@ -206,7 +206,7 @@ impl Rows {
         self.units.iter().map(String::as_str)
     }
 
-    /// The outputs of the row that was read last, or why there is none: its cell says that the sample is missing, or holds no number.
+    /// Outputs of the last row, or the reason why one is missing: its cell marks a missing sample, or contains no number.
     pub fn outputs(&self) -> &[Result<f64, BadLine>] {
         &self.values[1 + self.inputs..]
     }
@@ -223,7 +223,7 @@ impl Rows {
         self.seconds
     }
 
-    /// How the times are written, once a row has been read.
+    /// Format of the times, known after the first row.
     #[must_use]
     pub fn times(&self) -> Option<RowTimes> {
         let times = self.times.as_ref()?;
@@ -253,7 +253,7 @@ impl Rows {
         self.start = before.start;
     }
 
-    /// In which order a row's fields are read, in words.
+    /// Order of a row's fields, in words.
     #[must_use]
     pub fn order(&self) -> String {
         let (inputs, outputs) = self.names[1..].split_at(self.inputs);
@@ -320,7 +320,7 @@ fn is_end_of_time(cell: &str) -> bool {
     cell.chars().all(part) && cell.ends_with(|c: char| c.is_ascii_digit() || c == 'Z')
 }
 
-/// What so many readings of a row without a header are called.
+/// Names of the readings of a row without a header.
 pub(crate) fn letters(outputs: usize, between: &str) -> String {
     let of_output = |output: usize| match outputs {
         1 => "y".to_string(),

@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-/// From so many degrees of freedom on, the quantile is that of the series in 1/freedom.
+/// From this number of degrees of freedom on, the quantile is computed from the series in 1/freedom.
 const MANY: f64 = 1e4;
 
 /// Half the width, in standard errors, of the interval that holds the truth with probability `level` (0 to 1, both excluded), for a variance of so
@@ -30,7 +30,7 @@ pub fn student_half_width(level: f64, freedom: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The values of tables, and no jump between the two ways.
+    /// Compares with tables, and checks that the two formulas agree where they meet.
     #[test]
     fn quantiles_are_those_of_tables() {
         for (freedom, level, quantile) in [

@@ -205,7 +205,7 @@ impl TimestampReader {
         self.dated
     }
 
-    /// That the cells that were shown tell day and month apart: of a stream no later cell will, before it is read.
+    /// Checks that the cells so far distinguish day and month: a stream cannot be read ahead.
     ///
     /// # Errors
     /// [`TimestampError::DayOrMonth`].

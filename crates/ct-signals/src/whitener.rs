@@ -36,13 +36,13 @@ pub struct Whitener {
     lost: Vec<usize>,
     /// Covariance of the lost rows' estimates by slots, `(p + 1) x (p + 1)`, in `sigma^2`; other rows' entries hold nothing.
     covariance: Vec<f64>,
-    /// For each of the lost: its covariance with the next row; after that row has come, its gain.
+    /// For each lost row: its covariance with the next row; after the next row, its gain.
     with_next: Vec<f64>,
     predicted: Vec<f64>,
 }
 
 impl Whitener {
-    /// Of `lanes` signals at once.
+    /// For `lanes` signals at once.
     pub(crate) fn new(model: &ArModel, lanes: usize) -> Self {
         let p = model.order();
         let reflections = model.reflections();
@@ -174,7 +174,7 @@ impl Whitener {
         }
         let at = |ij: usize| self.covariance[slots[ij / p] * (p + 1) + slots[ij % p]];
         let mut covariance: Vec<f64> = (0..p * p).map(at).collect();
-        // Of 1, 2, 4, ... steps: their matrix, and the covariance of the noise that they add.
+        // For 1, 2, 4, ... steps: the transition matrix, and the covariance of the noise over these steps.
         let mut power = vec![0.0; p * p];
         power[..p].copy_from_slice(&self.coefficients);
         for i in 1..p {
@@ -192,7 +192,7 @@ impl Whitener {
         };
         while rows > 0 {
             if power.iter().all(|a| a.abs() < FORGOTTEN) {
-                // Whatever was before does not matter any more.
+                // The earlier rows have no influence any more.
                 self.reset();
                 return;
             }
@@ -212,11 +212,11 @@ impl Whitener {
         }
     }
 
-    /// As [`Whitener::push_with_variance`], where one of the last `p` rows is lost.
+    /// As [`Whitener::push_with_variance`], if one of the last `p` rows is lost.
     fn push_behind_lost(&mut self, row: &mut [f64]) -> f64 {
         let (p, lanes) = (self.scales.len(), self.lanes);
         let variance = self.predict();
-        // What this row says of the lost ones.
+        // Update of the lost rows from this row.
         for (i, &slot) in self.lost.iter().enumerate() {
             let gain = self.with_next[i] / variance;
             let past = &mut self.history[slot * lanes..][..lanes];
@@ -247,7 +247,7 @@ impl Whitener {
         lags.zip(self.with_next.iter().copied())
     }
 
-    /// How many rows before the next one, 1 to `p`.
+    /// Distance to the next row, 1 to `p`.
     fn lag(&self, slot: usize) -> usize {
         if self.slot > slot {
             self.slot - slot

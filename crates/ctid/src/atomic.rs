@@ -19,7 +19,7 @@ use crate::Error;
 const TRIES: u32 = 100;
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// What a run that was killed leaves behind has such a name, with so many letters and digits between.
+/// Prefix of a temporary file, which a killed run may leave behind; random letters and digits follow the prefix.
 const PREFIX: &str = ".ctid-";
 const SUFFIX: &str = ".part";
 const LETTERS: usize = 12;
@@ -91,7 +91,7 @@ fn replace(path: &Path, content: &[u8], still: impl FnOnce() -> bool) -> io::Res
             "it is write-protected",
         ));
     }
-    // Nobody reads the new text whom the old file does not let.
+    // The new file is readable only for those who could read the old one.
     let mut file = beside_with(&target, 0o600)?;
     let alike = attributes::links(&metadata) == 1
         && attributes::copy(&old, &metadata, file.as_file()).is_ok();
@@ -162,7 +162,7 @@ fn sync_folder(path: &Path) {
 
 /// A file in the same folder that vanishes unless it is renamed.
 pub(crate) fn beside(path: &Path) -> io::Result<NamedTempFile> {
-    // As any new file: the umask takes its part away.
+    // Permissions of a new file, reduced by the umask.
     beside_with(path, 0o666)
 }
 

@@ -48,7 +48,7 @@ pub(crate) fn like(
     Ok(rows.collect())
 }
 
-/// An effect and what it is.
+/// Describes one effect of the catalogue.
 fn row(effect: &EffectInfo, domain: Domain, widest: usize, look: Look) -> String {
     let first = format!(
         "  {}{}  ",

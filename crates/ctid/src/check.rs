@@ -29,7 +29,7 @@ pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
 
 /// Warnings of units that are none, each with its place in the text.
 fn unknown(path: &Path, look: Look) -> String {
-    // What cannot be read twice, as a pipe, was read as a model.
+    // A file that cannot be read twice, such as a pipe, was read as a model.
     let Ok(text) = model_file::read_text(path) else {
         return String::new();
     };
@@ -42,7 +42,7 @@ fn unknown(path: &Path, look: Look) -> String {
     lines.collect()
 }
 
-/// What a model holds, in words.
+/// Summary of a model in words.
 pub(crate) fn said(model: &ModelSpec, look: Look) -> String {
     let mut text = String::new();
     let title = match model.description.as_str() {

@@ -1,4 +1,4 @@
-//! What is wrong with the columns of a record that the option `--columns` names.
+//! Errors in the columns of a record that the option `--columns` names.
 
 use ct_signals::{ColumnFault, Error as Record};
 

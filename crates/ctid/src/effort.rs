@@ -1,4 +1,4 @@
-//! How much time a search may take.
+//! Time limit of a search.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! What the program can refuse: every message is one line that names the place and the mend.
+//! Errors of the program: every message is one line that names the place and the correction.
 
 use std::path::Path;
 
@@ -8,14 +8,14 @@ use ct_signals::escaped;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Something in a file, at a line.
+    /// An error at a line of a file.
     #[error("{file}:{line}: {what}")]
     AtLine {
         /// The path as it was given.
         file: String,
         /// Line number, from 1.
         line: usize,
-        /// What is wrong and the mend.
+        /// The error and the correction.
         what: String,
     },
     /// A model's text.
@@ -26,7 +26,7 @@ pub enum Error {
         /// Line, column, what is wrong and the mend.
         source: ct_model::TextError,
     },
-    /// Something about a file as a whole.
+    /// An error about a file as a whole.
     #[error("{file}: {what}")]
     File {
         /// The path as it was given.
@@ -39,13 +39,13 @@ pub enum Error {
     Changed {
         /// The path as it was given.
         file: String,
-        /// What has changed and the mend.
+        /// The change and the correction.
         what: String,
     },
-    /// No effect of that name.
+    /// No effect has this name.
     #[error("{0}")]
     UnknownEffect(String),
-    /// The command line asks for something that does not go together.
+    /// The command line combines options that exclude each other.
     #[error("{0}")]
     Usage(String),
     /// The columns of a record that an option names.

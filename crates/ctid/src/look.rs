@@ -1,4 +1,4 @@
-//! What the terminal can show: colours, width; and text laid out for it.
+//! Capabilities of the terminal (colours, width), and layout of text for it.
 
 use std::fmt::Display;
 
@@ -7,10 +7,10 @@ use console::{Style, Term};
 /// The widest a line is made: longer ones are hard to read.
 const WIDEST: usize = 100;
 const NARROWEST: usize = 48;
-/// Where the width is not known: a pipe, a file.
+/// Default width for a pipe or a file.
 const USUAL: usize = 80;
 
-/// How text is laid out.
+/// Layout of text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Look {
     /// Colours may be used.
@@ -20,13 +20,13 @@ pub struct Look {
 }
 
 impl Look {
-    /// What standard output can show: no colours into a pipe or where `NO_COLOR` is set.
+    /// Layout for standard output: no colours into a pipe or if `NO_COLOR` is set.
     #[must_use]
     pub fn of_stdout() -> Self {
         Self::of(&Term::stdout(), console::colors_enabled())
     }
 
-    /// What standard error can show.
+    /// Layout for standard error.
     #[must_use]
     pub fn of_stderr() -> Self {
         Self::of(&Term::stderr(), console::colors_enabled_stderr())
@@ -57,12 +57,12 @@ impl Look {
         self.paint(Style::new().bold().cyan(), lines.trim_end())
     }
 
-    /// What matters most.
+    /// Emphasised text.
     pub(crate) fn strong(self, text: impl Display) -> String {
         self.paint(Style::new().bold(), text)
     }
 
-    /// What may be skipped.
+    /// Text of lesser importance.
     pub(crate) fn faint(self, text: impl Display) -> String {
         self.paint(Style::new().dim(), text)
     }
@@ -72,7 +72,7 @@ impl Look {
         self.paint(Style::new().bold().green(), text)
     }
 
-    /// What needs attention.
+    /// Text of a warning.
     pub(crate) fn warning(self, text: impl Display) -> String {
         self.paint(Style::new().bold().yellow(), text)
     }
@@ -106,7 +106,7 @@ impl Look {
     }
 }
 
-/// How a column of a table is set.
+/// Alignment of a table's column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Side {
     Left,

@@ -25,7 +25,7 @@ pub(crate) fn effect(id: &str) -> Result<&'static EffectInfo, Error> {
     EffectInfo::find(id).ok_or_else(|| Error::UnknownEffect(unknown_effect(id)))
 }
 
-/// What to say of a name that is not in the catalogue.
+/// Message for a name that is not in the catalogue.
 pub(crate) fn unknown_effect(id: &str) -> String {
     format!(
         "unknown effect \"{}\": `ctid effects` lists the catalogue{}",

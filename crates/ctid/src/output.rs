@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Error, atomic, report, term_file};
 use linear_identification::{Identification, side_by_side::SideBySide};
 
-/// How much of an existing page is looked at: the mark stands in its head.
+/// Number of bytes of an existing page that are searched for the mark.
 const HEAD: u64 = 4096;
 
 /// Who has written a file of results, as its first key says.
@@ -24,7 +24,7 @@ struct Marked<'a, T> {
     found: &'a T,
 }
 
-/// What tells JSON of ctid's from others'.
+/// Mark that identifies JSON files of ctid.
 #[derive(Deserialize)]
 struct Mark {
     written_by: String,
@@ -32,7 +32,7 @@ struct Mark {
     _schema: u32,
 }
 
-/// What is in a file that the program writes.
+/// Kind of a file that the program writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The result as JSON.
@@ -47,7 +47,7 @@ pub enum Kind {
     Model,
 }
 
-/// What a command finds, which is written as JSON with `schema` and the mark that ctid knows its own files by, or as a page.
+/// Result of a command, written as JSON with `schema` and a mark that identifies files of ctid, or as a page.
 pub trait Found: Serialize {
     /// The page, complete, where there is one.
     fn page(&self) -> String {
@@ -133,19 +133,19 @@ pub fn plan(wanted: &[(Kind, &Path)], inputs: &[&Path]) -> Result<Vec<Output>, E
 }
 
 impl Output {
-    /// What is in it.
+    /// Kind of the file.
     #[must_use]
     pub fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// Where it goes.
+    /// Path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes it; says whether there was something to write.
+    /// Writes the result; returns whether there was a result to write.
     ///
     /// # Errors
     /// Where the disk does not take it, or something else stands there than when the command began; that is then still there.
@@ -225,7 +225,7 @@ fn is_empty_or_shows(record: &str, path: &Path) -> bool {
     fs::read_to_string(path).is_ok_and(|page| page.is_empty() || page.contains(&name))
 }
 
-/// What stands where a result is to go.
+/// Kind of the file that exists at the place of a result.
 #[derive(Debug, PartialEq, Eq)]
 enum Standing {
     Nothing,
@@ -262,7 +262,7 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
         return false;
     };
     match kind {
-        // Nothing in a record says who wrote it, and a text may have been changed by hand since.
+        // A record does not contain its author, and a text may have been edited by hand.
         Kind::Record | Kind::Model => false,
         Kind::Report => {
             let mut head = Vec::new();
@@ -275,7 +275,7 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
             read.is_ok() && term_file::is_own(&String::from_utf8_lossy(&head))
         }
         Kind::Json => {
-            // As a stream: it may be of any size.
+            // Read as a stream, because the file may be large.
             let mark = serde_json::from_reader::<_, Mark>(BufReader::new(file));
             mark.is_ok_and(|mark| mark.written_by == WRITTEN_BY)
         }
@@ -292,7 +292,7 @@ fn check(kind: Kind, path: &Path) -> Result<Standing, Error> {
             ));
         }
         Standing::NotOurs => {
-            // These do not say who wrote them.
+            // Files of these kinds contain no mark.
             let why = match kind {
                 Kind::Record | Kind::Model => {
                     "it is there already; choose another name or delete it"
@@ -318,7 +318,7 @@ fn check(kind: Kind, path: &Path) -> Result<Standing, Error> {
             format!("there is no folder {}; make it first", folder.display()),
         ));
     }
-    // A file that vanishes at once shows whether the folder takes one, before hours of computing.
+    // A temporary file shows whether the folder is writable, before hours of computing.
     atomic::beside(path)
         .and_then(tempfile::NamedTempFile::close)
         .map_err(|error| {

@@ -12,11 +12,11 @@ const DOWN: usize = 4;
 /// The cell without dots; the dots of a cell are the bits above it.
 const BLANK: u32 = 0x2800;
 
-/// What was measured.
+/// Colour of measured values.
 pub(crate) const MEASURED: Color = Color::Cyan;
-/// What the model says.
+/// Colour of the model's output.
 pub(crate) const MODEL: Color = Color::Yellow;
-/// What is left between the two.
+/// Colour of the residual.
 pub(crate) const RESIDUAL: Color = Color::Magenta;
 
 /// A line through points; where there are more than dots it becomes the band they fill.

@@ -1,4 +1,4 @@
-//! How far a computation is, on standard error; nothing is drawn where that is not a terminal.
+//! Progress of a computation on standard error; nothing is drawn if standard error is not a terminal.
 
 use std::fmt::Write;
 use std::sync::Mutex;
@@ -35,7 +35,7 @@ impl Bar {
         }
     }
 
-    /// The same for a search whose time is limited: it says how much of the limit is left.
+    /// Progress of a search with a time limit: it shows the remaining time.
     #[must_use]
     pub fn with_limit(limit: Option<Duration>) -> Self {
         Self {

@@ -75,7 +75,7 @@ const FAMILIES: [&[&str]; 12] = [
     &["hot", "heat", "temperature", "steam"],
 ];
 
-/// What is looked for: beginnings of words, and how much each counts.
+/// Search terms: beginnings of words, and their weights.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sought {
     said: String,
@@ -83,7 +83,7 @@ pub(crate) struct Sought {
 }
 
 impl Sought {
-    /// From what somebody typed.
+    /// Search terms from the typed text.
     pub fn of(said: &str) -> Self {
         let mut stems: Vec<(String, u32)> = Vec::new();
         for word in said.to_lowercase().split_whitespace() {
@@ -114,7 +114,7 @@ impl Sought {
         }
     }
 
-    /// How well texts go with it, the first counting most; zero where they do not.
+    /// Score of texts, with the largest weight for the first text; zero without a match.
     fn score(&self, texts: &[&str]) -> u32 {
         let mut score = 0;
         for (text, weight) in texts.iter().zip([4, 2, 1]) {
@@ -129,7 +129,7 @@ impl Sought {
         score
     }
 
-    /// How well an effect of a tank goes with it.
+    /// Score of an effect of a tank.
     pub fn score_of_plant(&self, effect: &EffectInfo) -> u32 {
         self.score(&[
             effect.id,
@@ -138,7 +138,7 @@ impl Sought {
         ])
     }
 
-    /// How well an effect at a port, or a candidate of the model file, goes with it.
+    /// Score of an effect at a port, or of a candidate of the model file.
     pub fn score_of(&self, candidate: &Candidate) -> u32 {
         match candidate.effect {
             Some(effect) => self.score(&[effect.id, &effect.symptoms.join(", "), effect.physics]),
@@ -146,7 +146,7 @@ impl Sought {
         }
     }
 
-    /// What is said where nothing goes with it.
+    /// Message without a match.
     pub fn nothing(&self) -> Error {
         let known: Vec<&str> = FAMILIES.iter().map(|family| family[0]).collect();
         Error::UnknownEffect(format!(
@@ -157,7 +157,7 @@ impl Sought {
     }
 }
 
-/// Those with a score, best first; equals stay in their order.
+/// Items with a score, best first; equal scores keep their order.
 pub(crate) fn best<T>(all: impl IntoIterator<Item = T>, score: impl Fn(&T) -> u32) -> Vec<T> {
     let scored = all.into_iter().map(|one| (score(&one), one));
     let mut scored: Vec<(u32, T)> = scored.filter(|(score, _)| *score > 0).collect();

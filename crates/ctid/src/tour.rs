@@ -17,12 +17,12 @@ const DATA: (&str, &str) = ("tour.csv", include_str!("../records/tour.csv"));
 const TEST: (&str, &str) = ("tour-test.csv", include_str!("../records/tour-test.csv"));
 const MODEL: (&str, &str) = ("tour.toml", include_str!("../records/tour.toml"));
 
-/// What the tour leaves behind.
+/// Files of the tour.
 #[derive(Debug)]
 pub struct Tour {
     /// The page that it wrote.
     pub report: PathBuf,
-    /// What it found.
+    /// Diagnosis of the tour.
     pub diagnosis: Diagnosis,
 }
 

@@ -13,7 +13,7 @@ use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 use crate::search::Grown;
 use crate::{Error, held_out};
 
-/// What was found.
+/// A result.
 pub(crate) struct Finding<'a> {
     /// The believed model, and the last one.
     pub base: &'a Node,
@@ -144,7 +144,7 @@ pub(crate) fn assemble(
 /// The believed model, then the effects one by one, each time the one that lowers the error most.
 fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<Vec<Node>, Error> {
     let mut nodes = vec![context.subset(last, base.added.clone(), noise, FINE)?];
-    // From where the believed model was fitted, too.
+    // Fit also from the estimates of the believed model.
     if let Ok(again) = context.refitted(base, noise, FINE)
         && again.fit.cost < nodes[0].fit.cost
     {
@@ -173,7 +173,7 @@ fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<
     Ok(nodes)
 }
 
-/// What was found of the parameters of an effect in a set.
+/// Estimates of an effect's parameters in a set.
 pub(crate) fn sizes(node: &Node, candidate: &Candidate) -> Vec<Estimate> {
     let errors = node.fit.std_errors();
     let parameters = node.spec().parameters.iter().enumerate();

@@ -22,7 +22,7 @@ use crate::problem::{Kept, Limit, Options, Problem};
 pub struct Believed {
     /// The model; the values of its parameters are fitted ones, in white noise.
     pub spec: ModelSpec,
-    /// What of the records its effects are written in, by their identifiers.
+    /// Numbers of the record that each effect contains, by effect identifiers.
     pub record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
@@ -44,8 +44,8 @@ pub fn believed(problem: &Problem, options: &Options) -> Result<Believed, Error>
     })
 }
 
-/// All that can act in a model where its records visit this, those of the catalogue with what is kept of earlier records, then those of the
-/// user's own, then smooth functions ([`Candidate::is_shape`]), which no search looks at.
+/// All effects that can act in a model for the visited ranges: those of the catalogue with kept record numbers, those of the user, then
+/// smooth functions ([`Candidate::is_shape`]), which searches do not use.
 ///
 /// # Errors
 /// As [`own_candidates`].
@@ -136,7 +136,7 @@ impl Context<'_> {
     }
 }
 
-/// What the fitted model visits in all records.
+/// Ranges that the fitted model visits in all records.
 fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
     let (count, states) = (setup.parameter_count(), problem.spec.states.len());
     let mut all: Option<Visited> = None;

@@ -8,10 +8,10 @@ pub(super) struct Search<'a, const P: usize, const N: usize> {
     rows: &'a [Interval<P>; N],
     start: SVector<f64, P>,
     pub(super) theta: SVector<f64, P>,
-    /// What the rounding of the entries of `theta` is measured by. With a bound of 0 the entries themselves are no measure; what
-    /// they were made from is.
+    /// Scale for the rounding errors of `theta`. With a bound of 0 the entries themselves are no scale; the terms that they were computed
+    /// from are.
     entries: SVector<f64, P>,
-    /// How long the way from the start was, in the metric.
+    /// Distance from the start, in the metric.
     way: f64,
     /// `L`
     root: SMatrix<f64, P, P>,
@@ -132,7 +132,7 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
         (self.theta, self.way) = (self.start, 0.0);
     }
 
-    /// Moves `theta` to where the active rows hold, by the shortest way.
+    /// Moves `theta` by the shortest distance onto the set where the active rows are satisfied.
     pub(super) fn move_onto_active(&mut self) {
         let (mut x, mut y) = (SVector::zeros(), [0.0; P]);
         for (j, active) in self.active().iter().enumerate() {

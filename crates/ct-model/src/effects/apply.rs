@@ -9,7 +9,7 @@ use super::port::Port;
 use crate::expression::{Expression, Variable};
 use crate::spec::{About, Flow, ModelSpec, Output, State};
 
-/// Why effects cannot be added to a model.
+/// Reasons why effects cannot be added to a model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ApplyError {
@@ -84,7 +84,7 @@ pub fn apply(spec: &ModelSpec, candidates: &[&Candidate]) -> Result<ModelSpec, A
     Ok(spec)
 }
 
-/// Where an effect stands in the order of all.
+/// Position of an effect in the order of all effects.
 fn rank(candidate: &Candidate) -> (u8, usize) {
     let group = match (&candidate.fragment.action, candidate.port) {
         (Action::Add(terms), _) => {
@@ -103,9 +103,9 @@ fn rank(candidate: &Candidate) -> (u8, usize) {
 struct Mended {
     base: Counts,
     spec: ModelSpec,
-    /// What the outputs read before.
+    /// Variables that the outputs read before the effects are added.
     reads: Vec<Variable>,
-    /// Where the chain of a port ends by now.
+    /// Current end of the chain of effects of each port.
     ends: BTreeMap<Port, Variable>,
 }
 
@@ -135,7 +135,7 @@ impl Mended {
     fn add(&mut self, candidate: &Candidate) {
         let fragment = &candidate.fragment;
         let (base, now) = (self.base, Counts::of(&self.spec));
-        // What the effect stands behind: its port, or the effect before it.
+        // Predecessor of the effect: its port, or the effect before it in the chain.
         let (chain, port) = match candidate.port {
             Port::Input(u) => (Some(candidate.port), Some(Variable::Input(u))),
             Port::Output(y) | Port::OutputAnd(y, _) => {

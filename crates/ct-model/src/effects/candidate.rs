@@ -18,21 +18,21 @@ use crate::text::is_reserved;
 /// A parameter of an effect at a port.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectParameter {
-    /// Its name in the model that the effect was added to: `lag_u_tau`.
+    /// Name of the parameter in the model that the effect was added to: `lag_u_tau`.
     pub name: String,
-    /// Its name in the effect: `tau`.
+    /// Name of the parameter in the effect: `tau`.
     pub short: String,
     /// Its unit.
     pub unit: String,
-    /// What it is.
+    /// Description of the parameter.
     pub description: String,
-    /// What it is to a search.
+    /// Role of the parameter in a search.
     pub role: Role,
-    /// Its value where the effect is not there: of a [`Role::Shape`] the value does not matter.
+    /// Value at which the effect is absent. For a [`Role::Shape`] the value does not matter.
     pub absent: f64,
     /// Smallest and largest value.
     pub bounds: (f64, f64),
-    /// Where fits start; several parameters: every combination.
+    /// Start values of fits; with several parameters, every combination is used.
     pub starts: Vec<f64>,
 }
 
@@ -41,14 +41,14 @@ pub struct EffectParameter {
 pub struct Candidate {
     /// Its identifier: `lag(u)`, `varies_with(k,T)`, or the name of an own candidate.
     pub id: String,
-    /// Where it acts.
+    /// Port at which the effect acts.
     pub port: Port,
     /// The effect; `None` for a candidate of the model file.
     pub effect: Option<&'static Effect>,
     /// Its parameters.
     pub parameters: Vec<EffectParameter>,
-    /// What of the record it is written in, by the names of its text ([`Effect::record_numbers`]): given again to [`candidates_keeping`] it
-    /// means the same beside another record.
+    /// Numbers of the record that the effect's equations contain, by their names in its text ([`Effect::record_numbers`]). If they are
+    /// passed to [`candidates_keeping`], the effect means the same for another record.
     pub record_numbers: BTreeMap<&'static str, f64>,
     /// The candidate of the model file, by its identifier, that this one repeats with states and parameters of its own: a second RC pair. Alone
     /// the two are the same.
@@ -132,21 +132,21 @@ impl Candidate {
         Some(candidate)
     }
 
-    /// How many parameters are fitted.
+    /// Number of fitted parameters.
     #[must_use]
     pub fn fitted(&self) -> usize {
         let roles = self.parameters.iter().map(|parameter| parameter.role);
         roles.filter(|role| *role != Role::Choice).count()
     }
 
-    /// Whether it goes with time and with nothing else: a drift, a step, a period. It can imitate any slow disturbance.
+    /// Whether the effect is a function of time alone: a drift, a step, a period. Such an effect can compensate for any slow disturbance.
     #[must_use]
     pub fn follows_time(&self) -> bool {
-        // What happens at an instant is written in the record's first one.
+        // The start of the record is an input of effects that happen at an instant.
         self.record_numbers.contains_key("begin")
     }
 
-    /// Whether it is a smooth function without physics, no candidate of a search ([`shapes_keeping`]).
+    /// Whether the effect is a smooth function without physics. Searches do not use it as a candidate ([`shapes_keeping`]).
     #[must_use]
     pub fn is_shape(&self) -> bool {
         self.effect
@@ -221,8 +221,8 @@ pub fn candidates(spec: &ModelSpec, visited: &Visited) -> Vec<Candidate> {
     candidates_keeping(spec, visited, &BTreeMap::new())
 }
 
-/// The same; those that `kept` names, by their identifiers, are written in these numbers of an earlier record
-/// ([`Candidate::record_numbers`]) in place of those that `visited` gives.
+/// All effects that can act in a model. For the identifiers in `kept`, the numbers of an earlier record ([`Candidate::record_numbers`])
+/// replace those from `visited`.
 #[must_use]
 pub fn candidates_keeping(
     spec: &ModelSpec,

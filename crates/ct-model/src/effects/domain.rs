@@ -1,4 +1,4 @@
-//! Which ports the effects of a domain have, from the units of states, inputs and readings.
+//! Ports of the effects of each physical domain, derived from the units of states, inputs and readings.
 
 use ct_signals::{Dimension, Unit};
 

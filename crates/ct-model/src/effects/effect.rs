@@ -1,4 +1,4 @@
-//! What an effect is: a small model, and what its text cannot say.
+//! Definition of an effect: a small model, and settings that its text cannot contain.
 
 use std::collections::BTreeMap;
 
@@ -36,24 +36,25 @@ pub enum Place {
     Terminal,
 }
 
-/// What a parameter of an effect is to a search.
+/// Role of an effect's parameter in a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// At its absent value the effect is not there, and the outputs have a derivative by it (from one side where a bound is there).
     Size,
-    /// It says when, where or how fast: without a size no output depends on it. A grid of starts covers it.
+    /// The parameter states when, where or how fast the effect acts. No output depends on it while the size of the effect is zero. A grid
+    /// of starts covers it.
     Shape,
     /// At its absent value the effect is not there, but the outputs have no derivative by it there: a limit at the edge of what was
     /// visited, a step of a converter. A grid of starts covers it.
     Threshold,
-    /// One of the starts, and nothing between them: upper or lower. It is not fitted.
+    /// The parameter takes one of its start values and no value in between: upper or lower. It is not fitted.
     Choice,
 }
 
-/// Where fits of a parameter start, as shares of what was visited.
+/// Start values of fits of a parameter, as shares of the visited range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Starts {
-    /// As they stand.
+    /// The values themselves.
     Values(&'static [f64]),
     /// Quantiles of the signal, and at the same shares of its range where no quantiles are known.
     Quantiles(&'static [f64]),
@@ -92,13 +93,13 @@ pub struct Effect {
     pub physics: &'static str,
     /// Effects that leave similar traces, as `name(port)`.
     pub confused_with: &'static [&'static str],
-    /// How a person confirms it at the plant.
+    /// How to confirm the effect at the plant.
     pub confirm: &'static str,
     /// Words that a person may describe it with.
     pub symptoms: &'static [&'static str],
 }
 
-/// What of a record the text of an effect may be written in.
+/// Numbers of a record that the text of an effect may contain.
 const RECORD_NUMBERS: [&str; 10] = [
     "low", "high", "middle", "width", "first", "begin", "zero", "duration", "interval", "balance",
 ];

@@ -16,14 +16,14 @@ pub(super) struct Fragment {
     pub action: Action,
 }
 
-/// What it does.
+/// Action of an effect on the model.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Action {
-    /// Its result, an own flow, stands in the place of the input, output, parameter or flow of its port.
+    /// The effect's output replaces the input, output, parameter or flow of its port.
     Stand(Variable),
-    /// This is added to the equations of states, to flows, or to readings, by position in the outputs.
+    /// The effect's output is added to state equations, to flows, or to readings (by position in the outputs).
     Add(Vec<(Target, Expression)>),
-    /// Its result stands in the place of the right-hand side, for which this flow of its own is kept.
+    /// The effect's output replaces the right-hand side of a state equation. The flow `rate` stores the original right-hand side.
     Govern { result: Variable, rate: Variable },
 }
 
@@ -34,7 +34,7 @@ pub(super) enum Target {
     Output(usize),
 }
 
-/// How many variables of each kind the model has.
+/// Number of variables of each kind in the model.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Counts {
     pub parameters: usize,

@@ -19,24 +19,25 @@ const DECADE: f64 = 10.0;
 /// A candidate as the model file has it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OwnCandidate {
-    /// Its parameters, by name.
+    /// Parameters of the candidate, by name.
     pub parameters: BTreeMap<String, OwnParameter>,
     /// States that it brings, by name.
     pub states: BTreeMap<String, OwnState>,
-    /// What is added: to the right-hand side of the equation of a state, to a named flow, or to an output, by their names.
+    /// Terms to add: to the right-hand side of a state equation, to a named flow, or to an output. The key is the name of the state, flow
+    /// or output.
     pub terms: BTreeMap<String, String>,
 }
 
 /// A parameter of a candidate.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OwnParameter {
-    /// Its unit; empty where none is given.
+    /// Unit of the parameter; empty if none is given.
     pub unit: String,
-    /// Its smallest value.
+    /// Lower bound.
     pub min: Option<f64>,
-    /// Its largest value.
+    /// Upper bound.
     pub max: Option<f64>,
-    /// Where a fit starts.
+    /// Start value of a fit.
     pub start: f64,
 }
 
@@ -45,7 +46,7 @@ pub struct OwnParameter {
 pub struct OwnState {
     /// Its unit; empty where none is given.
     pub unit: String,
-    /// Where its initial value starts.
+    /// Start value of the initial state.
     pub start: f64,
     /// The initial value is known, and not fitted.
     pub fixed: bool,
@@ -59,7 +60,7 @@ pub struct OwnState {
 pub struct OwnError {
     /// The keys below `candidates`: the candidate's name, `terms`, `T`.
     pub place: Vec<String>,
-    /// What is wrong and the mend; of an expression with line and column in it.
+    /// The error and the correction; for an expression, with line and column inside it.
     pub what: String,
 }
 
@@ -229,7 +230,7 @@ pub fn own_candidate(
             "it has no parameter: give it one that makes its terms vanish at zero, as a factor";
         return Err(error(&[], what.to_string()));
     }
-    // Without such values every parameter is a shape: the effect is absent only in a limit ([`Candidate::with_factor`]).
+    // If no such values exist, every parameter is a shape: the effect is absent only in a limit ([`Candidate::with_factor`]).
     let sizes = sizes(&scope, counts, &states, &terms);
     let in_limit = sizes.is_none();
     let sizes = sizes.unwrap_or_else(|| vec![false; own.parameters.len()]);
@@ -304,7 +305,7 @@ fn about(name: &str, unit: &str, min: Option<f64>, max: Option<f64>) -> About {
     }
 }
 
-/// What a term is added to.
+/// The variable that a term is added to.
 fn target(spec: &ModelSpec, name: &str) -> Result<Target, String> {
     let output = spec
         .outputs
@@ -328,8 +329,8 @@ fn target(spec: &ModelSpec, name: &str) -> Result<Target, String> {
     }
 }
 
-/// Which parameters are zero where the effect is not there: one alone that makes all terms vanish, else all of those that do so together.
-/// Terms vanish too where the states of the candidate stay at their start and they vanish there.
+/// Parameters that are zero when the effect is absent: one parameter that alone makes all terms vanish, else all parameters that do so
+/// together. The states of the candidate may stay at their start, if the terms vanish there too.
 fn sizes(
     scope: &ModelSpec,
     counts: Counts,
@@ -378,14 +379,14 @@ fn sizes(
     };
     let alone: Vec<bool> = (0..count).map(|i| vanish(&|own| own == i)).collect();
     if alone.iter().any(|is| *is) {
-        // One is enough: the first, where several are factors.
+        // One such parameter is enough; with several factors, the first one is used.
         let first = alone.iter().position(|is| *is);
         return Some((0..count).map(|i| Some(i) == first).collect());
     }
     if !vanish(&|_| true) {
         return None;
     }
-    // All but those that the others can do without.
+    // Start from all parameters, and drop each one that is not needed.
     let mut zero = vec![true; count];
     for i in 0..count {
         zero[i] = false;

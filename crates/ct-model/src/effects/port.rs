@@ -28,7 +28,7 @@ pub enum Port {
     Own,
 }
 
-/// What of a model has ports.
+/// Parts of a model that have ports.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ports {
     /// Inputs, outputs and the equations of states that are balances: not those that only say that one state is another's speed.
@@ -38,7 +38,7 @@ pub struct Ports {
 }
 
 impl Port {
-    /// Its names, as they stand in an identifier: `u`, `k,T`.
+    /// Names of the port's variables, as in an identifier: `u`, `k,T`.
     #[must_use]
     pub fn names(self, spec: &ModelSpec) -> String {
         let of = |variable| spec.about(variable).name.as_str();
@@ -103,7 +103,7 @@ impl ModelSpec {
         expression
     }
 
-    /// How often a variable stands in the equations.
+    /// Number of times that a variable occurs in the equations.
     pub(super) fn occurrences(&self, of: Variable) -> usize {
         let mut count = 0;
         for expression in self.expressions() {

@@ -46,7 +46,7 @@ macro_rules! of_signal {
     };
 }
 
-/// The same of time, from the beginning of the record to its end.
+/// Shape functions of time, from the beginning of the record to its end.
 macro_rules! of_time {
     ($inputs:literal, $unit:literal, $bound:literal, $before:literal, $behind:literal) => {
         concat!(
@@ -124,7 +124,7 @@ const INPUT_IN_TIME: Effect = Effect {
     ..EQUATION_IN_TIME
 };
 
-/// All of them: of a balance, an input, an output, and a parameter or a named flow.
+/// All shape effects: in a balance, at an input, at an output, and at a parameter or a named flow.
 pub(super) const EFFECTS: [Effect; 8] = [
     OF_EQUATION,
     OF_INPUT,

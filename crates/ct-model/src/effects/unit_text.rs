@@ -7,7 +7,7 @@
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Powers(Vec<(String, i32)>);
 
-/// One unit over another, in the notation of Modelica: `W` over `degC` is `W/K`, `m/s` over `m/s` is `1`. Empty where one is not known or is
+/// Quotient of two units in the notation of Modelica: `W` over `degC` is `W/K`, `m/s` over `m/s` is `1`. Empty if a unit is unknown or is
 /// not a product of powers.
 pub(super) fn quotient(a: &str, b: &str) -> String {
     composed(a, b, -1)
@@ -60,7 +60,7 @@ impl Powers {
     }
 }
 
-/// What is left of a unit's text.
+/// The part of a unit's text that is not read yet.
 struct Reader<'t> {
     rest: &'t str,
 }

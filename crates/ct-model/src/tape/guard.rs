@@ -12,7 +12,7 @@ pub(crate) struct Guard {
 }
 
 impl Guard {
-    /// Its answer where the difference has this value.
+    /// Answer of the guard for this difference.
     pub fn holds(self, difference: f64) -> bool {
         match self.comparison {
             Comparison::Less => difference < 0.0,
@@ -40,7 +40,7 @@ impl Guard {
     }
 }
 
-/// When a branch is taken, over the answers of guards.
+/// Condition for a branch, in terms of the answers of guards.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Branch {
     Constant(bool),

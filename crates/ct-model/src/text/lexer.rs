@@ -8,7 +8,7 @@ pub(crate) enum Word {
     /// A name or a keyword.
     Name(String),
     Number(f64),
-    /// What stands between quotes.
+    /// Text between quotes.
     Text(String),
     /// An operator or a bracket.
     Sign(&'static str),
@@ -136,7 +136,7 @@ fn number(text: &str) -> usize {
     end
 }
 
-/// What stands between the quotes that a text begins with, and the length with them; `None` where they are not closed.
+/// The text between the quotes at the beginning of `text`, and the length including the quotes; `None` if they are not closed.
 fn quoted(text: &str) -> Option<(String, usize)> {
     let mut all = String::new();
     let mut characters = text.char_indices().skip(1);

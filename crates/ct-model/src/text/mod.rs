@@ -53,7 +53,7 @@ impl ModelSpec {
         resolve::resolve(text, parser::parse(text)?)
     }
 
-    /// The same, of a model that is to be simulated from its declared starts: a division by a state that starts at zero is refused.
+    /// Parses a model that is to be simulated from its declared starts: a division by a state that starts at zero is an error.
     ///
     /// # Errors
     /// As [`ModelSpec::parse`].

@@ -1,4 +1,4 @@
-//! What each name of a text stands for: parameter, input, state or flow.
+//! Meaning of each name of a text: parameter, input, state or flow.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,17 +17,17 @@ pub(crate) fn is_reserved(name: &str) -> bool {
     RESERVED.contains(&name) || Function::ALL.iter().any(|f| f.name() == name)
 }
 
-/// What a name stands for. Flows are in the order of the text until they are sorted.
+/// Meanings of names. Flows have the order of the text until they are sorted.
 pub(super) struct Names {
     pub(super) all: BTreeMap<String, Variable>,
     /// Declarations that are flows, and those that are states, by position.
     pub(super) flows: Vec<usize>,
     pub(super) states: Vec<usize>,
-    /// How many flows, the first ones, are of parameters alone.
+    /// Number of flows, at the beginning, that depend on parameters alone.
     pub(super) tied: usize,
 }
 
-/// What the value of a parameter depends on.
+/// Dependence of the value of a parameter.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Tied {
     /// On numbers, constants and measured parameters: it has a value.

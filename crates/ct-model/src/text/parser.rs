@@ -83,7 +83,7 @@ fn parse_part<T>(
     Ok(part)
 }
 
-/// What an operator makes of the parts beside it.
+/// Builds the node of an operator from its two operands.
 type Joins = fn(Box<Node>, Box<Node>) -> Kind;
 
 struct Parser<'a> {

@@ -19,7 +19,7 @@ pub(crate) fn resolve(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError
     resolve_with(text, syntax, true, false)
 }
 
-/// The same, and what cannot be simulated from its declared starts is refused.
+/// Resolves a model for simulation: models that cannot be simulated from their declared starts are an error.
 pub(crate) fn resolve_to_simulate(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
     resolve_with(text, syntax, true, true)
 }
@@ -60,7 +60,7 @@ struct Builder<'a> {
     text: &'a str,
     names: Names,
     used: BTreeSet<Variable>,
-    /// What is declared has to be used.
+    /// Whether every declared variable has to be used.
     all_used: bool,
     /// A simulation has to begin at the declared starts.
     begins: bool,
@@ -91,7 +91,7 @@ impl ModelSpec {
     }
 }
 
-/// What an expression may hold.
+/// Kinds of variables that an expression may contain.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Holds {
     /// Numbers and parameters that stand before it; these are not used by it.
@@ -316,7 +316,7 @@ impl Builder<'_> {
         Ok((assigned, differential))
     }
 
-    /// What is declared and has no part in anything is a mistake more often than not.
+    /// A declared variable that is not used is usually a mistake.
     fn unused(&self, declarations: &[Declaration]) -> Result<(), TextError> {
         for declaration in declarations {
             let variable = self.names.all[&declaration.name];

@@ -1,4 +1,4 @@
-//! What a text says, before names are looked up.
+//! Syntax of a model text, before names are resolved.
 
 use crate::expression::{Comparison, Operator};
 
@@ -45,7 +45,7 @@ impl Node {
     }
 }
 
-/// What a variable is declared as.
+/// Kind of a declared variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kept {
     Constant,
@@ -68,7 +68,7 @@ pub(crate) enum Attribute {
 pub(crate) struct Declaration {
     pub(crate) kept: Kept,
     pub(crate) name: String,
-    /// Where the name stands \[bytes\].
+    /// Position of the name \[bytes\].
     pub(crate) from: usize,
     /// Name, place and value.
     pub(crate) attributes: Vec<(String, usize, Attribute)>,

@@ -6,7 +6,7 @@ use std::fmt::{self, Display, Formatter};
 use crate::expression::{Comparison, Condition, Expression, Operator, Variable};
 use crate::spec::{About, Given, ModelSpec};
 
-/// How tightly an expression holds together; one that holds less than its place asks for is put in brackets.
+/// Binding strength of an expression; an expression with less strength than its place needs is put in brackets.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Binding {
     Choice,
@@ -24,7 +24,7 @@ enum Binding {
 struct Written<'a, T> {
     spec: &'a ModelSpec,
     part: &'a T,
-    /// What its place asks for.
+    /// Binding strength that the place needs.
     at_least: Binding,
 }
 

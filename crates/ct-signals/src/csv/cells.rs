@@ -3,8 +3,8 @@
 use super::place::Place;
 use crate::{Error, TimestampError, quoted};
 
-/// What historians, loggers and spreadsheets write where there is no sample, in small letters. A cell that begins with one of them and goes
-/// on with a blank or a colon is meant too (`Bad: sensor failure`).
+/// Marks of missing samples in historians, loggers and spreadsheets, in small letters. A cell that begins with one of them and continues
+/// with a blank or a colon is a missing sample too (`Bad: sensor failure`).
 const MISSING: &[&str] = &[
     "-",
     "--",
@@ -76,15 +76,15 @@ pub(super) fn is_word(cell: &str) -> bool {
         || !(cell_is_number || cell.starts_with(|c: char| c.is_ascii_digit() || "+-.,".contains(c)))
 }
 
-/// What a cell holds.
+/// Content of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Cell {
     Number(f64),
-    /// Its sample is missing.
+    /// The sample is missing.
     Missing,
 }
 
-/// Why a cell is refused; the caller knows its row and its column.
+/// Reason why a cell is rejected; the caller knows its row and its column.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum CellFault {
     Empty,
@@ -94,7 +94,7 @@ pub(crate) enum CellFault {
     Word,
     /// Commas that are no decimal mark.
     Thousands,
-    /// It says that its sample is missing, and none may be.
+    /// The cell marks a missing sample, and missing samples are not allowed.
     Strict,
     /// The time is a number in the rows before, and no number here.
     NoNumber,
@@ -108,7 +108,7 @@ pub(crate) enum CellFault {
 }
 
 impl CellFault {
-    /// As an error of the file; `strict`: a missing sample is refused.
+    /// Converts the fault to an error of the file; `strict`: a missing sample is an error.
     pub(super) fn at(self, place: Place, cell: &str, strict: bool) -> Error {
         let (file, row, column) = (place.file(), place.row(), place.column());
         let mend = match self {
@@ -177,7 +177,7 @@ pub(crate) struct Numbers {
     mark: Option<char>,
     /// A missing sample is refused.
     strict: bool,
-    /// What stands for a missing sample beside the usual words: as text, and as a number where it is one.
+    /// Marks of a missing sample in addition to the usual words: as text, and as a number if it is one.
     own: Vec<(String, Option<f64>)>,
     scratch: String,
 }

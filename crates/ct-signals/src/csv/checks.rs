@@ -1,4 +1,4 @@
-//! What can only be seen in a whole record.
+//! Checks that need the whole record.
 
 use std::collections::HashMap;
 
@@ -121,7 +121,7 @@ impl Table {
                 });
             }
             let largest = values.iter().fold(0.0, |high: f64, v| high.max(v.abs()));
-            // What is simulated may rest at zero.
+            // A signal for simulation may be zero for a long time.
             if purpose == Purpose::Fit && largest < 1.0 / LARGEST {
                 return Err(Error::TooSmall {
                     file: file.into(),
@@ -162,7 +162,7 @@ impl Table {
     }
 }
 
-/// What stands in cells whose sample is missing.
+/// The contents of the cells with missing samples.
 fn listed(words: &[(String, usize)]) -> String {
     let word = |(word, _): &(String, usize)| match word.as_str() {
         "" => "empty cells".to_string(),

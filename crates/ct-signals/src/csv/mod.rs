@@ -31,11 +31,11 @@ pub(crate) use self::{
 use crate::columns::{Columns, Heading, Purpose};
 use crate::{Error, Hold, LARGEST_RECORD, MIN_ROWS, Record, read_file};
 
-/// How a record is read.
+/// Options for reading a record.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReadOptions {
-    /// What the inputs do between samples.
+    /// Hold of the inputs between samples.
     pub hold: Hold,
     /// Rows before this are left out: a date, or a number in the unit of the time column.
     pub from: Option<String>,
@@ -61,7 +61,7 @@ impl From<Hold> for ReadOptions {
 pub struct Reading {
     /// The record.
     pub record: Record,
-    /// What was read, what was missing and what was done.
+    /// Summary: rows read, samples missing, and corrections made.
     pub summary: ReadSummary,
 }
 

@@ -1,4 +1,4 @@
-//! What was read, what was missing and what was done, in one line.
+//! One-line summary: rows read, samples missing, and corrections made.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ pub struct MissingSamples {
     pub column: String,
     /// How many.
     pub samples: usize,
-    /// What stands in their cells, with the number of each; empty for an empty cell.
+    /// Contents of the cells with missing samples, with the number of each; empty text for an empty cell.
     pub words: Vec<(String, usize)>,
 }
 
@@ -28,7 +28,7 @@ pub struct Converted {
     pub to: String,
 }
 
-/// What was read of a file; [`fmt::Display`] says it in one line.
+/// Summary of a file that was read; [`fmt::Display`] formats it in one line.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadSummary {
     /// The file.
@@ -51,7 +51,7 @@ pub struct ReadSummary {
     pub interval: f64,
     /// Time from the first to the last row in use \[s\].
     pub duration: f64,
-    /// When it began, where the file has dates.
+    /// Start date, if the file has dates.
     #[serde(skip)]
     pub calendar: Option<Calendar>,
     /// Samples that are missing, by column.

@@ -20,16 +20,16 @@ pub(super) struct Table {
     pub(super) ends: Vec<usize>,
     /// \[s\], from zero of the column, or from the first row where these are dates.
     pub(super) time: Vec<f64>,
-    /// Of every channel, in the order of [`Layout::channels`], its values in the units that are wanted.
+    /// Values of each channel, in the order of [`Layout::channels`], in the required units.
     pub(super) values: Vec<Vec<f64>>,
-    /// Of every channel the words that stand in cells whose sample is missing, with their number.
+    /// For each channel, the words that mark missing samples, with their number.
     pub(super) missing: Vec<Vec<(String, usize)>>,
     pub(super) calendar: Option<Calendar>,
     /// Rows before or behind what is wanted.
     pub(super) outside: usize,
     /// Rows without a time.
     pub(super) without_time: usize,
-    /// Where the first of them ends, and what stands in their cells.
+    /// Row where the first group of rows without time ends, and the contents of their time cells.
     pub(super) untimed: (usize, Vec<(String, usize)>),
 }
 

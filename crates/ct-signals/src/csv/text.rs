@@ -119,7 +119,7 @@ pub(crate) fn delimiter(text: &str) -> u8 {
     b";\t,".iter().copied().max_by_key(count).unwrap_or(b',')
 }
 
-/// What a delimiter is called.
+/// Name of a delimiter.
 pub(crate) fn delimiter_name(delimiter: u8) -> &'static str {
     match delimiter {
         b';' => "semicolon",

@@ -1,9 +1,9 @@
-//! Why a line of a stream is not used.
+//! Reasons why a line of a stream is not used.
 
 use crate::TimestampError;
 use crate::csv::TIME_AS_NUMBER;
 
-/// Why a line is not used; the next one may be.
+/// Reason why a line is not used; later lines may be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BadLine {
@@ -64,10 +64,10 @@ pub enum BadLine {
         column: String,
         /// The cell.
         text: String,
-        /// What to do.
+        /// The correction, in words.
         mend: &'static str,
     },
-    /// Both marks for decimals.
+    /// The column uses both decimal marks.
     #[error(
         "column \"{column}\": \"{text}\" has another decimal mark than the rows before; use one of them throughout"
     )]

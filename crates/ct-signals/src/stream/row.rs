@@ -126,7 +126,7 @@ impl Rows {
         if let Some(times) = &mut self.times {
             return times.read(cell, &mut self.numbers);
         }
-        // There is no more of the column to look at.
+        // The other cells of the column are not available.
         let all = || vec![cell.to_string()];
         let mut times = Times::of(cell, all, self.seconds, &self.columns)?;
         if let Times::Dates { reader, first } = &mut times {

@@ -1,12 +1,12 @@
-//! Why a date or a time is not understood.
+//! Errors of dates and times.
 
 use thiserror::Error;
 
-/// Why a date or a time is refused; the caller knows the file, the row and the column.
+/// Reason why a date or a time is rejected; the caller knows the file, the row and the column.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TimestampError {
-    /// There is no zone of this name.
+    /// No time zone has this name.
     #[error(
         "there is no time zone \"{zone}\"; give a name such as \"Europe/Berlin\" or \"UTC\", or an offset such as \"+01:00\""
     )]
@@ -14,7 +14,7 @@ pub enum TimestampError {
         /// The name.
         zone: String,
     },
-    /// No cell of the column holds anything.
+    /// Every cell of the column is empty.
     #[error("there is no date or time to read; name another column")]
     NoCells,
     /// The first cell has no form that is known.
@@ -66,10 +66,10 @@ pub enum TimestampError {
         text: String,
         /// The format.
         format: String,
-        /// What does not fit.
+        /// Reason for the mismatch.
         reason: String,
     },
-    /// There is no such date or time.
+    /// The date or time does not exist.
     #[error("\"{text}\" is not in the calendar or on the clock; correct the cell")]
     NoSuchTime {
         /// The cell.

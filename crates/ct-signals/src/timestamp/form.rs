@@ -8,7 +8,7 @@ mod scanner;
 use self::scanner::Scanner;
 use super::calendar;
 
-/// How all cells of a column are written.
+/// Format of all cells of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Form {
     pub date: DateForm,
@@ -35,7 +35,7 @@ pub(super) enum DateForm {
     TimeOnly,
 }
 
-/// What a cell says.
+/// Fields of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Fields {
     /// Days since 1970-01-01; `None` where there is no date.
@@ -49,10 +49,10 @@ pub(super) struct Fields {
     pub timed: bool,
 }
 
-/// Why a cell cannot be read.
+/// Reason why a cell cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// It is written in another way.
+    /// The cell has another format.
     Form,
     /// There is no such date or time.
     Range,
@@ -72,7 +72,7 @@ impl Form {
             (1 | 2, b'-' | b'/' | b'.' | b' ') if at(first + 1).is_ascii_alphabetic() => {
                 DateForm::MonthName(separator)
             }
-            // No country writes the month first with points.
+            // Dates with points never have the month first.
             (1 | 2, b'.') => DateForm::DayFirst(separator),
             (1 | 2, b'-' | b'/') => DateForm::Undecided(separator),
             _ => return None,
@@ -225,7 +225,7 @@ impl Form {
             let more = scan.peek().is_ascii_digit();
             return Ok((hour, minute, more.then(|| scan.number(2, 2)).transpose()?));
         }
-        // Without a date the hours may be those since the start of the record.
+        // Without a date, the hours may count from the start of the record.
         let hour = scan.number(1, if dated { 2 } else { 4 })?;
         scan.expect(b':')?;
         let minute = scan.number(2, 2)?;

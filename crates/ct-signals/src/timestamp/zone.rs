@@ -32,7 +32,7 @@ pub struct Zone {
 enum Rules {
     /// Seconds ahead of UTC, all the year.
     Fixed(i32),
-    /// With daylight saving time, now or at some time.
+    /// A zone with daylight saving time, now or in some years.
     Changing(TimeZone),
 }
 
@@ -59,7 +59,7 @@ pub(super) struct KnownOffset {
 }
 
 impl KnownOffset {
-    /// No time at all.
+    /// Zero duration.
     pub(super) const NONE: Self = Self {
         begin: 0,
         end: 0,
@@ -77,12 +77,12 @@ pub(super) struct Civil {
     pub timed: bool,
 }
 
-/// Why a civil time is no instant.
+/// Reason why a civil time is not a valid instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NoInstant {
     /// Clocks go forward over it.
     Skipped,
-    /// It is beyond the years that can be computed with.
+    /// The year is outside the range of the computation.
     Range,
 }
 
@@ -295,7 +295,7 @@ fn known_around(zone: &TimeZone, seconds: i64, offset: Offset) -> KnownOffset {
         }?;
         Some(transition.timestamp().as_second())
     };
-    // One that is at this very instant precedes what follows it.
+    // A change at this very instant comes before the times that follow it.
     let begin = change(seconds + 1, false).and_then(|change| {
         let before = offset_at(change - 1)?;
         Some(change + i64::from(own.max(before)))

@@ -18,7 +18,7 @@ pub struct Dimension {
 }
 
 impl Dimension {
-    /// Of pure numbers.
+    /// Dimension of pure numbers.
     pub const NONE: Self = Self::of([0; 6]);
     /// Of times.
     pub const TIME: Self = Self::of([0, 0, 1, 0, 0, 0]);

@@ -1,9 +1,10 @@
-//! What a unit's text means: its dimension, its size and its zero, and how values are converted.
+//! Meaning of a unit's text: dimension, size and zero, and the conversion of values.
 
 use super::dimension::Dimension;
 use super::table::{self, Base};
 
-// Not a crate: those that read units at run time follow UCUM or GNU units, where C is the coulomb and degC, rpm, pct or lmin are unknown.
+// No existing crate is used: crates that read units at run time follow UCUM or GNU units, where C is the coulomb and degC, rpm, pct or lmin
+// are unknown.
 
 /// A unit of measurement that is understood.
 ///
@@ -32,7 +33,7 @@ pub struct Unit {
     zero: (f64, f64),
 }
 
-/// How values are converted: `factor * value + offset`.
+/// Conversion of values: `factor * value + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conversion {
     /// New units in one old unit.
@@ -73,7 +74,7 @@ impl Unit {
             .replace("deg F", "degF")
             .replace("° C", "°C")
             .replace("° F", "°F");
-        // A scale with a zero of its own is one only where it stands alone.
+        // A unit with an offset zero (degC) has its offset only if it is not part of a compound unit.
         if let Some(base) = table::find(&text) {
             return Some(Self::of(base));
         }

@@ -6,7 +6,7 @@ use super::dimension::Dimension;
 
 /// A unit that has a symbol of its own.
 pub(super) struct Symbol {
-    /// As it is written. Words of four letters and more are understood in capitals too.
+    /// Spellings. Words of four letters and more are also understood in capitals.
     names: &'static [&'static str],
     /// Whether a prefix such as `m` or `k` may stand before it.
     prefixed: bool,
@@ -157,7 +157,7 @@ const PREFIXES: &[(&str, (f64, f64))] = &[
 
 /// The unit of a symbol, with or without a prefix.
 pub(super) fn find(name: &str) -> Option<Base> {
-    // Without a prefix first: min is a minute, not a milli-inch.
+    // Units without a prefix first: min is a minute, not a milli-inch.
     if let Some(symbol) = SYMBOLS.iter().find(|symbol| symbol.is(name)) {
         return Some(symbol.base((1.0, 1.0)));
     }

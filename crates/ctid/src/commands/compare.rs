@@ -74,7 +74,7 @@ impl Compare {
         }
     }
 
-    /// What stands in the model file and has no effect, and what the records cannot tell, where there is such.
+    /// Notes on entries of the model file that have no effect, and on what the records cannot show.
     fn notes(waiting: &[String], input: &Input, look: Look) -> String {
         let Input { problem, summaries } = input;
         let note = |table: &String| {
@@ -136,7 +136,7 @@ impl Compare {
     }
 }
 
-/// What is said of effects whose numbers are those of the records at hand.
+/// Notes on effects whose numbers come from the records of this run.
 fn not_kept(model: &OwnModelFile, used: &RecordNumbers, look: Look) -> String {
     let notes = model.not_kept(used).into_iter();
     notes

@@ -30,7 +30,7 @@ pub(super) struct Identify {
     /// Record (CSV), one; several of one plant for srivc and rivc
     #[arg(required = true, value_name = "DATA.csv")]
     data: Vec<PathBuf>,
-    /// How the parameters are found; several, with commas between them, or all, are set side by side
+    /// Estimation method; several, separated by commas, or `all`, are compared side by side
     #[arg(long, value_enum, value_delimiter = ',', required = true)]
     method: Vec<Choice>,
     /// Orders n of A and m of B in A y = B u + d; N..N tries all from one n to another with m below n
@@ -48,17 +48,17 @@ pub(super) struct Identify {
     /// linear model of your own stands its own transfer function
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
-    /// Of a linear model of your own with several inputs: the one that is identified
+    /// For a linear model of your own with several inputs: the input that is identified
     #[arg(long, value_name = "NAME", requires = "model")]
     input: Option<String>,
-    /// The same of several outputs
+    /// For a linear model of your own with several outputs: the output that is identified
     #[arg(long, value_name = "NAME", requires = "model")]
     output: Option<String>,
     /// The columns' names, where their first letters do not tell; several inputs with + between them, for srivc and rivc. Without a fourth name there is
     /// no reference
     #[arg(long, value_name = "TIME,INPUT,OUTPUT[,REFERENCE]", value_parser = columns)]
     columns: Option<Columns>,
-    /// What the input does between samples
+    /// Hold of the input between samples
     #[arg(long, value_enum, default_value_t = InputHold::Zero)]
     hold: InputHold,
     /// Memory of stabilized-oe, ct-rls and recursive-fcloe [s]; without it a fifth of the record, at least 10 time constants
@@ -68,7 +68,7 @@ pub(super) struct Identify {
     /// best of several, from which fcloe, recursive-fcloe, srivc and rivc start
     #[arg(long, value_name = "L", allow_negative_numbers = true)]
     bandwidth: Option<f64>,
-    /// Where zero of the signals is, for ls, iv, fcloe and recursive-fcloe
+    /// How the operating point (zero of the signals) is chosen, for ls, iv, fcloe and recursive-fcloe
     #[arg(long, value_enum, default_value_t = LevelChoice::Auto)]
     levels: LevelChoice,
     /// Delay of the inputs [s], for srivc and rivc: a number, auto to estimate it up to a tenth of the record, or 0..S to estimate it up to S
@@ -113,13 +113,13 @@ fn columns(text: &str) -> Result<Columns, String> {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum InputHold {
-    /// It stands until the next sample: a D/A converter
+    /// Constant until the next sample: a D/A converter
     Zero,
-    /// It runs on a line to the next sample: a measured input
+    /// A straight line to the next sample: a measured input
     First,
 }
 
-/// Which columns are read and how, and the model of the user's own that they are of.
+/// Columns, hold, and the user's own model to which the columns belong.
 type Layout<'l> = (&'l Columns, Hold, Option<&'l OneByOne<'l>>);
 
 impl Identify {
@@ -138,7 +138,7 @@ impl Identify {
         Ok(file)
     }
 
-    /// Which columns, the hold, and the controller with its limits.
+    /// Columns, hold, and the controller with its limits.
     fn layout(
         &self,
         model: Option<ModelFile>,
@@ -236,7 +236,7 @@ impl Identify {
         Ok(())
     }
 
-    /// What was asked of a method: the options that concern it.
+    /// Options that concern a method.
     fn request(
         &self,
         method: Method,

@@ -64,7 +64,7 @@ enum Command {
     Tables(Tables),
 }
 
-/// Where results go besides the terminal.
+/// Files for results, in addition to the terminal.
 #[derive(Debug, Args)]
 struct Results {
     /// Write the result as JSON
@@ -102,7 +102,7 @@ struct Remove {
 
 #[derive(Debug, Args)]
 struct Effects {
-    /// One effect to say all about
+    /// An effect to describe in full
     effect: Option<String>,
     /// List only what may be added to the model of this file
     #[arg(long, value_name = "M.toml", conflicts_with = "effect")]
@@ -181,7 +181,7 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
 }
 
 impl Results {
-    /// Where the results go, checked.
+    /// The checked files of the results.
     fn plan(&self, inputs: &[&Path], unknown: Option<&Path>) -> Result<Vec<Output>, Error> {
         let unknown = unknown.map(|path| (Kind::Unknown, path));
         let wanted: Vec<_> = self.wanted().chain(unknown).collect();

@@ -108,7 +108,7 @@ impl Simulate {
                 "a model file of a plant holds first guesses, no values: give the records that it is fitted to, --fit DATA.csv",
             ));
         }
-        // Without a fit the inputs are those that are applied, whatever moves them.
+        // Without a fit the given inputs are applied, also if a controller produced them.
         let fitted = (!self.fit.is_empty()).then(|| model.loop_said(look));
         let bar = Bar::new();
         bar.phase("fitting the model");

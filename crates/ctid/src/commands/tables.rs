@@ -24,7 +24,7 @@ pub(super) struct Tables {
     /// Noises: each table is run once with each; without it as many as a paper's bands are for, 200 or 100
     #[arg(long, value_name = "N", value_parser = runs, allow_negative_numbers = true)]
     runs: Option<usize>,
-    /// What the noises are drawn from
+    /// Seed of the noise
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Write the record of baysse's emulated rig as CSV, for `diagnose` or `identify`
@@ -34,7 +34,7 @@ pub(super) struct Tables {
     results: Results,
 }
 
-/// How many runs; which of the limits holds is known with the paper.
+/// Number of runs; the limits depend on the paper.
 fn runs(text: &str) -> Result<usize, String> {
     text.parse().map_err(|_| {
         let (udink, baysse) = (udink::FEWEST, baysse::FEWEST);

@@ -23,7 +23,7 @@ use crate::own_model::{self, AnyModelFile, OwnModelFile, OwnProposal};
 use crate::progress::Bar;
 use crate::{Error, names};
 
-/// What may be typed.
+/// Command line options.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Records (CSV) that leave it undecided; several are fitted together
@@ -48,7 +48,7 @@ pub struct Arguments {
     /// Length [s]; without it that of the longest record
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     duration: Option<f64>,
-    /// What sequences are drawn from
+    /// Seed of the random sequences
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Limit on the time of the search; the result says what it left out
@@ -64,7 +64,7 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
-/// What random numbers are drawn from.
+/// Seed of random numbers.
 pub(crate) fn seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_| format!("a whole number from 0 to {} is needed", u64::MAX))
@@ -136,7 +136,7 @@ fn digits(value: f64) -> String {
 
 impl Found for Proposal {
     fn record(&self) -> Option<String> {
-        // What tells nothing apart is not worth applying.
+        // An experiment that does not distinguish the two is not worth applying.
         if self.design.twins() {
             return None;
         }
@@ -268,7 +268,7 @@ impl Arguments {
         Ok(limits)
     }
 
-    /// Of a model of one's own.
+    /// For a model of the user's own.
     fn run_own(
         &self,
         model: &OwnModelFile,
@@ -338,7 +338,7 @@ impl Arguments {
         );
         bar.clear();
         let design = design.map_err(|error| files.blame(error))?;
-        // Of a file that was asked for it is said that it is not there.
+        // If a file was requested, report that it is not written.
         if design.twins() && self.out.is_none() {
             outputs.retain(|output| output.kind() != Kind::Record);
         }

@@ -1,4 +1,4 @@
-//! What a person reads of a design; all of it is derived from the struct that `--json` writes.
+//! Text output of a design; it is derived from the struct that `--json` writes.
 
 use missing_effect::design::{Alternative, Candidate, Design, Power};
 
@@ -6,9 +6,9 @@ use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 
-/// How many experiments the table shows.
+/// Number of experiments in the table.
 pub(crate) const SHOWN: usize = 10;
-/// What the columns of the table mean.
+/// Meaning of the table's columns.
 pub(crate) const NOTE: &str = "(power: the expected rise of the criterion of the wrong model; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; among experiments with ample power the first stays closest to the range of the records)";
 
 fn with_unit(number: &str, unit: &str) -> String {
@@ -137,7 +137,7 @@ fn row(number: &str, candidate: &Candidate, design: &Design) -> Vec<String> {
     ]
 }
 
-/// What is below a hundredth is nothing.
+/// Values below a hundredth are shown as zero.
 pub(crate) fn power(power: &Power, refitted: bool) -> String {
     let mark = if refitted { "" } else { "~" };
     if power.power < 0.01 {

@@ -25,7 +25,7 @@ pub(super) fn push(document: &mut DocumentMut, id: &str) {
         effects.push(id);
         return;
     }
-    // One effect a line: a comment behind the last one stays behind it.
+    // One effect per line: a comment after the last effect stays after it.
     let indent = effects
         .iter()
         .last()

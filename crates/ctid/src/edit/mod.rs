@@ -77,11 +77,11 @@ pub fn remove(path: &Path, effect: &str) -> Result<String, Error> {
 pub struct Edited {
     /// The model file's new text.
     pub text: String,
-    /// What was done.
+    /// Description of the change.
     pub done: String,
 }
 
-/// One change after the other: of two at once, as from two tabs of `ctid serve`, one would be lost.
+/// Serialises changes: of two simultaneous changes, as from two tabs of `ctid serve`, one would be lost.
 static CHANGING: Mutex<()> = Mutex::new(());
 
 /// Whoever writes into the file meanwhile, such as an editor, is read so often again.
@@ -138,7 +138,7 @@ fn still(path: &Path, text: &str) -> bool {
     model_file::read_text(path).is_ok_and(|now| now == text)
 }
 
-/// A change that would have been made to something else than was seen.
+/// Error: the file has changed since it was shown.
 pub(crate) fn changed(file: &str, what: &str) -> Error {
     Error::Changed {
         file: file.to_string(),
@@ -195,7 +195,7 @@ pub fn with_effect(
         })?;
     }
     let text = document.to_string();
-    // What is about to be written has to be a model file that can be read again.
+    // The new text has to be a valid model file.
     let model = model_file::parse(file, &text)?;
     let placed = model.effects.last().copied().unwrap_or(placed);
     let done = format!(

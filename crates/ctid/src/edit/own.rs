@@ -17,10 +17,10 @@ use crate::own_model::effects::{RECORD, every_candidate, find, plain};
 use crate::own_model::{OwnModelFile, read_model};
 use crate::report::rounded;
 
-/// Where the text that a model file names is read.
+/// Reads the text that a model file names.
 pub(crate) type ReadText<'r> = &'r dyn Fn(&Path) -> Result<ModelSpec, Error>;
 
-/// Of what `ctid diagnose --json` and `ctid compare --json` write of a model of its user's own, what is kept in a model file.
+/// The parts of the JSON results of `ctid diagnose` and `ctid compare`, for a user's own model, that a model file can keep.
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct Findings {
     model: String,
@@ -36,7 +36,7 @@ struct FoundStep {
     parameters: Vec<FoundParameter>,
 }
 
-/// An effect alone beside the believed model.
+/// Result of one effect added alone to the believed model.
 #[derive(Debug, Clone, Deserialize)]
 struct FoundSingle {
     sizes: Vec<FoundParameter>,
@@ -57,7 +57,7 @@ impl Findings {
         Self::of_text(&read_text(path)?).map_err(|what| Error::file(path, what))
     }
 
-    /// The same of its text.
+    /// Reads the findings from a JSON text.
     ///
     /// # Errors
     /// What is wrong and the mend.
@@ -69,7 +69,7 @@ impl Findings {
         })
     }
 
-    /// Whether it says anything of an effect.
+    /// Whether the result contains an effect.
     pub fn has(&self, id: &str) -> bool {
         self.record_numbers.contains_key(id)
     }
@@ -88,7 +88,7 @@ impl Findings {
 }
 
 impl Findings {
-    /// What is kept of an effect: where fits of its parameters begin, and the numbers of its records.
+    /// Values to keep for an effect: start values of its parameters, and the numbers of its records.
     ///
     /// # Errors
     /// Where the result says nothing of it.
@@ -143,7 +143,7 @@ pub(super) fn is_own(text: &str) -> bool {
     table.is_ok_and(|table| table.contains_key("model"))
 }
 
-/// Where the text stands that a model file of this path names.
+/// Finds the text that the model file at this path names.
 pub(super) fn beside(path: &Path) -> impl Fn(&Path) -> Result<ModelSpec, Error> {
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     move |named| read_model(&folder.join(named))
@@ -267,7 +267,7 @@ pub(crate) fn without_effect(
     let file = path.display().to_string();
     let mut document = document(&file, text)?;
     let wanted = plain(effect);
-    // As it is written there, with blanks or without.
+    // The entry as written in the file, with or without blanks.
     let listed = document.get_mut("effects").and_then(Item::as_array_mut);
     let removed = listed.is_some_and(|effects| {
         let written = effects.iter().filter_map(|on| on.as_str());

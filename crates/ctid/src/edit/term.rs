@@ -107,12 +107,12 @@ pub fn with_term(
     Ok(Edited { text, done })
 }
 
-/// To the digits that a person reads.
+/// Rounds values to the digits that are shown.
 fn shortened(values: &[f64]) -> Vec<f64> {
     values.iter().map(|&value| rounded(value, 6)).collect()
 }
 
-/// The same of knots, where they still rise then.
+/// Rounds knots, if they still rise after rounding.
 fn knots(at: &[f64]) -> Vec<f64> {
     let short = shortened(at);
     if short.windows(2).all(|pair| pair[0] < pair[1]) {

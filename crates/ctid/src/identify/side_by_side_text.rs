@@ -21,7 +21,7 @@ pub fn text(found: &SideBySide, look: Look) -> String {
     text
 }
 
-/// By what the methods are compared.
+/// Measure by which the methods are compared.
 pub(crate) fn measure(found: &SideBySide) -> String {
     let test = match &found.test[..] {
         [] => String::new(),
@@ -177,7 +177,7 @@ fn orders(found: &SideBySide, look: Look) -> String {
     text
 }
 
-/// What the table of orders says.
+/// Meaning of the table of orders.
 pub(crate) const ORDERS: &str = "BIC of the simulation error beside an autoregressive noise model: shown above is the least of a method whose parameters differ \
      significantly from zero. \
      YIC: low for a model that fits and has small standard errors; it needs standard errors.";

@@ -229,7 +229,7 @@ fn drift(found: &Identification, look: Look) -> String {
     text
 }
 
-/// What `a_1` is.
+/// Name of `a_1`.
 pub(crate) fn time_constant_name(found: &Identification) -> &'static str {
     match found.order.n {
         1 => "time constant a1",
@@ -237,7 +237,7 @@ pub(crate) fn time_constant_name(found: &Identification) -> &'static str {
     }
 }
 
-/// What the drift says, nothing where none is known.
+/// Sentence about the drift; empty if it is not known.
 pub(crate) fn drift_verdict(found: &Identification) -> String {
     let Some(drift) = &found.drift else {
         return String::new();

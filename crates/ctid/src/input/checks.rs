@@ -10,8 +10,7 @@ use crate::{Error, numbers};
 /// Readings above the tank's height by this part, and commands above their range, are noise.
 const BEYOND_THE_RANGE: f64 = 1.01;
 
-/// Where an effect of the sensor is in the model a full tank may read this many times its height; a reading beyond is in
-/// another unit.
+/// With an effect of the sensor in the model, a full tank may read up to this many times its height; a larger reading has another unit.
 const BEYOND_THE_TANK: f64 = 1.5;
 
 /// Readings this far below zero, as a part of what the record spans, are no noise about an empty tank.
@@ -63,7 +62,7 @@ pub(super) fn controller(
         file: model_name.to_string(),
         what: error.to_string(),
     })?;
-    // Of several levels it is the last one that is held.
+    // With several levels, the last level is compared with the bound.
     let outputs = records.first().map_or(1, |record| record.outputs.len());
     Ok(controller.at_output(outputs.saturating_sub(1)))
 }
@@ -147,7 +146,7 @@ pub(super) fn check_movement(records: &[Record]) -> Result<(), Error> {
     }
 }
 
-/// A level above the tank is in another unit than the tank, or its sensor is not right.
+/// At least one fitted record has an input that changes; the other records may be at rest.
 pub(super) fn check_height<'a>(
     model_name: &str,
     model: &ModelFile,
@@ -225,8 +224,8 @@ fn after_space(unit: &str) -> String {
     }
 }
 
-/// Where the outflow is a square root of the level a reading far below zero has another zero than the outlet: no such
-/// level can be simulated. Noise about an empty tank may reach below it, and so may a sensor whose offset is in the model.
+/// If the outflow depends on the square root of the level, a reading far below zero has another zero than the outlet and cannot be
+/// simulated. Noise around an empty tank may be slightly negative, and so may the reading of a sensor whose offset is in the model.
 pub(super) fn check_levels<'a>(
     model: &ModelFile,
     mut records: impl Iterator<Item = &'a Record>,

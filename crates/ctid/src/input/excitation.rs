@@ -26,7 +26,7 @@ const CHANCE: f64 = 0.01;
 /// Standard errors of a correlation beyond which it is none of chance.
 const STANDARD_ERRORS: f64 = 4.0;
 
-/// What a record cannot tell.
+/// Properties that a record cannot show.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ExcitationWarning {
     /// The command of a record never moves.
@@ -34,7 +34,7 @@ pub enum ExcitationWarning {
         /// The record.
         record: String,
     },
-    /// All fitted records together hold one step of the command.
+    /// All fitted records together contain one step of the command.
     SingleStep {
         /// The record that holds it.
         record: String,
@@ -101,13 +101,13 @@ fn with_unit(value: f64, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
 }
 
-/// What the fitted records of a problem cannot tell.
+/// Warnings for the fitted records of a problem.
 #[must_use]
 pub fn of_problem(problem: &Problem) -> Vec<ExcitationWarning> {
     of_records(problem.records.iter())
 }
 
-/// The same of fitted records that are not in a problem yet.
+/// Warnings for fitted records that are not in a problem yet.
 pub(crate) fn of_records<'a>(
     records: impl Iterator<Item = &'a Record> + Clone,
 ) -> Vec<ExcitationWarning> {
@@ -205,7 +205,7 @@ fn no_answer(record: &Record, output: &Channel) -> Option<(f64, f64)> {
     silent.then_some((range, difference))
 }
 
-/// No lag of the prewhitened input is correlated with the output. Where that cannot be tested it is not said.
+/// Whether no lag of the prewhitened input is correlated with the output. False if the test is not possible.
 fn uncorrelated(input: &[f64], output: &[f64]) -> bool {
     let lags = (input.len() / 10).clamp(2, 60);
     prewhitened_input_test(input, output, lags).is_ok_and(|(_, p)| p > CHANCE)
@@ -234,7 +234,7 @@ fn uncorrelated_behind_lags(input: &[f64], output: &[f64]) -> bool {
     }
 }
 
-/// Of the pairs of which both samples are there.
+/// Correlation over the pairs with both samples present.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let pairs = || a.iter().zip(b).filter(|(a, b)| !a.is_nan() && !b.is_nan());
     let count = pairs().count() as f64;
@@ -306,7 +306,7 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         }
-        // Each of the tests finds something by chance in one record of a hundred.
+        // Each test has a false alarm in one record of a hundred.
         assert!(raised >= 18, "{raised} of 20");
     }
 

@@ -1,4 +1,4 @@
-//! What `compare` and `diagnose` read: all of it, and checked, before anything is computed.
+//! Input of `compare` and `diagnose`: read and checked completely before the computation.
 
 mod checks;
 pub mod excitation;
@@ -18,7 +18,7 @@ use crate::look::Look;
 use crate::model_file::{self, ModelFile};
 use crate::output::same_file;
 
-/// What is wrong with a record, where its name says that it is none.
+/// Error of a record whose file name suggests that it is a model.
 fn perhaps_a_model(path: &Path, error: ct_signals::Error) -> Error {
     let named_as_model = path
         .extension()
@@ -41,11 +41,11 @@ pub struct Files {
     pub test: Vec<PathBuf>,
     /// The model file.
     pub model: PathBuf,
-    /// How the records are read, the hold aside, which the model says.
+    /// Options for reading the records, except the hold, which the model gives.
     pub options: ReadOptions,
 }
 
-/// Which part of a record is read, and how.
+/// Options for reading a record: its part and its format.
 #[derive(Debug, Clone, Default, Args)]
 pub struct ReadArguments {
     /// Leave out rows before this: a date such as "2026-01-31 14:25", or a number in the unit of the time column
@@ -70,7 +70,8 @@ fn interval(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What was missing, converted or left out in records, and their dates, a line each; empty where they were read as they stand.
+/// Notes on samples that were missing, converted or left out in records, and on dates, one line each; empty if the records were read
+/// unchanged.
 pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
     let worth = |summary: &&ReadSummary| !summary.is_plain() || summary.calendar.is_some();
     let noted = summaries.iter().filter(worth);
@@ -80,7 +81,7 @@ pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
 }
 
 impl ReadArguments {
-    /// As the reader takes them; what the inputs do between samples is for others to say.
+    /// Options for the reader; the hold of the inputs is set elsewhere.
     #[must_use]
     pub fn options(&self) -> ReadOptions {
         ReadOptions {
@@ -98,12 +99,12 @@ impl ReadArguments {
 pub struct Input {
     /// Model and records.
     pub problem: Problem,
-    /// Of each record, fitted ones first.
+    /// Summary of each record, fitted ones first.
     pub summaries: Vec<ReadSummary>,
 }
 
 impl Files {
-    /// All of them.
+    /// All records.
     #[must_use]
     pub fn all(&self) -> Vec<&Path> {
         let records = self.data.iter().chain(&self.test);
@@ -167,7 +168,7 @@ impl Files {
         ) {
             return Error::file(&self.model, error.to_string());
         }
-        // Its message names the option.
+        // The message of this error names the option.
         if matches!(error, Design(_)) {
             return error.into();
         }
@@ -183,7 +184,7 @@ impl Files {
         }
     }
 
-    /// How a record is called: by its file, or by its path where another has the same file name; in printable text.
+    /// Name of a record in messages: its file name, or its path if another record has the same file name; in printable text.
     pub(crate) fn name_of(&self, path: &Path) -> String {
         let records = self.data.iter().chain(&self.test);
         let same = records.filter(|other| other.file_name() == path.file_name());
@@ -194,7 +195,7 @@ impl Files {
         escaped(&name).into_owned()
     }
 
-    /// No record twice: a fitted one cannot be held out, and twice the same is not twice the data.
+    /// Checks that no record is given twice: a fitted record cannot be held out, and a repeated record adds no information.
     ///
     /// # Errors
     /// Where one is.

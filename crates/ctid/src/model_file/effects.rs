@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{Error, names, term_file};
 
-/// What an `[effect.X]` table says.
+/// Content of an `[effect.X]` table.
 #[derive(Default)]
 pub(super) struct Setting {
     pub(super) vessel: Option<usize>,

@@ -48,7 +48,7 @@ pub(crate) use source::Source;
 /// The largest model file, and the largest file of a term \[bytes\].
 pub(crate) const LARGEST: usize = 1024 * 1024;
 
-/// What a model file says, checked.
+/// Checked content of a model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFile {
     /// The plant.
@@ -57,7 +57,7 @@ pub struct ModelFile {
     pub effects: Vec<Placed>,
     /// The terms of the user's own that have been added, in the file's order.
     pub terms: Vec<OwnTerm>,
-    /// Which column of the records is what.
+    /// Columns of the records.
     pub columns: Columns,
     /// Constants that are not fitted.
     pub known: Known,
@@ -65,11 +65,11 @@ pub struct ModelFile {
     pub start: BTreeMap<String, f64>,
     /// Names of the parameters that stay at their value in `start`.
     pub fixed: Vec<String>,
-    /// What is known of parameters beside the records, by the same names.
+    /// Prior knowledge of parameters, by the same names.
     pub priors: BTreeMap<String, PriorValue>,
     /// The controller of the loop, where it is known.
     pub controller: Option<ControllerSettings>,
-    /// What the input does between samples.
+    /// Hold of the input between samples.
     pub hold: Hold,
     /// Tables of effects and terms that are not on, and so have no effect: `effect.overflow`.
     pub waiting: Vec<String>,

@@ -65,7 +65,7 @@ pub(crate) struct RawKnown {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawController {
-    /// Of a model of its user's own: the output that it reads, ...
+    /// For a user's own model: the output that the controller reads, ...
     pub(crate) output: Option<Spanned<String>>,
     /// ... and the column of the reference.
     pub(crate) reference: Option<Spanned<String>>,

@@ -31,7 +31,7 @@ impl Source<'_> {
         1 + self.text.bytes().take(byte).filter(|&b| b == b'\n').count()
     }
 
-    /// What the parser refuses, in one line, with the key that was probably meant.
+    /// The parser's error in one line, with the key that was probably meant.
     pub(crate) fn syntax(&self, error: &toml::de::Error) -> Error {
         // Words of the file stand between backquotes.
         let parts = error.message().trim().split('`').enumerate();

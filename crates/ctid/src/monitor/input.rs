@@ -8,9 +8,9 @@ use ct_signals::{BadLine, LONGEST_LINE, Line, Rows, TimestampError, quoted};
 use super::{Halt, INPUT, Session, lines::Cut};
 use crate::{Error, one_line};
 
-/// So many lines at the beginning may be parts of rows.
+/// Number of lines at the beginning that may be incomplete.
 const PARTS: usize = 2;
-/// What becomes of a row without a reading, of a plant and of a model of its user's own.
+/// Handling of a row without a reading, for a plant and for a user's own model.
 const LOST: [&str; 2] = [
     "the reading is lost, the command of the row is used",
     "the reading is lost, the inputs of the row are used",
@@ -249,7 +249,7 @@ impl<'a> Session<'a> {
         self.bad(|| text);
     }
 
-    /// What is wrong with a row's value, with its column and the mend; `at`: of which input or output.
+    /// Error in a row's value, with its column and the correction; `at`: number of the input or output.
     fn named(&self, refused: &Refused, at: usize) -> String {
         let column = self.rows.as_ref().map_or(String::new(), |rows| {
             quoted(rows.name(refused.column(), at))

@@ -6,7 +6,7 @@ use ct_signals::LONGEST_LINE;
 /// A line, or what is left of one that is too long.
 #[derive(Debug, PartialEq)]
 pub(super) enum Cut<'a> {
-    /// Without its end.
+    /// A line without its end.
     Line(&'a [u8]),
     /// Longer than [`LONGEST_LINE`]; said once, when its end has come.
     TooLong,

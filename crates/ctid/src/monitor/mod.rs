@@ -27,7 +27,7 @@ use screen::{DRAWN_EVERY, Screen};
 use source::Event;
 use trouble::Trouble;
 
-/// What the rows are called in messages.
+/// Name of the source of the rows in messages.
 const INPUT: &str = "standard input";
 /// What may be typed.
 #[derive(Debug, Args)]
@@ -100,16 +100,16 @@ impl Arguments {
                 Event::Stop => break Ok("stopped"),
             }
         };
-        // What was seen is kept, whatever has ended it.
+        // The state is saved, whatever ended the run.
         let saved = session.saver.finish(&session.monitor);
         session.end(ended?, saved.is_ok())?;
         saved
     }
 }
 
-/// Why no further line is wanted.
+/// Reason for ending the input.
 enum Halt {
-    /// Nobody reads the alarms any more.
+    /// The reader of the alarms has closed the pipe.
     Closed,
     Error(Error),
 }
@@ -120,11 +120,11 @@ impl From<Error> for Halt {
     }
 }
 
-/// What is watched.
+/// The monitored model.
 #[derive(Clone)]
 enum Believed<'a> {
     Plant(Box<Model>),
-    /// With the candidates of its file, and the seconds in one unit of its time.
+    /// A user's own model with the candidates of its file, and the seconds in one unit of its time.
     Own(&'a OwnModelFile, &'a [CandidateModel], f64),
 }
 
@@ -153,7 +153,7 @@ struct Session<'a> {
     columns: Columns,
     settings: Settings,
     monitor: Monitor<'a>,
-    /// Of each input and output of a model of its user's own how it is put into the model's unit.
+    /// Conversion of each input and output of a user's own model to the model's unit.
     conversions: Vec<Option<Conversion>>,
     /// The monitor goes on from a saved state.
     restored: bool,
@@ -203,7 +203,7 @@ impl<'a> Session<'a> {
                 Believed::Plant(Box::new(believed(file))),
             ),
             AnyModelFile::Own(file) => {
-                // Where the model file does not say in which unit the time is, the header does.
+                // If the model file gives no unit of the time, the header's unit is used.
                 let declared = file.columns.time.is_some();
                 let declared = declared.then(|| file.columns.time_header().1);
                 let saved = state.as_ref().and_then(::monitor::State::time_unit);
@@ -293,7 +293,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// What the model file says that the monitor needs.
+/// The settings of the model file that the monitor needs.
 fn believed(file: &ModelFile) -> Model {
     Model {
         plant: file.plant,

@@ -1,4 +1,4 @@
-//! What is said between the alarms: notices in words, estimates, and JSON lines.
+//! Output between the alarms: notices in words, estimates, and JSON lines.
 
 use std::io;
 
@@ -123,7 +123,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// What is still needed, where nothing has been learned; empty where it has.
+    /// What is missing to finish learning; empty if learning is finished.
     pub(super) fn still_learning(&self) -> String {
         let Some(gathered) = self.monitor.gathered() else {
             return String::new();

@@ -8,7 +8,7 @@ use ::monitor::Monitor;
 use super::state_file;
 use crate::{Error, one_line};
 
-/// How often the state is saved.
+/// Interval between saves of the state.
 const SAVED_EVERY: Duration = Duration::from_secs(60);
 
 pub(super) struct Saver {
@@ -85,7 +85,7 @@ mod tests {
             saver.save(&monitor)
         };
         assert_eq!(next(&mut saver, 1.0), None);
-        // Its own state is renewed.
+        // The monitor overwrites its own state.
         assert_eq!(next(&mut saver, 2.0), None);
         std::fs::write(&path, "{\"written_by\": \"another program\"}").unwrap();
         let said = next(&mut saver, 3.0).unwrap();
@@ -93,7 +93,7 @@ mod tests {
         assert!(std::fs::read_to_string(&path).unwrap().contains("another"));
         std::fs::remove_file(&path).unwrap();
         assert_eq!(next(&mut saver, 4.0).unwrap(), "the state is saved again");
-        // One that came before the first was written.
+        // A file that appeared before the first save.
         std::fs::write(&path, "mine").unwrap();
         let mut first = Saver::new(Some(path.clone()), 0);
         assert!(next(&mut first, 5.0).unwrap().contains("no state of"));
@@ -124,7 +124,7 @@ mod tests {
         assert_eq!(next(&mut saver), None);
         std::fs::remove_dir_all(&inside).unwrap();
         assert!(next(&mut saver).unwrap().contains("cannot be written"));
-        // No row has come since it failed: it is owed all the same.
+        // No row has come since the failed save: the state still has to be saved.
         assert!(saver.finish(&monitor).is_err());
         std::fs::create_dir(&inside).unwrap();
         saver.finish(&monitor).unwrap();

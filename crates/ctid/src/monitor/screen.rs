@@ -1,4 +1,4 @@
-//! What a person sees on standard error: lines, and on a terminal a plot of each output's innovations below them.
+//! Display on standard error: lines, and on a terminal a plot of each output's innovations below them.
 
 use std::collections::VecDeque;
 use std::io::{self, Write};

@@ -11,11 +11,11 @@ const CHUNK: usize = 64 * 1024;
 /// Chunks that may wait.
 const WAITING: usize = 4;
 
-/// What has come.
+/// Input event.
 pub(super) enum Event {
     /// Some bytes.
     Bytes(Vec<u8>),
-    /// No more bytes will.
+    /// End of the input.
     End,
     /// Reading has failed.
     Failed(io::Error),

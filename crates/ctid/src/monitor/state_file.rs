@@ -27,7 +27,7 @@ struct Read {
     state: State,
 }
 
-/// What a state of every version has.
+/// Fields that a state of every version has.
 #[derive(Deserialize)]
 struct Head {
     written_by: String,
@@ -35,7 +35,7 @@ struct Head {
 
 const WRITTEN_BY: &str = "ctid monitor";
 
-/// The state, where there is one; `None` where the file is not there yet. The folder is seen to take a file.
+/// Reads the state; `None` if the file does not exist. Checks that the folder is writable.
 pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
     if output::same_file(path, model) {
         return Err(Error::file(
@@ -81,7 +81,7 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
         .map_err(|error| not_ours(format!("it cannot be read: {error}")))?;
     let read: Read = serde_json::from_str(&text).map_err(|error| {
         let head = serde_json::from_str::<Head>(&text);
-        // It may quote what the file holds.
+        // The message may quote content of the file.
         let why = quoted(&error.to_string());
         not_ours(if head.is_ok_and(|head| head.written_by == WRITTEN_BY) {
             format!("another version of `ctid monitor` wrote it, or it is damaged ({why})")
@@ -107,7 +107,7 @@ fn checksum(state: &State) -> serde_json::Result<u32> {
     Ok(crc32fast::hash(&serde_json::to_vec(state)?))
 }
 
-/// Whether a state of ours stands there, in whatever version.
+/// Whether the file is a state of this program, in any version.
 fn is_ours(path: &Path) -> bool {
     let Ok(file) = fs::File::open(path) else {
         return false;
@@ -116,7 +116,8 @@ fn is_ours(path: &Path) -> bool {
     head.is_ok_and(|head| head.written_by == WRITTEN_BY)
 }
 
-/// Saves a state, where none is yet or one of ours: what somebody else has put there since the program began stays.
+/// Saves a state to a new file or over an earlier state of this program. A file that another program wrote since the start is not
+/// overwritten.
 pub(super) fn write(path: &Path, state: &State) -> Result<(), Error> {
     let text = checksum(state)
         .and_then(|checksum| {

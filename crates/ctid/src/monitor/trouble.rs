@@ -1,8 +1,8 @@
-//! What is wrong with rows, said without flooding: the first ones in full, then now and then with a count.
+//! Messages about bad rows with a limited rate: the first ones in full, then occasional ones with a count.
 
 /// Messages in a row that are printed in full.
 const IN_FULL: u64 = 5;
-/// After so many good rows trouble is new again.
+/// After this number of good rows, a bad row is reported in full again.
 const FORGOTTEN: u64 = 1000;
 
 /// Counts bad rows.
@@ -29,7 +29,7 @@ impl Trouble {
         self.bad += 1;
         self.recent += 1;
         let recent = self.recent;
-        // The 10th, 100th, 1000th ... of them says how many there were.
+        // The 10th, 100th, 1000th ... message contains the count.
         let power = recent >= 10 && 10_u64.checked_pow(recent.ilog10()) == Some(recent);
         if recent <= IN_FULL {
             let last = if recent == IN_FULL {

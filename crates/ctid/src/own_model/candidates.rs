@@ -74,7 +74,7 @@ impl RawCandidate {
         }
     }
 
-    /// Where the model file has what these keys name.
+    /// Position of these keys in the model file.
     fn place(&self, keys: &[String]) -> Option<usize> {
         let key = keys.get(1)?;
         match keys.first()?.as_str() {

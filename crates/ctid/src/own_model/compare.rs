@@ -30,13 +30,13 @@ pub struct Curves {
     pub unit: String,
     /// Length of the record \[s\].
     pub length: f64,
-    /// What was measured, NaN where nothing was \[unit of the output\].
+    /// Measured values, NaN if missing \[unit of the output\].
     pub measured: Vec<f64>,
-    /// What the model gives \[unit of the output\].
+    /// Output of the model \[unit of the output\].
     pub model: Vec<f64>,
 }
 
-/// What `ctid compare` finds.
+/// Result of `ctid compare`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Comparison {
     /// Version of this layout.
@@ -45,17 +45,17 @@ pub struct Comparison {
     pub model: String,
     /// The effects of the model file that are in the model.
     pub effects: Vec<String>,
-    /// What of the records they are written in.
+    /// Numbers of the records that the effects contain.
     pub record_numbers: RecordNumbers,
     /// The fitted model.
     pub steps: [Step; 1],
-    /// What a linear prediction from the past of each output's residual leaves.
+    /// Innovation variance of each output's residual: the part that its past does not predict.
     pub noise: Vec<NoiseFloor>,
     /// Fitted entries that these records do not determine, alone or together with another one.
     pub not_determined: Vec<Vec<String>>,
     /// The limit on the time, and what it cut short.
     pub effort: Effort,
-    /// How long it took \[s\].
+    /// Computing time \[s\].
     pub seconds: f64,
     /// Measured and model, of each output of each record.
     #[serde(skip)]
@@ -87,7 +87,7 @@ pub fn compare(
 }
 
 impl FittedModel {
-    /// How far the fitted model is off, on its records and on those that are held out.
+    /// Errors of the fitted model on its records and on the held-out records.
     ///
     /// # Errors
     /// Where a simulation is not finite, or the initial states of a held-out record cannot be fitted.
@@ -223,7 +223,7 @@ fn not_determined(setup: &ModelSetup, fit: &Fit) -> Vec<Vec<String>> {
                 }
             }
         }
-        // Not all can be told: those without a trace in the outputs are named.
+        // If the parameters are not all determined: names those that do not affect the outputs.
         None => {
             let free = setup.free();
             let length = |column: usize| fit.triangle.column_norm(column);

@@ -43,7 +43,7 @@ pub fn design(
     let problem = problem(file, records);
     let found = search(&problem, [ids[0], ids[1]], limits, options, progress);
     found.map_err(|error| match error {
-        // What is wrong with the options is no fault of a file.
+        // An error in the options, not in a file.
         effect_search::Error::Design(refused) if refused != Refused::OutOfTime => {
             Error::Usage(refused.to_string())
         }
@@ -174,9 +174,9 @@ pub(crate) fn limits(design: &Design) -> String {
 
 /// An experiment in words.
 pub(crate) struct ShownExperiment {
-    /// What the inputs do.
+    /// Course of the inputs.
     pub what: String,
-    /// Where each output goes.
+    /// Range of each output.
     pub reaches: Vec<String>,
     pub power: String,
     pub decides: String,
@@ -247,7 +247,7 @@ fn listed(file: &OwnModelFile, design: &Design, look: Look) -> String {
     text + "\n\n"
 }
 
-/// What the inputs do that move.
+/// Course of the inputs that change.
 fn applied(design: &Design, experiment: &Experiment) -> String {
     let inputs = experiment.inputs.iter();
     let inputs: Vec<String> = inputs.map(|own| sequence_words(design, own)).collect();
@@ -270,7 +270,7 @@ fn sequence_words(design: &Design, applied: &InputSequenceKind) -> String {
     )
 }
 
-/// What to apply, and what it can be expected to tell.
+/// Sentences: the experiment to apply, and the expected result.
 pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) -> Vec<String> {
     let words = EffectWords::of(&file.base, &file.candidates);
     let [a, b] = design

@@ -1,4 +1,4 @@
-//! What a model of its user's own is missing.
+//! Diagnosis of a user's own model.
 
 use effect_search::{Diagnosis, Left, Options, Step, Thresholds, Verdict};
 
@@ -27,7 +27,7 @@ pub fn diagnose(
     effect_search::diagnose(&problem, options, progress).map_err(|error| blamed(&problem, &error))
 }
 
-/// What a person reads of a diagnosis.
+/// Text output of a diagnosis.
 pub(crate) fn said(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
     let words = EffectWords::of(&file.base, &file.candidates);
     let mut text = format!("{}\n\n", look.heading(&diagnosis.model));
@@ -58,7 +58,7 @@ pub(crate) fn heading(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// What was found, in sentences.
+/// Findings in sentences.
 pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<String> {
     let mut all = Vec::new();
     for group in &diagnosis.groups {
@@ -92,7 +92,7 @@ pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<Strin
     all
 }
 
-/// How much the effects explain, and what remains.
+/// Share of the error that the effects explain, and tests of the residual.
 pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
     let mut all = Vec::new();
     if let Some(share) = diagnosis.share {

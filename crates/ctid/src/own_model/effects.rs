@@ -36,11 +36,11 @@ pub(super) enum Setting {
 pub struct OwnEffects {
     /// Identifiers of those that are on, in order.
     pub on: Vec<String>,
-    /// What is kept of them.
+    /// Values kept from earlier results.
     pub kept: BTreeMap<String, Kept>,
     /// Parameters of theirs that are not fitted, and their values.
     pub fixed: BTreeMap<String, f64>,
-    /// All their parameters, by the names in the model that they are in, with the effect of each.
+    /// Parameters of all effects by their names in the extended model, with the effect of each.
     pub parameters: BTreeMap<String, String>,
     /// Tables of effects that are not on.
     pub waiting: Vec<String>,
@@ -97,7 +97,7 @@ pub(super) fn read(
     Ok(effects)
 }
 
-/// The effects of these identifiers, each with what is kept of it.
+/// The effects of these identifiers, each with its kept values.
 ///
 /// # Errors
 /// In words where one cannot act in the model, or stands there twice.
@@ -127,7 +127,7 @@ pub(super) fn of_ids(
     Ok(effects)
 }
 
-/// All parameters of effects, with the effect of each.
+/// Parameters of effects, with the effect of each.
 fn parameters_of(on: &[&Candidate]) -> BTreeMap<String, String> {
     let parameters = on.iter().flat_map(|candidate| {
         let names = candidate.parameters.iter().map(|p| p.name.clone());
@@ -136,7 +136,7 @@ fn parameters_of(on: &[&Candidate]) -> BTreeMap<String, String> {
     parameters.collect()
 }
 
-/// All that can act in a model, of the catalogue and of the model file.
+/// All effects that can act in a model, from the catalogue and from the model file.
 ///
 /// # Errors
 /// As [`all_candidates`], which a model file passes first.

@@ -14,7 +14,7 @@ use crate::numbers;
 use crate::output::Found;
 use crate::simulate::{Curves, FittedRecord, TimeColumn};
 
-/// What `ctid export` writes.
+/// Output of `ctid export`.
 #[derive(Debug, Serialize)]
 pub(crate) struct Exported {
     pub schema: u32,
@@ -80,7 +80,7 @@ impl FittedModel {
         for (parameter, value) in spec.parameters.iter_mut().zip(&fit.x) {
             parameter.value = *value;
         }
-        // Where a simulation begins: as the first record does.
+        // A simulation begins with the initial states of the first record.
         for (state, value) in spec.states.iter_mut().zip(&fit.x[count..]) {
             if !state.fixed {
                 state.start = number(*value);

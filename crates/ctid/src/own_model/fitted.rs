@@ -28,7 +28,7 @@ pub struct FittedModel {
     effort: Effort,
 }
 
-/// What ends a fit before its end: it takes no further steps then, and is what it is.
+/// Time limit of a fit: at the limit the fit stops, and its present estimate is the result.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FitLimit<'a> {
     /// A time.
@@ -37,7 +37,7 @@ pub struct FitLimit<'a> {
     pub interrupt: Option<&'a AtomicBool>,
 }
 
-/// How well a simulation agrees with an output that was measured.
+/// Agreement of a simulation with a measured output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutputScore {
     /// The output.
@@ -99,7 +99,7 @@ impl FittedModel {
         })
     }
 
-    /// The same of a fit that was kept: of this model to these records.
+    /// Restores a saved fit of this model to these records.
     ///
     /// # Errors
     /// Where it is none of this model and these records.
@@ -152,7 +152,7 @@ impl FittedModel {
         &self.fit
     }
 
-    /// How it was fitted.
+    /// Options of the fit.
     #[must_use]
     pub fn options(&self) -> &FitOptions {
         &self.options
@@ -181,7 +181,7 @@ impl FittedModel {
         Ok(setup.robust(&self.fit, self.options.noise_order).ok())
     }
 
-    /// How well the parameters are known; `None` where the records do not determine all of them.
+    /// Uncertainty of the parameters; `None` if the records do not determine all of them.
     pub(super) fn uncertainty(&self, setup: &ModelSetup) -> Result<Option<FitUncertainty>, Error> {
         let count = setup.parameter_count();
         let known = FitUncertainty::of(setup, &self.fit, count, self.options.noise_order);
@@ -216,8 +216,8 @@ impl FittedModel {
         simulated(of, (&read, &name, first), level, &self.options)
     }
 
-    /// How well simulations of other records agree with what was measured there, output by output. Initial states are fitted to the first
-    /// rows of each record, which are not scored; all else stays.
+    /// Scores of simulations of other records, output by output. Initial states are fitted to the first rows of each record, which are not
+    /// scored; all other parameters are fixed.
     ///
     /// # Errors
     /// Where a record is not one of this model, or its initial states cannot be fitted.
@@ -239,7 +239,7 @@ impl FittedModel {
         Ok(self.scores(all.map(|(o, &rmse)| (rmse, scored(o)))))
     }
 
-    /// How well the model agrees with the records that it was fitted to, output by output.
+    /// Scores of the model on its fitted records, output by output.
     #[must_use]
     pub fn score_of_fit(&self) -> Vec<OutputScore> {
         let of = |(o, &rmse): (usize, &f64)| {
@@ -250,7 +250,7 @@ impl FittedModel {
         self.scores(self.fit.rmse.iter().enumerate().map(of))
     }
 
-    /// Of each output, from its error and the readings that are scored.
+    /// Scores of each output, from its error and the scored readings.
     fn scores(&self, errors: impl Iterator<Item = (f64, Vec<f64>)>) -> Vec<OutputScore> {
         let spec = self.model.model.spec();
         let outputs = spec.outputs.iter().zip(errors);

@@ -34,15 +34,15 @@ pub(crate) struct OwnTransferFunction {
     pub input: String,
     /// The output.
     pub output: String,
-    /// Of the input, by powers of s.
+    /// Coefficients of the input's polynomial, by powers of s.
     pub b: Vec<f64>,
-    /// Of the output, by powers of s.
+    /// Coefficients of the output's polynomial, by powers of s.
     pub a: Vec<f64>,
     /// Inputs that are taken to stand still.
     pub others: Vec<String>,
 }
 
-/// What was found, and the transfer function of the model.
+/// The identified model, and the transfer function of the user's model.
 #[derive(Debug, Serialize)]
 pub(crate) struct Beside<'t, T> {
     #[serde(flatten)]
@@ -150,7 +150,7 @@ impl<'f> OneByOne<'f> {
         controllers.find(|own| own.input == self.input && own.output == self.output)
     }
 
-    /// The same with times in seconds; `data`: a record, whose header says the unit of the time where the model file does not.
+    /// Controller with times in seconds; `data`: a record whose header gives the unit of the time if the model file does not.
     ///
     /// # Errors
     /// Where the record cannot be read.
@@ -229,7 +229,7 @@ impl<'f> OneByOne<'f> {
     }
 }
 
-/// Without the poles that zeros cancel, which this input does not move or this output does not see, and without leading zeros.
+/// Cancels common poles and zeros (modes that this input does not excite or this output does not contain), and removes leading zeros.
 fn reduced(mut found: TransferFunction) -> Result<TransferFunction, Error> {
     let largest = found.numerator.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let rounding = 1e-14 * largest;
@@ -273,7 +273,7 @@ impl OwnTransferFunction {
         (self.a.len() - 1, self.b.len() - 1)
     }
 
-    /// What a person reads of it beside what was identified: name, value and standard error of each coefficient.
+    /// Text that compares the model with the identified one: name, value and standard error of each coefficient.
     pub fn said(&self, found: Option<(Order, &[missing_effect::Parameter])>, look: Look) -> String {
         let title = format!(
             "{}: its own transfer function from {} to {}, with the values of its text and [known]",

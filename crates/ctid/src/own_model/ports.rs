@@ -1,4 +1,4 @@
-//! What can act where in a model of its user's own.
+//! Effects and ports of a user's own model.
 
 use ct_model::ModelSpec;
 use ct_model::effects::{Candidate, Place, Port, Visited, candidates};
@@ -20,7 +20,7 @@ const HEADINGS: [&str; 6] = [
     "of the model file",
 ];
 
-/// Which of the headings a candidate stands under.
+/// Heading of a candidate's group.
 fn group(candidate: &Candidate) -> usize {
     match candidate.port {
         Port::Input(_) => 0,
@@ -34,7 +34,7 @@ fn group(candidate: &Candidate) -> usize {
     }
 }
 
-/// All that a search looks at: of the catalogue and of the model file.
+/// All candidates of a search: from the catalogue and from the model file.
 fn searched(file: &OwnModelFile) -> Result<Vec<Candidate>, Error> {
     let mut all = every_candidate(&file.base, &file.candidates)?;
     all.retain(|candidate| !candidate.is_shape());

@@ -18,7 +18,7 @@ use super::words::{EffectWords, Site, shown_unit};
 use crate::output::Found;
 use crate::report::{self, ComparedPort, MissingTerm};
 
-/// What was found, written as JSON as it stands, and its page.
+/// A result that is written as JSON, and its page.
 #[derive(Debug, Serialize)]
 pub(crate) struct Paged<'t, T> {
     #[serde(flatten)]
@@ -30,7 +30,7 @@ pub(crate) struct Paged<'t, T> {
 }
 
 impl<'t, T> Paged<'t, T> {
-    /// With the page that shows this, where one is asked for.
+    /// With the page for this document, if one is requested.
     pub fn new(found: &'t T, shown: Option<&Document>) -> Self {
         Self {
             found,
@@ -39,7 +39,7 @@ impl<'t, T> Paged<'t, T> {
         }
     }
 
-    /// With the shape of what no candidate explains as a file.
+    /// With the shape of the unexplained error as a file.
     pub fn with_unknown(self, unknown: Option<String>) -> Self {
         Self { unknown, ..self }
     }
@@ -55,12 +55,12 @@ impl<T: Serialize> Found for Paged<'_, T> {
     }
 }
 
-/// What the report shows.
+/// Content of the report.
 #[derive(Debug, Clone)]
 pub struct Document {
     /// Curves, table and sentences.
     pub diagnosis: Diagnosis,
-    /// What nothing explains, as a function at a port.
+    /// The unexplained error, as a function at a port.
     pub(crate) term: Option<MissingTerm>,
 }
 
@@ -103,7 +103,7 @@ pub(crate) fn missing_term(words: &EffectWords, unknown: &Unknown) -> MissingTer
     }
 }
 
-/// What the report shows of a comparison.
+/// Report of a comparison.
 pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Document {
     let source = "innovation of the residual: the part that its past does not predict";
     let mut shown = document(file, records, (&found.steps, &found.noise), source);
@@ -115,7 +115,7 @@ pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> D
     }
 }
 
-/// What the report shows of a diagnosis.
+/// Report of a diagnosis.
 pub fn diagnosed(
     file: &OwnModelFile,
     records: &Records,

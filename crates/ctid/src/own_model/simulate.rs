@@ -234,7 +234,7 @@ fn states(
     Ok((states, StateSource::Text))
 }
 
-/// When the simulation ends, and the mend.
+/// Message for a simulation that diverges: time, and correction.
 fn runs_away(setup: &ModelSetup, record: &Record, path: &Path, x: &[f64], model: &str) -> Error {
     let goes = |rows: usize| {
         let part = [record.rows(0..rows)];

@@ -1,4 +1,4 @@
-//! What a person reads of a comparison.
+//! Text output of a comparison.
 
 use super::compare::{Comparison, Curves};
 use super::diagnose::state_rows;

@@ -7,7 +7,7 @@ use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::term_file::of_curve;
 
-/// What it is, in a sentence or two.
+/// Describes the function in one or two sentences.
 pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
     let left_out = unknown.share_left_out.map_or(String::new(), |share| {
         if share > 0.0 {
@@ -64,7 +64,7 @@ pub(crate) fn file(unknown: &Unknown) -> String {
     let values = unknown.at.iter().zip(&unknown.value);
     let rows = values.zip(&unknown.std_error);
     of_curve(
-        // Its ports are told apart by a comma.
+        // A comma separates the two variables of a port.
         (&format!("\"{}\"", unknown.effect), &unknown.variable),
         (&unknown.variable_unit, &unknown.unit),
         rows.map(|((at, value), error)| (*at, *value, *error)),

@@ -8,7 +8,7 @@ use ct_signals::escaped;
 
 use super::effects::every_candidate;
 
-/// What is said of the effects of a model.
+/// Descriptions of the effects of a model.
 pub(crate) struct EffectWords(BTreeMap<String, Words>);
 
 /// A port that effects sit at, by the name of its variable.
@@ -42,7 +42,7 @@ struct Words {
 }
 
 impl EffectWords {
-    /// Of all that can act in a model.
+    /// Descriptions of all effects that can act in a model.
     pub fn of(spec: &ModelSpec, own: &BTreeMap<String, OwnCandidate>) -> Self {
         // A model file has been read with these candidates.
         let all = every_candidate(spec, own).unwrap_or_default();
@@ -72,7 +72,7 @@ impl EffectWords {
         self.0.get(id).map_or(&[], |words| &words.sites)
     }
 
-    /// What it does, in a sentence without its end.
+    /// The physics of an effect, in a sentence without its final point.
     pub fn physics(&self, id: &str) -> &str {
         let words = self.0.get(id).map_or("", |words| &words.physics);
         words.trim_end_matches('.')
@@ -119,7 +119,7 @@ fn of_own(spec: &ModelSpec, own: &OwnCandidate) -> Words {
     }
 }
 
-/// What a term of the model file is added to.
+/// Port to which a term of the model file is added.
 fn port_of_term(spec: &ModelSpec, name: &str) -> Option<Port> {
     match spec.find(name)? {
         Variable::State(i) => Some(Port::Balance(i)),
@@ -139,7 +139,7 @@ fn named(about: &About) -> String {
     }
 }
 
-/// Where a port is.
+/// Description of a port.
 fn place(spec: &ModelSpec, port: Port) -> String {
     let of = |variable: Variable| named(spec.about(variable));
     let state = |i: usize| of(Variable::State(i));

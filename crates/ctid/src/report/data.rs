@@ -1,4 +1,4 @@
-//! What the report's script draws, as JSON: the curves thinned for display, the rest as it stands.
+//! Data for the report's script, as JSON: the curves thinned for display, the other data unchanged.
 
 use ct_signals::Clock;
 use missing_effect::{Diagnosis, Failures, OutputStep, ResidualTests, Score, Shown, Step, Unknown};
@@ -21,15 +21,15 @@ struct Report<'a> {
     records: Vec<Record<'a>>,
     steps: Vec<Model<'a>>,
     scores: &'a [Score],
-    /// Which of the scores are of effects that were added.
+    /// For each score whether its effect was added.
     added: Vec<bool>,
-    /// Which of the scores are of effects that cannot be told from an added one.
+    /// For each score whether the data cannot distinguish its effect from an added one.
     equal: Vec<bool>,
-    /// What nothing explains.
+    /// The unexplained error.
     unknown: Option<Missing<'a>>,
 }
 
-/// Of a plant, or of a model of its user's own.
+/// The unexplained error of a plant, or of a user's own model.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Missing<'a> {
@@ -44,7 +44,7 @@ struct Output<'a> {
     noise_floor: f64,
 }
 
-/// How times are drawn: as numbers in this unit or, where the records have dates, as those.
+/// Time axis: numbers in this unit, or dates if the records have dates.
 #[derive(Serialize)]
 pub(crate) struct Axis {
     unit: &'static str,
@@ -85,13 +85,13 @@ struct Input<'a> {
 #[derive(Serialize)]
 struct Model<'a> {
     label: String,
-    /// Where it fails, of all outputs.
+    /// Sentences about where the model fails, for all outputs.
     sentences: Vec<String>,
     /// In the order of the outputs.
     outputs: Vec<ModelOutput<'a>>,
 }
 
-/// What a model shows at one output.
+/// Results of a model at one output.
 #[derive(Serialize)]
 struct ModelOutput<'a> {
     rmse: f64,
@@ -132,7 +132,7 @@ pub(crate) fn json(diagnosis: &Diagnosis) -> String {
     json_with(diagnosis, None)
 }
 
-/// The same of a model of its user's own, with what nothing explains there.
+/// Data of a diagnosis of a user's own model, with its unexplained error.
 pub(super) fn json_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> String {
     let report = Report {
         clock: (&diagnosis.clock).into(),
@@ -165,7 +165,7 @@ pub(super) fn json_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> St
     script_safe(&report)
 }
 
-/// The same of records alone, before there is a model.
+/// Data of records alone, before there is a model.
 pub(crate) fn records(
     records: &[Shown],
     input_unit: &str,

@@ -14,7 +14,7 @@ const POINTS: usize = 3_000;
 /// Panels one above the other, over one abscissa.
 #[derive(Debug, Serialize)]
 pub(super) struct Figure {
-    /// Of its place in the page.
+    /// Identifier of the figure's place in the page.
     pub id: String,
     /// In pixels.
     pub height: u32,
@@ -43,13 +43,13 @@ pub(super) struct Panel {
     pub lines: Vec<f64>,
 }
 
-/// What a curve is drawn in.
+/// Colour of a curve.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(untagged)]
 pub(super) enum Colour {
-    /// One of those of the page.
+    /// A named colour of the page.
     Named(&'static str),
-    /// One of those that are told apart.
+    /// One of a set of distinct colours.
     Of(usize),
 }
 
@@ -64,7 +64,7 @@ pub(super) enum Values {
 #[derive(Debug, Serialize)]
 pub(super) struct Curve {
     pub name: String,
-    /// Which panel, from 0.
+    /// Index of the panel, from 0.
     pub panel: usize,
     pub colour: Colour,
     pub dash: &'static str,
@@ -136,7 +136,7 @@ impl Curve {
         }
     }
 
-    /// The same with a band of this half width about it.
+    /// Adds a band of this half width.
     pub(super) fn with_band(mut self, (time, values): (&[f64], &[f64]), half: &[f64]) -> Self {
         let at = kept(time, values);
         let edge = |sign: f64| -> Vec<f64> {

@@ -1,4 +1,4 @@
-//! What nothing explains in a model of its user's own: a smooth function at one of its ports, as the report and the page show it.
+//! The unexplained error of a user's own model: a smooth function at one of its ports, for the report and the page.
 
 use missing_effect::numbers;
 use serde::Serialize;
@@ -11,18 +11,18 @@ use super::text::{escape, prose, unit};
 /// are called the same.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct MissingTerm {
-    /// Its identifier: `shape(T,u)`.
+    /// Identifier of the function: `shape(T,u)`.
     pub effect: String,
-    /// The same with its port in words.
+    /// Identifier with its port in words.
     pub placed: String,
-    /// What it depends on.
+    /// Variable that the function depends on.
     pub variable: String,
     pub variable_unit: String,
-    /// What it is to its port: `added to the equation of T`.
+    /// How the function enters the port: `added to the equation of T`.
     pub shown_term: String,
     /// Unit of the term.
     pub unit: String,
-    /// Where it is given, over the visited range.
+    /// Arguments at which the function is given, over the visited range.
     pub knots: Vec<f64>,
     pub ordinates: Vec<f64>,
     /// Standard errors; `None` where the records do not determine them.
@@ -57,11 +57,11 @@ impl ComparedPort {
     }
 }
 
-/// What [`ComparedPort`] holds, for the reader.
+/// Explanation of [`ComparedPort`] for the reader.
 pub(crate) const COMPARED: &str = "Each function was fitted together with all parameters. Left-out error: by how much the squared error falls on parts of the records \
      that the function was not fitted to; it was computed for the best functions of a state or an input.";
 
-/// Its section in a report.
+/// Section of the report on the unexplained error.
 pub(super) fn html(term: &MissingTerm) -> String {
     let heading = format!(
         "{} against {}",

@@ -125,7 +125,7 @@ fn verdict(diagnosis: &Diagnosis) -> String {
     .to_owned()
 }
 
-/// Nothing was scored: the report of `compare`.
+/// Whether no effect was scored: the report of `compare`.
 fn is_comparison(diagnosis: &Diagnosis) -> bool {
     diagnosis.scores.is_empty() && diagnosis.steps.len() < 2
 }
@@ -189,7 +189,7 @@ fn errors_of_outputs(diagnosis: &Diagnosis, step: &Step) -> String {
     step.outputs.iter().enumerate().map(line).collect()
 }
 
-/// What the plots show: buttons that choose the model, and the choice of the output, each where there are several.
+/// Controls of the plots: buttons that choose the model, and a choice of the output, each only if there are several.
 fn shown(diagnosis: &Diagnosis) -> String {
     let (buttons, output) = (step_buttons(diagnosis), output_choice(diagnosis));
     if buttons.is_empty() && output.is_empty() {

@@ -1,4 +1,4 @@
-//! What every page shares: the shell that holds style, data and scripts, and the places for what it shows.
+//! Parts that every page shares: the frame that contains style, data and scripts, and the places for its content.
 
 use super::text::escape;
 
@@ -23,11 +23,11 @@ pub(super) struct Page<'a> {
     pub body: &'a str,
     /// JSON, safe inside a `<script>` element.
     pub data: &'a str,
-    /// What draws it.
+    /// Script that draws the figures.
     pub script: &'a str,
 }
 
-/// How every page begins, with its mark: a file that begins so may be overwritten by a new one.
+/// Beginning of every page, with a mark of ctid: a file with this mark may be overwritten.
 #[must_use]
 pub fn head() -> String {
     format!(

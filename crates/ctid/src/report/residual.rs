@@ -1,4 +1,4 @@
-//! What is left over: where the model fails, what nothing explains, and the tests of the residual.
+//! Residual: where the model fails, the unexplained error, and the residual tests.
 
 use missing_effect::{Diagnosis, Failures, ResidualTests, Shown};
 
@@ -58,7 +58,7 @@ pub(super) fn failures(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// What nothing explains, where it has a shape.
+/// The unexplained error, if it is a function of a variable.
 pub(super) fn unknown(diagnosis: &Diagnosis) -> String {
     let Some(unknown) = &diagnosis.unknown else {
         return String::new();

@@ -231,7 +231,7 @@ pub(crate) fn two_tanks() -> Diagnosis {
     diagnosis(&["y"])
 }
 
-/// The same of a record of both levels.
+/// Sample diagnosis of a record with both levels.
 pub(crate) fn two_outputs() -> Diagnosis {
     let mut diagnosis = diagnosis(&["lower", "upper"]);
     for score in &mut diagnosis.scores {

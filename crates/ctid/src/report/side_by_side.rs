@@ -217,7 +217,7 @@ fn fit_figure(found: &SideBySide) -> Figure {
     for (k, (row, outcome)) in with_results(found).enumerate() {
         let (name, colour) = (row.method.id(), Colour::Of(k));
         let simulated = (&shown.time[..], &outcome.simulated[..]);
-        // Six curves cannot be distinguished by colour alone.
+        // What was analysed: plant, records, noise floor.
         let dash = ["solid", "dash", "dot"][k / 3 % 3];
         curves.push(Curve::line(name, 0, colour, simulated).dashed(dash).named());
         let residual: Vec<f64> = output

@@ -9,7 +9,7 @@ use super::text::{code, escape, significant, unit, with_error};
 use crate::findings;
 use crate::numbers::duration;
 
-/// What was looked at: plant, records, noise floor.
+/// Analysed plant and records, and noise floor.
 pub(super) fn facts(diagnosis: &Diagnosis) -> String {
     let several = findings::several(diagnosis);
     let mut facts = vec![("Model", escape(&diagnosis.plant))];
@@ -158,7 +158,7 @@ pub(super) fn rankings(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// How much of a missing term each variable predicts.
+/// Share of the unexplained error that each variable predicts.
 pub(super) fn shares(unknown: &Unknown) -> String {
     let rows: String = unknown
         .shares

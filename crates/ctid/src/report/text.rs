@@ -102,7 +102,7 @@ pub(super) fn with_error(value: f64, std_error: Option<f64>) -> String {
     }
 }
 
-/// What the Ljung-Box test says.
+/// Result of the Ljung-Box test.
 pub(super) fn whiteness(p: f64) -> String {
     let finding = match p {
         p if !p.is_finite() => return "The whiteness of the residual was not tested.".to_owned(),
@@ -113,7 +113,7 @@ pub(super) fn whiteness(p: f64) -> String {
     format!("{finding} (Ljung-Box test, {}).", p_value(p))
 }
 
-/// What the cross-correlation test with the input says.
+/// Result of the cross-correlation test with the input.
 pub(super) fn input_test(p: f64) -> String {
     let finding = match p {
         p if !p.is_finite() => return "Residual against input was not tested.".to_owned(),

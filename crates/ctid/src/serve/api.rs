@@ -49,7 +49,7 @@ pub(super) fn routes(app: &Arc<App>) -> Router<Arc<App>> {
         .route("/api/forget", post(forget))
         .merge(downloads::routes())
         .layer(middleware::from_fn_with_state(app.clone(), read_first))
-        // It reads its body itself.
+        // The handler reads the body itself.
         .route("/api/record", post(record))
 }
 
@@ -70,7 +70,7 @@ async fn read_first(
     Ok(next.run(Request::from_parts(parts, body.into())).await)
 }
 
-/// Which tab asks.
+/// The requesting tab.
 #[derive(Debug, Deserialize)]
 pub(super) struct Tab {
     pub session: String,
@@ -86,7 +86,7 @@ pub(super) fn find(app: &App, id: &str) -> Result<Shared, Refusal> {
     })
 }
 
-/// Something that may take a while, such as reading a large file, away from the threads that serve.
+/// Runs a slow operation, such as reading a large file, outside the threads of the server.
 pub(super) async fn aside<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Refusal> + Send + 'static,
 ) -> Result<T, Refusal> {
@@ -99,7 +99,7 @@ pub(super) async fn aside<T: Send + 'static>(
     spawn_blocking(work).await.map_err(broke)?
 }
 
-/// Does something with the session, and answers with its state.
+/// Applies a function to the session, and answers with the session's state.
 async fn with(
     app: &App,
     id: &str,

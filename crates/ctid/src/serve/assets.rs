@@ -1,4 +1,4 @@
-//! What the page is made of. Every file is in the program; the plots' script is that of the report.
+//! Files of the page. All are built into the program; the script of the plots is that of the report.
 
 use std::sync::{Arc, LazyLock};
 

@@ -13,7 +13,7 @@ use super::guard::Refusal;
 
 /// The next part of a body is here within this time after the one before it.
 const LONGEST_SILENCE: Duration = Duration::from_secs(10);
-/// All of it is here within this time.
+/// Time limit for receiving a whole body.
 const LONGEST: Duration = Duration::from_secs(60);
 
 /// The body, and its share of the room, a permit for each byte that is under way. Nobody waits for another's body: where there is no

@@ -29,12 +29,12 @@ use tokio::time::{Sleep, sleep};
 use super::guard::{Guard, restrict};
 use super::session::lock;
 
-/// After it could not take a connection, as where too many files are open.
+/// Pause after a failed accept, for example with too many open files.
 const PAUSE: Duration = Duration::from_millis(100);
 /// Bytes of a request that are held before they are looked at; the head is smaller.
 const BUFFER: usize = 64 << 10;
 
-/// What a client may take.
+/// Limits of a client.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {
     /// Connections at once on which the secret was known. A browser opens six.
@@ -58,11 +58,11 @@ impl Default for Bounds {
     }
 }
 
-/// What is known of a connection.
+/// State of a connection.
 #[derive(Debug)]
 struct Client {
     knows: AtomicBool,
-    /// When something was read or written last; where the secret is not known, when it began.
+    /// Time of the last read or write; before the access key is checked, time of the start.
     moved: Mutex<Instant>,
 }
 
@@ -78,7 +78,7 @@ impl Client {
     }
 }
 
-/// Those that are open.
+/// Open connections.
 #[derive(Debug, Default)]
 struct Clients(Mutex<Vec<(Arc<Client>, AbortHandle)>>);
 
@@ -102,7 +102,7 @@ impl Clients {
     }
 }
 
-/// What all connections share.
+/// Data that all connections share.
 struct Door {
     guard: Guard,
     router: TowerToHyperService<Router>,
@@ -179,7 +179,7 @@ async fn answer(
     Ok(response)
 }
 
-/// A stream that tells of its movement and fails where nothing of an answer is taken for long.
+/// A stream that records the time of transfers, and fails if the client reads no part of an answer for long.
 struct Watched {
     stream: TcpStream,
     client: Arc<Client>,

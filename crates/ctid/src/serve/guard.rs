@@ -19,12 +19,12 @@ use serde_json::json;
 /// The largest body that is taken \[bytes\].
 pub(super) const LARGEST_BODY: usize = 64 << 20;
 
-/// What the browser may do with the page: everything comes from here. Plotly writes styles into its elements, and draws the
-/// picture that it saves from a blob.
+/// Content security policy of the page: everything comes from this server. Plotly writes styles into its elements, and draws saved pictures
+/// from a blob.
 const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; object-src 'none'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// An answer that says what is wrong and the mend.
+/// An answer with the error and the correction.
 #[derive(Debug)]
 pub(super) struct Refusal {
     status: StatusCode,
@@ -39,7 +39,7 @@ impl Refusal {
         }
     }
 
-    /// What was sent cannot be used.
+    /// The content of the request cannot be used.
     pub(super) fn input(what: impl ToString) -> Self {
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, what.to_string())
     }
@@ -88,7 +88,7 @@ impl Guard {
     pub(super) fn new(port: u16) -> Self {
         let names = ["127.0.0.1", "localhost"];
         let mut hosts = names.map(|host| format!("{host}:{port}")).to_vec();
-        // A browser leaves out the port that it would take anyway.
+        // Browsers omit the default port.
         if port == 80 {
             hosts.extend(names.map(str::to_owned));
         }
@@ -171,7 +171,7 @@ pub(super) fn check_length(headers: &HeaderMap) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Tells the browser what the answer may do.
+/// Sets the security headers of the answer.
 pub(super) fn restrict<B>(response: &mut Response<B>) {
     for (name, value) in [
         (header::CONTENT_SECURITY_POLICY, POLICY),

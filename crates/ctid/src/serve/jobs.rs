@@ -26,12 +26,12 @@ use crate::model_file::{self, ModelFile};
 use crate::own_model::Comparison;
 use crate::{Error, edit};
 
-/// What is to be computed.
+/// A computation.
 #[derive(Debug, Clone)]
 pub(super) enum Task {
     /// Fits the model.
     Compare,
-    /// Fits the model with these effects in place of its own; the model stays.
+    /// Fits the model with these effects instead of its own; the stored model does not change.
     Chain(Vec<(String, Option<String>)>),
     /// Searches what is missing; at most so many effects, where that is said.
     Diagnose {
@@ -43,18 +43,18 @@ pub(super) enum Task {
         group: usize,
         between: [String; 2],
         limits: Limits,
-        /// Of a model of its user's own: what each input may do.
+        /// For a user's own model: the permitted changes of each input.
         inputs: Vec<AppliedInput>,
     },
 }
 
-/// What a task works on.
+/// Input of a task.
 enum Input {
     Plant(Box<Work>),
     Own(Box<own::Work>),
 }
 
-/// What came out.
+/// Outcome of a task.
 enum Outcome {
     Own(Box<Comparison>),
     OwnDiagnosed(Box<effect_search::Diagnosis>),
@@ -64,7 +64,7 @@ enum Outcome {
     Designed(Box<Design>, Columns),
 }
 
-/// What a computation works on.
+/// Input of a computation.
 struct Work {
     text: String,
     pub(super) model: ModelFile,
@@ -117,7 +117,7 @@ impl Work {
         })
     }
 
-    /// What was found, with what it was found from.
+    /// The result, with the input that it was computed from.
     fn found<F>(self, id: u64, found: F) -> Arc<Found<F>> {
         Arc::new(Found {
             id,
@@ -222,7 +222,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                 compute(work, &task, options, &show)
             }
             Input::Own(work) => {
-                // What was stopped ends its step first: the next one waits for that.
+                // A stopped computation finishes its current step first; the next computation waits for this.
                 let _alone = lock(&own_fits);
                 if stop.load(Ordering::Relaxed) {
                     return Err(Error::Usage("stopped".to_string()));
@@ -368,7 +368,7 @@ fn with_effects(session: &Session, effects: &[(String, Option<String>)]) -> Resu
     Ok(text)
 }
 
-/// The model that was diagnosed with what was found beside a group: two of the group are to be told apart there.
+/// The diagnosed model with the accepted effects outside a group: a design distinguishes two effects of the group in addition to these.
 fn beside(session: &Session, group: usize, between: &[String; 2]) -> Result<String, Refusal> {
     let name = session.model_name();
     let Some(of) = &session.diagnosis else {

@@ -94,9 +94,9 @@ use ct_signals::ReadOptions;
 use crate::input::Files;
 use crate::own_model::AnyModelFile;
 
-/// Where the page is, if nothing else is there.
+/// Default port of the page.
 const PORT: u16 = 8420;
-/// So many ports from the first on are tried.
+/// Number of ports that are tried, from the first on.
 const TRIED: u16 = 20;
 /// Files of the largest size that may be on their way at once.
 const FILES_AT_ONCE: usize = 4;
@@ -120,7 +120,7 @@ pub struct Arguments {
     port: u16,
 }
 
-/// What all requests share.
+/// Data that all requests share.
 #[derive(Debug)]
 struct App {
     sessions: Sessions,
@@ -148,7 +148,7 @@ impl Arguments {
                 "The page is at http://{address}/{secret}/, on this machine, for whoever knows this address; Ctrl-C ends it.\n"
             ),
         )?;
-        // What the page edits is the model file of a plant.
+        // The page edits only the model file of a plant.
         let file = self.model.clone().filter(|_| own.is_none());
         let sessions = Sessions::new(file, own, records);
         runtime.block_on(serve(listener, guard, sessions))

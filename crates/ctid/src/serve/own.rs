@@ -28,9 +28,9 @@ use crate::{Error, check, edit};
 
 /// Points of a curve that are drawn.
 const DRAWN: usize = 2000;
-/// How the model file is called in messages and downloads.
+/// Name of the model file in messages and downloads.
 pub(super) const FILE: &str = "model.toml";
-/// What the page begins with, where nobody has typed anything.
+/// Initial text of the page.
 const TEMPLATE: &str = include_str!("page/template.mo");
 
 /// An example: name, text, model file, record.
@@ -65,13 +65,13 @@ pub(super) struct Own {
     pub text: String,
     /// The model file: columns, what is known, side measurements.
     pub file: String,
-    /// What was fitted last.
+    /// Latest fit.
     pub fit: Option<Fit>,
-    /// What was diagnosed last.
+    /// Latest diagnosis.
     pub diagnosis: Option<Diagnosed>,
     /// The experiment that was designed last.
     pub design: Option<Designed>,
-    /// What the report shows: the last of both.
+    /// Content of the report: the latest of both.
     pub shown: Option<Arc<report::Document>>,
     /// Columns and what is held, as they were read last: a text that is being typed is no model for a while.
     read: (Columns, ReadOptions),
@@ -81,21 +81,21 @@ pub(super) struct Own {
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub id: u64,
-    /// Of which texts and records.
+    /// Texts and records of the result.
     text: String,
     file: String,
     data: u64,
-    /// What the page shows, as JSON.
+    /// JSON for the page.
     pub body: Bytes,
 }
 
-/// What is changed.
+/// A change of the model.
 #[derive(Debug, serde::Deserialize)]
 #[serde(tag = "do", rename_all = "lowercase")]
 pub(super) enum Change {
     /// A model of one's own in place of a plant.
     Begin,
-    /// One of the plants again.
+    /// Return to the built-in plants.
     End,
     /// An example in place of all that is there.
     Example { name: String },
@@ -104,7 +104,7 @@ pub(super) enum Change {
         text: Option<String>,
         file: Option<String>,
     },
-    /// Which column a signal is, or the time.
+    /// Sets the column of a signal or of the time.
     Column { signal: String, column: String },
     /// An effect into the model file, with what the diagnosis found of it.
     Add { effect: String },
@@ -145,7 +145,7 @@ impl Own {
         self.read.clone()
     }
 
-    /// The same with the columns of its texts, where these can be read.
+    /// Adds the columns of the texts, if they can be read.
     fn looked_at(mut self) -> Self {
         if let Ok(model) = self.model() {
             self.read = (model.columns.clone(), model.hold.into());
@@ -174,7 +174,7 @@ impl Own {
         }
     }
 
-    /// What the page shows of it.
+    /// State of the model for the page.
     pub(super) fn state(&self, data: u64) -> Value {
         let spec = self.spec();
         let model = self.model();
@@ -244,7 +244,7 @@ pub(super) fn examples() -> Vec<&'static str> {
     EXAMPLES.iter().map(|(name, ..)| *name).collect()
 }
 
-/// The model file that says no more than which text it goes with.
+/// A minimal model file that only names its text.
 fn bare_file(text: &str) -> String {
     let name = ModelSpec::parse(text).map_or("model".to_string(), |spec| spec.name);
     format!("model = \"{name}.mo\"\n\n[columns]\n")
@@ -322,7 +322,7 @@ fn no_model() -> Refusal {
     Refusal::input("there is no model of your own yet")
 }
 
-/// How far a search is that goes through these phases.
+/// Progress of a search with these phases.
 fn progress(now: effect_search::Progress, phases: &[&str]) -> Progress {
     let done = phases.iter().position(|phase| *phase == now.phase);
     Progress {

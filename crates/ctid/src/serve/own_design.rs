@@ -13,11 +13,11 @@ use crate::report::rounded;
 /// The seed of `ctid design` where none is given.
 const SEED: u64 = 1;
 
-/// What the page's form says of an input.
+/// Settings of an input in the page's form.
 #[derive(Debug, Clone, Deserialize)]
 pub(super) struct AppliedInput {
     name: String,
-    /// It may be moved.
+    /// Whether the experiment may change the input.
     apply: bool,
     range: Option<(f64, f64)>,
     slew: Option<f64>,
@@ -46,7 +46,7 @@ pub(super) fn limits(inputs: &[AppliedInput], duration: Option<f64>) -> Limits {
 /// A design.
 #[derive(Debug, Clone)]
 pub(super) struct Designed {
-    /// What the page shows.
+    /// JSON for the page.
     pub body: Value,
     /// The experiment as CSV; none where none is worth making.
     pub record: Option<String>,

@@ -1,5 +1,4 @@
-//! What a diagnosis of a model of its user's own found, as the page shows it: the effects, where each sits among the model's ports, and how
-//! the error falls.
+//! Diagnosis of a user's own model for the page: the effects, their ports in the model, and the fall of the error.
 
 use ct_model::{About, ModelSpec, Variable};
 use effect_search::{Diagnosis, Step};
@@ -20,7 +19,7 @@ pub(super) struct Diagnosed {
     pub text: String,
     pub file: String,
     pub data: u64,
-    /// What is kept of it in the model file.
+    /// Values that the model file keeps.
     pub findings: Findings,
     /// The effects that were added.
     pub effects: Vec<String>,
@@ -28,7 +27,7 @@ pub(super) struct Diagnosed {
     pub body: Value,
 }
 
-/// What the page shows of a diagnosis.
+/// JSON of a diagnosis for the page.
 pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
     let words = EffectWords::of(&model.base, &model.candidates);
     let one = |id: &String| json!({ "effect": id, "placed": words.placed(id), "physics": words.physics(id) });

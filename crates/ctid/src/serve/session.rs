@@ -1,4 +1,4 @@
-//! What one tab works on: records, the model, what was fitted and found, and the computation that runs.
+//! State of one tab: records, model, results, and the running computation.
 
 mod fits;
 
@@ -29,10 +29,10 @@ const MOST_RECORDS: usize = 20;
 const LARGEST_MODEL: usize = 1 << 20;
 /// Fitted models that are kept.
 const MOST_MODELS: usize = 12;
-/// How the model is called where it is in no file.
+/// Name of a model without a file.
 pub(super) const UNNAMED: &str = "model.toml";
 
-/// What was found, and of what.
+/// A result and its input.
 #[derive(Debug)]
 pub(super) struct Found<T> {
     pub id: u64,
@@ -61,39 +61,39 @@ pub(super) enum Kind {
 pub(super) struct Job {
     pub number: u64,
     pub kind: Kind,
-    /// What it computes with; `None` for a model of its user's own.
+    /// Model of the computation; `None` for a user's own model.
     pub model: Option<ModelFile>,
     pub begun: Instant,
     /// Limit on the time of a search.
     pub limit: Option<Duration>,
     pub stop: Arc<AtomicBool>,
-    /// When set, the search ends soon with the best that it has found.
+    /// When set, the search ends soon and returns the best result so far.
     pub interrupt: Arc<AtomicBool>,
     pub progress: Arc<Mutex<Option<Progress>>>,
 }
 
-/// What one tab works on.
+/// State of one tab.
 #[derive(Debug)]
 pub(super) struct Session {
-    /// The model file, where there is one; else the text is kept here alone.
+    /// Path of the model file, if there is one; else the text exists in memory only.
     pub file: Option<PathBuf>,
     pub text: String,
     /// A model of its user's own, where one is looked at in place of a plant.
     pub own: Option<Own>,
-    /// Its fits run one after the other, those that were stopped too.
+    /// Serialises the fits of a user's own model, including stopped ones.
     pub own_fits: Arc<Mutex<()>>,
     pub records: Vec<Upload>,
     /// Counts the changes of the records.
     pub data: u64,
-    /// Counts the changes of everything that the page shows.
+    /// Number of changes of the displayed state.
     pub version: u64,
     pub models: VecDeque<Arc<Fitted>>,
-    /// What was fitted last, for the report.
+    /// Latest fit, for the report.
     pub fitted: Option<Arc<Found<Diagnosis>>>,
     pub diagnosis: Option<Arc<Found<Diagnosis>>>,
     pub design: Option<Arc<Found<(Design, Columns)>>>,
     pub job: Option<Job>,
-    /// Why the last computation or change came to nothing.
+    /// Reason why the last computation or change failed.
     pub failure: Option<String>,
     /// The models run on the measured command, also where the loop could be simulated.
     pub measured: bool,
@@ -148,7 +148,7 @@ impl Session {
         self.numbers
     }
 
-    /// What messages call the model.
+    /// Name of the model in messages.
     pub(super) fn model_name(&self) -> String {
         self.file
             .as_ref()
@@ -193,7 +193,7 @@ impl Session {
             (Kind::Compare, Ok(model), Some(own)) => same(own, &model),
             (Kind::Chain, Ok(model), Some(own)) => without_effects(own) == without_effects(&model),
             (Kind::Compare | Kind::Chain, ..) => false,
-            // What it finds is said to be of the model that it was asked for.
+            // The result refers to the model at the start of the computation.
             (Kind::Diagnose | Kind::Design | Kind::Own, ..) => true,
         };
         if !of_use {
@@ -201,7 +201,7 @@ impl Session {
         }
     }
 
-    /// Which way a loop is treated; what was fitted the other way is kept for the way back.
+    /// Sets how a loop is simulated; fits of the other setting are kept for a return to it.
     pub(super) fn treat_loop(&mut self, measured: bool) {
         if self.measured == measured {
             return;
@@ -234,7 +234,7 @@ impl Session {
         Domain::of(model.plant, self.output_unit(model))
     }
 
-    /// Columns and hold as the model names them; what can be guessed where there is no model yet.
+    /// Columns and hold from the model; guessed values if there is no model yet.
     pub(super) fn layout(&self) -> (Columns, ReadOptions) {
         if let Some(own) = &self.own {
             return own.layout();
@@ -333,13 +333,13 @@ impl Session {
         self.data_changed();
     }
 
-    /// Takes a record away; there may be none of that name.
+    /// Removes a record; a missing name is no error.
     pub(super) fn drop_record(&mut self, name: &str) {
         self.records.retain(|record| record.name != name);
         self.data_changed();
     }
 
-    /// Nothing that was computed is of these records.
+    /// Discards the results of earlier records.
     fn data_changed(&mut self) {
         self.stop();
         self.data += 1;
@@ -385,7 +385,7 @@ impl Session {
     }
 }
 
-/// The lock of something that no panic leaves half changed.
+/// Locks data that stay consistent if a thread panics.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

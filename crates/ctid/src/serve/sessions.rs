@@ -1,4 +1,4 @@
-//! The sessions of all tabs: each has a number that nobody can guess, there are a few of them, and what they hold is bounded.
+//! Sessions of all tabs: each has a random number that cannot be guessed; the number of sessions and their memory are limited.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -8,7 +8,7 @@ use super::own::Own;
 use super::session::{Session, lock};
 use super::upload::Upload;
 
-/// Tabs at most; the one that was not seen for the longest time goes.
+/// Largest number of tabs; the tab with the oldest request is dropped.
 const MOST: usize = 8;
 /// Bytes over all tabs: records as they were sent and as they were read, and what was computed. One tab may hold more, and is then
 /// alone.
@@ -27,7 +27,7 @@ struct Tab {
     session: Shared,
 }
 
-/// All of them, and what a new one begins with.
+/// All sessions, and the initial state of a new one.
 #[derive(Debug)]
 pub(super) struct Sessions {
     model: Option<PathBuf>,
@@ -74,7 +74,7 @@ impl Sessions {
         (id, session)
     }
 
-    /// Makes room where the tabs hold too much; the one that was seen last stays.
+    /// Drops sessions if their memory is too large; the latest one stays.
     pub(super) fn make_room(&self) {
         self.make_room_for(BYTES);
     }
@@ -170,7 +170,7 @@ mod tests {
         assert_eq!(lock(&sessions.all).len(), 2);
         sessions.make_room_for(sent + 2 * 500 * 3 * 8 - 1);
         assert!(sessions.find(&tabs[0].0).is_none(), "the older one goes");
-        // Alone it stays, whatever it holds.
+        // A single session stays, whatever its memory is.
         sessions.make_room_for(0);
         assert!(sessions.find(&tabs[1].0).is_some());
     }
@@ -213,12 +213,12 @@ mod tests {
                 "{said}"
             );
         }
-        // A fit begins again by itself: there is nothing to say.
+        // The page restarts a fit by itself, so no message is needed.
         lock(&session).failure = None;
         lock(&session).job = Some(job(Kind::Compare));
         sessions.stop_unseen_for(Duration::ZERO);
         assert!(lock(&session).job.is_none() && lock(&session).failure.is_none());
-        // Where nothing runs there is nothing to stop.
+        // Stopping without a running computation has no effect.
         sessions.stop_unseen_for(Duration::ZERO);
         assert!(lock(&session).failure.is_none());
     }

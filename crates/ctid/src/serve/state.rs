@@ -1,4 +1,4 @@
-//! What the page is told of its session, whenever something has changed.
+//! State of the session for the page, sent after every change.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -15,7 +15,7 @@ use super::words;
 use crate::input::excitation;
 use crate::model_file::ModelFile;
 
-/// How far the computation is, if there is one.
+/// Progress of the computation, if one is running.
 pub(super) fn job(session: &Session) -> Value {
     let Some(job) = &session.job else {
         return Value::Null;
@@ -54,7 +54,7 @@ pub(super) fn state(session: &mut Session) -> Value {
         .collect();
     let fitted = session.records.iter().filter(|upload| !upload.held_out);
     let fitted: Vec<&Record> = fitted.filter_map(Upload::as_read).collect();
-    // What they say is of one command.
+    // The warnings refer to a single command.
     let excited = if session.own.is_some() {
         Vec::new()
     } else {
@@ -126,7 +126,7 @@ fn is_of<T>(found: &Found<T>, session: &Session) -> bool {
         && model.is_ok_and(|model| same(&model, &found.model))
 }
 
-/// What a record holds, in words.
+/// Description of a record.
 fn about(record: &Record) -> Value {
     let signal = |signal: &ct_signals::Channel| {
         let (low, high) = signal.range();
@@ -226,7 +226,7 @@ pub(super) fn plants() -> Value {
             "known": known_of(plant),
             "pumps": plant.pumps(),
             "levels": vessel_names(plant),
-            // With one reading the others have the last level.
+            // With one reading, the list has one more level: the last one.
             "joined": plant.joined(),
             "model": equation(plant),
         })
@@ -234,7 +234,7 @@ pub(super) fn plants() -> Value {
     plants.collect()
 }
 
-/// What may be known of a plant, by its keys in the model file.
+/// Known constants that a plant may have, by their keys in the model file.
 fn known_of(plant: Plant) -> Vec<&'static str> {
     let areas: &[&str] = match (plant.outlet(), plant.vessels()) {
         (Outlet::Torricelli, 1) => &["area"],

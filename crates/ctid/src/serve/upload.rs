@@ -25,7 +25,7 @@ pub(super) struct Upload {
     pub held_out: bool,
     pub headings: Vec<Heading>,
     pub content: Bytes,
-    /// As it was read last, and with which columns.
+    /// Result of the last reading, and its columns.
     read: Option<(Columns, ReadOptions, Result<AsRead, String>)>,
 }
 
@@ -68,7 +68,7 @@ impl Upload {
         read.as_ref().ok().map(|(record, _)| record.as_ref())
     }
 
-    /// What was missing and what was done when it was read last; `None` where it was read as it stands.
+    /// Note on missing samples and corrections of the last reading; `None` if the record was read unchanged.
     pub(super) fn remark(&self) -> Option<String> {
         let (_, _, read) = self.read.as_ref()?;
         let (_, summary) = read.as_ref().ok()?;
@@ -135,7 +135,7 @@ mod tests {
 
     use super::*;
 
-    /// As many rows as bytes allow: every command and reading is one digit.
+    /// The largest number of rows for these bytes: every command and reading is one digit.
     #[test]
     fn what_is_read_is_counted_and_takes_at_most_four_times_the_file() {
         let mut text = "t,u,y,u2,r\n".to_string();
@@ -156,7 +156,7 @@ mod tests {
         upload.record(&columns, &options).unwrap();
         assert_eq!(upload.held(), sent + 2000 * 5 * 8);
         assert!(upload.held() <= 5 * sent);
-        // What cannot be read takes nothing.
+        // An unreadable file uses no memory.
         let columns = Columns {
             inputs: vec!["no such".into()],
             ..columns

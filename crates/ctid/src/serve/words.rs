@@ -24,7 +24,7 @@ pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
         parameters: Vec<Value>,
         starts: usize,
         starts_agree: usize,
-        /// What the error on held-out data is made of.
+        /// Parts of the error on held-out data.
         held_out_error: Option<String>,
         sentences: Vec<&'a str>,
         noise: String,
@@ -82,7 +82,7 @@ fn size(parameter: &Parameter) -> String {
     with_unit(&format!("{name} {value}{error}"), &parameter.unit)
 }
 
-/// What a diagnosis found.
+/// Texts of a diagnosis.
 pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
     let diagnosis = &found.found;
     let unit = &diagnosis.output_unit;
@@ -129,7 +129,7 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
         "held_out_error": diagnosis.steps.last().and_then(|step| held_out_errors(diagnosis, step)),
         "effort": findings::effort(&diagnosis.effort, Reader::Page),
         "ranking": ranked.collect::<Vec<_>>(),
-        // What the shape depends on, where nothing explains it.
+        // Variable of the unexplained error.
         "unknown": diagnosis.unknown.as_ref().map(|unknown| unknown.variable),
         "seconds": diagnosis.seconds,
     })
@@ -186,7 +186,7 @@ fn own_size(step: &Step, effect: &str) -> Option<String> {
 fn ranked(diagnosis: &Diagnosis, score: &Score) -> Value {
     let info = EffectInfo::find(&score.effect);
     let domain = diagnosis.domain();
-    // How to confirm an effect is written for tanks.
+    // The confirmation texts refer to tanks.
     let confirm = info.filter(|_| domain == Domain::Hydraulic);
     let unit = score.size.as_ref().map_or("", |size| size.unit.as_str());
     let (error, error_unit) = findings::score_error(diagnosis, score);

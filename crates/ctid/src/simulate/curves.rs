@@ -13,7 +13,7 @@ pub(crate) struct FittedRecord {
     pub model: Vec<Vec<f64>>,
 }
 
-/// All records that were fitted.
+/// Curves of all fitted records.
 #[derive(Debug, Clone)]
 pub(crate) struct Curves {
     /// Names and units of the inputs.

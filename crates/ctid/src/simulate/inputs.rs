@@ -10,12 +10,12 @@ use ct_signals::{
 use super::TimeColumn;
 use crate::Error;
 
-/// What is asked for.
+/// Requested inputs.
 #[derive(Debug, Clone)]
 pub(crate) struct Inputs {
     /// The file of the inputs.
     pub path: PathBuf,
-    /// How it is read, the hold aside.
+    /// Options for reading, except the hold.
     pub options: ReadOptions,
     /// First readings of each output to which initial states are fitted.
     pub first: usize,
@@ -64,7 +64,7 @@ impl ReadInputs {
     }
 }
 
-/// What an input did in a gap nobody knows.
+/// The input inside a gap is not known.
 fn check_whole(path: &Path, record: &Record) -> Result<(), Error> {
     let clock = Clock::of([record]);
     const MEND: &str =

@@ -38,9 +38,9 @@ pub(crate) const FIRST_READINGS: usize = 5;
 /// Half the widths of the bands of an output \[its unit\].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Band {
-    /// Of the model's output, from the uncertainty of parameters and initial states, row by row.
+    /// Standard error of the model's output from the uncertainty of parameters and initial states, row by row.
     pub output: Vec<f64>,
-    /// Of a reading, whose noise comes to that.
+    /// Standard error of a reading: the model's output and the noise.
     pub reading: Vec<f64>,
 }
 
@@ -49,18 +49,18 @@ pub struct Band {
 pub struct SimulatedOutput {
     /// The column that holds it where it is measured, without its unit.
     pub name: String,
-    /// Its unit; empty where nobody says.
+    /// Unit; empty if not known.
     pub unit: String,
     /// Row by row.
     pub mean: Vec<f64>,
-    /// Where the model was fitted, and the records determine its parameters.
+    /// Band; only if the model was fitted and the records determine its parameters.
     pub band: Option<Band>,
-    /// What was measured, NaN where nothing was.
+    /// Measured values, NaN if missing.
     #[serde(skip)]
     pub measured: Vec<f64>,
 }
 
-/// Where an initial state comes from.
+/// Source of an initial state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StateSource {
@@ -72,7 +72,7 @@ pub enum StateSource {
     Rest,
 }
 
-/// What `ctid simulate` finds.
+/// Result of `ctid simulate`.
 #[derive(Debug, Serialize)]
 pub struct Simulated {
     /// Version of this layout.
@@ -87,18 +87,18 @@ pub struct Simulated {
     pub parameters: Vec<(String, f64, Option<f64>)>,
     /// The initial states' names and values.
     pub states: Vec<(String, f64)>,
-    /// Where they come from.
+    /// Source of the initial states.
     pub states_from: StateSource,
     /// The probability with which each band holds.
     pub level: f64,
     /// The outputs, in the order of the model.
     pub outputs: Vec<SimulatedOutput>,
-    /// What should be known before it is used.
+    /// Warnings about the use of the simulation.
     pub warnings: Vec<String>,
     /// Length of the record \[s\].
     #[serde(skip)]
     pub length: f64,
-    /// When each row is.
+    /// Time of each row.
     pub time: TimeColumn,
     /// The bands of readings are written too.
     #[serde(skip)]
@@ -106,7 +106,7 @@ pub struct Simulated {
 }
 
 impl Band {
-    /// Of one output, from the standard errors of its mean.
+    /// Band of one output, from the standard errors of its mean.
     pub fn of(errors: &[f64], known: &FitUncertainty, output: usize, level: f64) -> Self {
         let quantile = known.quantile(level);
         let noise = known.reading[output];

@@ -1,4 +1,4 @@
-//! One of the plants on new inputs.
+//! Simulation of a built-in plant with new inputs.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::Error;
 use crate::input::{self, Files};
 use crate::model_file::ModelFile;
 
-/// What the fit of initial levels is taken to.
+/// Stopping criteria of the fit of initial levels.
 const STOPPING: Stopping = Stopping {
     evaluations: 60,
     cost: 1e-10,

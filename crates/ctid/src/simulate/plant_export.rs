@@ -11,7 +11,7 @@ use crate::model_file::ModelFile;
 use crate::numbers;
 use crate::own_model::{Exported, commented, number};
 
-/// Why a plant cannot be written as Modelica; `None` where it can.
+/// Reason why a plant cannot be written as Modelica; `None` if it can.
 pub(crate) fn no_text(model: &ModelFile) -> Option<&'static str> {
     let known = model.known.outputs(model.plant);
     if !model.effects.is_empty() || !model.terms.is_empty() {

@@ -49,7 +49,7 @@ impl TimeColumn {
             });
         }
         let number = |time: &f64| {
-            // Without the last digits, which are an accident of the conversion.
+            // Rounds off the last digits, which are rounding errors of the conversion.
             let value = time / seconds;
             let value = format!("{value:.12e}").parse().unwrap_or(value);
             format!("{value}")

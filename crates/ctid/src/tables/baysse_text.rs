@@ -97,7 +97,7 @@ pub(crate) fn paper_mark(cell: &Cell) -> &'static str {
     }
 }
 
-/// How many of the printed figures lie inside the bands, and which do not.
+/// Number of printed figures inside the bands, and the others by name.
 pub(crate) fn printed_inside_bands(study: &Study) -> String {
     let of = study.printed().count();
     let outside: Vec<String> = study

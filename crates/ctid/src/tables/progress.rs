@@ -3,7 +3,7 @@
 use missing_effect::Progress;
 use paper_tables::Stage;
 
-/// As the bar takes it.
+/// Progress in the units of the bar.
 pub(crate) fn for_bar(progress: paper_tables::Progress) -> Progress {
     let paper_tables::Progress { stage, done, total } = progress;
     Progress {

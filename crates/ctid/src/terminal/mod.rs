@@ -1,4 +1,4 @@
-//! What a person reads in the terminal; all of it is derived from the [`Diagnosis`] that `--json` writes.
+//! Text output for the terminal; it is derived from the [`Diagnosis`] that `--json` writes.
 
 mod curves;
 mod errors;
@@ -14,7 +14,7 @@ use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot;
 
-/// How many findings say where a model fails.
+/// Number of findings about where a model fails.
 const FAILURES: usize = 5;
 const BAR: usize = 20;
 
@@ -56,7 +56,7 @@ pub fn diagnosis(diagnosis: &Diagnosis, look: Look) -> String {
     text + &groups(diagnosis, look) + &findings(diagnosis, look)
 }
 
-/// What was looked at.
+/// Analysed plant and records.
 pub(crate) fn header(diagnosis: &Diagnosis, look: Look) -> String {
     // The readings of all outputs are counted.
     let several = findings::several(diagnosis);
@@ -161,7 +161,7 @@ fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
 }
 
-/// Where a model fails, in words, output by output.
+/// Sentences about where a model fails, output by output.
 pub(crate) fn failures(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
     let outputs = step.outputs.iter();
     outputs
@@ -194,7 +194,7 @@ fn failures_of(diagnosis: &Diagnosis, step: &Step, output: &OutputStep, look: Lo
     text
 }
 
-/// What the residual tests say.
+/// Sentences about the residual tests.
 fn residual_tests(tests: &ResidualTests) -> String {
     let p = |p: f64| {
         if p < 0.001 {
@@ -265,7 +265,7 @@ pub(crate) fn parameters(diagnosis: &Diagnosis, step: &Step, look: Look) -> Stri
     text
 }
 
-/// What cannot be told apart on these data.
+/// Effects that these data cannot distinguish.
 pub(crate) fn groups(diagnosis: &Diagnosis, look: Look) -> String {
     let mut lines = String::new();
     for (effect, group) in diagnosis.effects.iter().zip(&diagnosis.groups) {
@@ -316,7 +316,7 @@ fn rankings(diagnosis: &Diagnosis, look: Look) -> String {
     text
 }
 
-/// Nothing was scored: a comparison.
+/// Whether no effect was scored: a comparison.
 fn compared(diagnosis: &Diagnosis) -> bool {
     diagnosis.scores.is_empty() && diagnosis.steps.len() < 2
 }

@@ -6,7 +6,7 @@ use super::{placed, with_unit};
 use crate::look::{Look, Side, table};
 use crate::{findings, numbers};
 
-/// How many effects the ranking shows.
+/// Number of effects in the ranking.
 const RANKED: usize = 8;
 
 /// The columns of the ranking, in order.
@@ -27,8 +27,8 @@ pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
     if diagnosis.scores.is_empty() {
         return String::new();
     }
-    // As much as the width takes. The verdict refers to what would have been visible: sizes go before it. What an effect does
-    // to the error goes last.
+    // As many columns as the width allows. The minimum detectable sizes come first, because the verdict refers to them. The change of the
+    // error comes last.
     let variants: [&[Ranked]; 7] = [
         &[Place, Effect, Gain, Error, Size, Visible],
         &[Place, Effect, Gain, Error, SizeAlone, Visible],

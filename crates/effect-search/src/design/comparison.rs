@@ -12,7 +12,7 @@ use super::{Experiment, InputSequenceKind, Kind, Power, Reach, Refused, power};
 use crate::Error;
 use crate::node::{Context, FINE, Node};
 
-/// Both effects, and what the records say of each.
+/// Both effects, and their results on the records.
 pub(super) struct Comparison<'s, 'a> {
     context: &'s Context<'a>,
     nodes: &'s [Node; 2],

@@ -68,7 +68,7 @@ pub(super) fn candidate(
     } else {
         scales.reading(port)
     };
-    // Of a temperature: its zero above absolute zero.
+    // For a temperature: the zero of its unit above absolute zero.
     let zero = if spec.about(signal).unit == "K" {
         0.0
     } else {

@@ -7,7 +7,7 @@ use crate::text::lexer::Word;
 use crate::text::syntax::{Kind, Node};
 
 impl Parser<'_> {
-    /// What holds more than so many within each other would take a stack of any size.
+    /// Deeper nesting could overflow the stack.
     fn bounded(&self, node: Node) -> Result<Node, TextError> {
         if node.depth <= DEEPEST {
             return Ok(node);
@@ -38,7 +38,7 @@ impl Parser<'_> {
         Ok(node)
     }
 
-    /// From `if` or `elseif` on.
+    /// Parses from `if` or `elseif` on.
     fn choice(&mut self) -> Result<Node, TextError> {
         let from = self.next().from;
         let condition = self.expression()?;
@@ -214,7 +214,7 @@ impl Parser<'_> {
         }
     }
 
-    /// From the bracket on.
+    /// Parses from the opening bracket on.
     fn call(&mut self, name: String, from: usize) -> Result<Node, TextError> {
         self.expect_sign("(", "`(`")?;
         let mut arguments = Vec::new();

@@ -1,4 +1,4 @@
-//! What is declared: attributes, values and initial values.
+//! Declarations: attributes, values and initial values.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -123,7 +123,7 @@ impl Builder<'_> {
             Kept::FinalParameter => Given::Measured,
             _ => Given::Fitted,
         };
-        // Of a fitted one it is where a fit starts, and no part of the model.
+        // For a fitted parameter the value is the start of a fit, and not part of the model.
         let holds = match given {
             Given::Fitted => Holds::Numbers,
             Given::Measured | Given::Constant => Holds::Parameters,
@@ -199,7 +199,7 @@ impl Builder<'_> {
         Ok(all)
     }
 
-    /// As [`Self::start`], from an initial equation.
+    /// As [`Self::start`], for an initial equation.
     pub(super) fn initial_value(
         &mut self,
         declaration: &Declaration,

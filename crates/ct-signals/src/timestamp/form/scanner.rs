@@ -69,7 +69,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// What stands between date and time: `T`, or blanks with or without a comma before them.
+    /// Separator between date and time: `T`, or blanks with or without a comma before them.
     #[inline]
     pub(super) fn date_separator(&mut self) -> bool {
         if matches!(self.peek(), b'T' | b't') {

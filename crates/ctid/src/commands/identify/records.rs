@@ -9,7 +9,7 @@ use crate::Error;
 use crate::column_errors::of_option;
 
 impl Identify {
-    /// What a column that is not there is blamed on: the model file, or the option.
+    /// Source of the column names for error messages: the model file, or the option.
     pub(super) fn named_by(&self) -> fn(ct_signals::Error) -> Error {
         if self.model.is_some() {
             Error::from

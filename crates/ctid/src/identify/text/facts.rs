@@ -1,11 +1,11 @@
-//! What the methods with instruments, and those of a loop, say of their way: a name and a sentence each.
+//! Facts about a fit by the methods with instruments and by those for a loop: a name and a sentence each.
 
 use fcloe::{Condition, NoisePath, Verdict};
 use linear_identification::{Identification, InLoop, LevelChoice, Refined};
 
 use crate::numbers;
 
-/// What SRIVC and RIVC say of their way.
+/// Facts about a fit by SRIVC or RIVC.
 pub(crate) fn refined_facts(
     found: &Identification,
     refined: &Refined,
@@ -67,7 +67,7 @@ pub(crate) fn refined_facts(
             ),
         }
     });
-    // SRIVC takes the noise for white, whatever its residual is.
+    // SRIVC assumes white noise, whatever its residual is.
     let name = match refined.name.ends_with("SRIVC") {
         true => "residual",
         false => "noise model",
@@ -86,7 +86,7 @@ pub(crate) fn refined_facts(
     facts
 }
 
-/// What is known of the loop and of the way to the estimates.
+/// Facts about the loop and the fit.
 pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static str, String)> {
     let (y, u) = (&found.shown.output.unit, &found.shown.input.unit);
     let digits = |value| numbers::significant(value, 4);

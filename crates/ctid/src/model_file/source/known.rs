@@ -1,4 +1,4 @@
-//! What is known of a plant: areas, heights, and what is measured.
+//! Known constants of a plant: areas, heights, and the measured levels.
 
 use ct_signals::quoted;
 use plants::{Known, MAX_VESSELS, Plant};
@@ -187,7 +187,7 @@ impl Source<'_> {
             );
             return Err(self.at(at, what));
         }
-        // Nothing of what is below would show in the level of what is above.
+        // Changes in the lower tank do not affect the level of the upper one.
         let last = plant.vessels() - 1;
         if !plant.joined() && !vessels.contains(&last) {
             let what = format!(
@@ -231,7 +231,7 @@ impl Source<'_> {
         })
     }
 
-    /// What a valve lets through at one unit of head and a flow coefficient of one.
+    /// Flow through a valve at one unit of head with a flow coefficient of one.
     fn orifice(&self, raw: &RawKnown, area_known: bool) -> Result<Option<f64>, Error> {
         match (&raw.pipe_area, &raw.gravity) {
             (None, None) => Ok(None),
@@ -257,7 +257,7 @@ impl Source<'_> {
 /// The only vessel of a plant, as `disturbance` names it.
 const ONLY: &str = "tank";
 
-/// What `disturbance` may say, in quotes.
+/// Allowed values of `disturbance`, in quotes.
 pub(super) fn disturbed(plant: Plant) -> Vec<String> {
     let names = (0..plant.vessels()).map(|vessel| plant.vessel_name(vessel).unwrap_or(ONLY));
     names.map(|name| format!("\"{name}\"")).collect()

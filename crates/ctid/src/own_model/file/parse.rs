@@ -63,7 +63,7 @@ impl OwnModelFile {
         })
     }
 
-    /// The same, the model from wherever `read` has it; it is given the name that stands in the file.
+    /// Parses a model file; `read` provides the model text for the name in the file.
     ///
     /// # Errors
     /// One line that names the file, the line, what is wrong and the mend.
@@ -187,7 +187,7 @@ impl OwnModelFile {
     }
 }
 
-/// Where a controller stands that is written as that of a plant, which has one input.
+/// Position of a `[controller]` table without the name of an input. Only built-in plants have such a table.
 fn unnamed_controller(text: &str) -> Option<usize> {
     let table = text.parse::<toml::Table>().ok()?;
     let controller = table.get("controller")?.as_table()?;

@@ -7,12 +7,12 @@ use missing_effect::{
 
 use super::{NOISE, PERIOD, named, two_tanks};
 
-/// The same after `compare`: the base model alone, nothing scored, nothing held out.
+/// Sample of `compare`: the base model alone, no scores, no held-out data.
 pub(crate) fn comparison() -> Diagnosis {
     comparison_of(two_tanks())
 }
 
-/// What `compare` has of a diagnosis.
+/// Reduces a diagnosis to the content of `compare`.
 pub(crate) fn comparison_of(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis.verdict = Verdict::Unexplained;
     diagnosis.effects.clear();

@@ -77,7 +77,7 @@ pub(crate) fn parameters(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// The rows of the simulation error of an output; its name stands before them where there are several.
+/// Rows with the simulation error of an output; the output's name comes first if there are several.
 fn errors(diagnosis: &Diagnosis, index: usize, name: &str) -> String {
     let steps = &diagnosis.steps;
     let unit = unit(diagnosis.unit_of(index));

@@ -1,4 +1,4 @@
-//! What is computed for a model of its user's own: comparison, search and design, and how they end.
+//! Computations for a user's own model: comparison, search and design.
 
 use ct_signals::{ReadOptions, Reading};
 use effect_search::design::{Design, Limits};
@@ -22,7 +22,7 @@ use crate::serve::own_findings::Diagnosed;
 use crate::serve::session::Session;
 use crate::{Error, edit, numbers};
 
-/// What a fit or a diagnosis works on.
+/// Input of a fit or a diagnosis.
 pub(crate) struct Work {
     own: Own,
     pub(super) model: OwnModelFile,

@@ -12,22 +12,22 @@ use crate::model_file::ModelFile;
 pub(crate) struct Fitted {
     pub id: u64,
     pub model: ModelFile,
-    /// Which state of the records it was fitted to.
+    /// Version of the records that were fitted.
     pub data: u64,
-    /// It ran on the measured command, also where the loop could be simulated.
+    /// Whether the fit uses the measured command although the loop could be simulated.
     pub measured: bool,
     /// Simulation error of each output, on the fitted and on the held-out records.
     pub errors: PerOutput,
     pub errors_test: Option<PerOutput>,
     pub bic: f64,
-    /// What is left of the records looks like noise.
+    /// Whether the residual looks like noise.
     pub adequate: bool,
-    /// What the page draws and says of it, as JSON.
+    /// JSON for the page.
     pub body: Bytes,
 }
 
 impl Session {
-    /// Keeps a fitted model; the oldest goes where there are many.
+    /// Stores a fitted model; drops the oldest one if there are too many.
     pub(crate) fn keep(&mut self, fitted: Fitted) {
         let again =
             |other: &Fitted| other.model == fitted.model && other.measured == fitted.measured;

@@ -73,7 +73,7 @@ pub(crate) struct Registers<T> {
     /// The answers of the guards.
     pub answers: Vec<bool>,
     taken: Vec<bool>,
-    /// The operations, and where their results go, that the taken branches leave: those that slopes need, ...
+    /// The operations on the selected branches, with the registers of their results: those that slopes need, ...
     slopes: Vec<(Operation, Register)>,
     /// ... the operations whose results change although all inputs are held, ...
     moving: Vec<(Operation, Register)>,
@@ -81,7 +81,7 @@ pub(crate) struct Registers<T> {
     guards: Vec<(Operation, Register)>,
     outputs: Vec<(Operation, Register)>,
     all: Vec<(Operation, Register)>,
-    /// Numbers that have no derivatives: parameters, numbers of the text, and what is made of them.
+    /// Values without derivatives: parameters, constants of the text, and expressions of these.
     plain: Vec<bool>,
     /// All inputs are held, and the results that depend on inputs and parameters only are computed.
     pub held: bool,
@@ -290,7 +290,7 @@ impl Tape {
 
     /// Evaluates the tape with the branch of every guard chosen by its present difference.
     pub fn evaluate_with_guards<T: Scalar>(&self, registers: &mut Registers<T>) {
-        // A guard may stand on what another one decides: after as many rounds as there are guards none changes any more.
+        // A guard may depend on the answer of another guard: after as many rounds as there are guards, no answer changes.
         for _ in 0..=self.guards.len() {
             self.evaluate(registers);
             let mut changed = false;
@@ -319,7 +319,7 @@ impl Tape {
         }
     }
 
-    /// Lets the guards whose difference is near zero choose one side.
+    /// Sets the answers of the guards on this difference to those for one sign.
     pub fn answer<T: Scalar>(
         &self,
         registers: &mut Registers<T>,

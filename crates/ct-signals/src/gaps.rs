@@ -284,7 +284,7 @@ impl Record {
                 }
             }
             if end {
-                // The first row after the last known input: its output depends on the known input, later ones do not.
+                // After the last known input, only the row that still depends on that input is kept.
                 let next = last + 1;
                 let acts = !lines && next < self.len();
                 stretches.push(begin..next + usize::from(acts));

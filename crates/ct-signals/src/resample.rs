@@ -131,7 +131,7 @@ mod tests {
         // The command between 5.5 and 8 is not known.
         assert!(coarse.inputs[0].values[2..4].iter().all(|u| u.is_nan()));
         assert_eq!(coarse.inputs[0].values[4], 0.0);
-        // Between 4 and 8 nothing was read.
+        // There is no reading between 4 and 8.
         assert_eq!(coarse.outputs[0].values[..3], [0.0, 2.0, 4.0]);
         assert!(coarse.outputs[0].values[3].is_nan() && coarse.outputs[0].values[4] == 8.0);
         assert!(record.resampled(1e-9).is_err());

@@ -1,4 +1,4 @@
-//! What can go wrong in a search.
+//! Errors of a search.
 
 /// What can go wrong in a search.
 #[derive(Debug, thiserror::Error)]
@@ -28,7 +28,7 @@ pub enum Error {
     /// The unit of the model's time is none.
     #[error("a unit of the model's time of {seconds} s: it has to be above zero and finite")]
     TimeUnit {
-        /// How many seconds it was to have.
+        /// The given number of seconds.
         seconds: f64,
     },
     /// An effect of the model file that the model cannot have.

@@ -19,7 +19,7 @@ use crate::score::{DAMPING, Trial, thinned};
 struct Place {
     /// Cost that the step predicts.
     predicted: f64,
-    /// The vector there, without the factor; and one step from there.
+    /// The parameter vector at this point, without the factor; and one step from this point.
     x: Vec<f64>,
     stepped: Vec<f64>,
     factor: f64,
@@ -62,7 +62,7 @@ impl Context<'_> {
         let place = |values: Vec<f64>| {
             let mut x = begin.clone();
             for (&at, value) in own.iter().zip(values) {
-                // What the model file fixes stays as it is.
+                // Parameters that the model file fixes do not change.
                 if setup.free().contains(&at) {
                     x[at] = value;
                 }
@@ -103,7 +103,7 @@ impl Context<'_> {
         };
         let fall = self.samples() * (node.fit.cost / best.predicted.max(f64::MIN_POSITIVE)).ln();
         scored.truncate(self.thresholds.kept_factor_starts);
-        // Without the factor every entry behind it is one place nearer.
+        // Removing the factor shifts every later entry by one.
         let own: Vec<usize> = own
             .iter()
             .map(|&at| at - usize::from(at > factor))

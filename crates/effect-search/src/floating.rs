@@ -50,7 +50,7 @@ impl Context<'_> {
         (least.fit.bic() < than.bic() - self.thresholds.growth_margin).then_some(least)
     }
 
-    /// What of the best sets does not follow time, fitted in white noise.
+    /// The best sets without their functions of time, fitted with white noise.
     fn seeds(&self, base: &Node, sets: &[Node], white: &Noise) -> Vec<Node> {
         let (by_error, coloured): (Vec<Node>, Vec<Node>) = sets
             .iter()

@@ -13,7 +13,7 @@ use crate::Error;
 
 /// Samples on which the initial states of a held-out record are fitted at least, and which are not scored.
 const STATE_ROWS: usize = 5;
-/// They are no more than this part of the record.
+/// Largest share of the record for these rows.
 const MOST_OF_RECORD: usize = 4;
 
 /// A fitted model on held-out records.
@@ -21,7 +21,7 @@ const MOST_OF_RECORD: usize = 4;
 pub struct HeldOut {
     /// Simulation error of each output \[its unit\].
     pub rmse: Vec<f64>,
-    /// What the model gives: a series for each record and output; NaN where the simulation cannot go on.
+    /// Simulated output: a series for each record and output; NaN after the simulation diverges.
     pub simulated: Vec<Vec<f64>>,
     /// On so many first samples of each record the initial states were fitted; they are not scored.
     pub state_rows: Vec<usize>,

@@ -8,14 +8,14 @@ use greybox::ModelSetup;
 
 use crate::node::{Context, Node};
 
-/// Where a column comes from.
+/// Source of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Column {
     Known(usize),
     Own(usize),
 }
 
-/// Which columns of a candidate's model are those of the set.
+/// Columns of a candidate's model that belong to the set.
 pub(crate) struct Columns {
     all: Vec<Column>,
     /// Entries of the vector that are the candidate's own.
@@ -31,7 +31,7 @@ pub(crate) struct Joined<'a> {
 }
 
 impl Context<'_> {
-    /// Which columns of a larger model are those of a set.
+    /// Columns of a larger model that belong to a set.
     pub fn columns_beside(&self, set: &Node, own: &ModelSetup, larger: &ModelSetup) -> Columns {
         let (old, new) = (set.spec(), larger.model().spec());
         let (old_first, first) = (old.parameters.len(), new.parameters.len());

@@ -23,7 +23,7 @@ pub(crate) const FINE: Stopping = Stopping {
     cost: 1e-9,
 };
 
-/// What all sets of one search share.
+/// Data that all sets of one search share.
 #[derive(Clone)]
 pub(crate) struct Context<'a> {
     pub problem: &'a Problem,
@@ -63,7 +63,7 @@ impl Node {
     }
 }
 
-/// What is said of the parameters that a model has.
+/// Description of the parameters of a model.
 fn of_model<T: Clone>(model: &Model, said: &BTreeMap<String, T>) -> BTreeMap<String, T> {
     let mut said = said.clone();
     let parameters = &model.spec().parameters;

@@ -12,7 +12,7 @@ use crate::score::Trial;
 
 /// Values in all columns together above which rows are thinned out.
 const MOST_VALUES: usize = 20_000_000;
-/// What is left of a column by the projection is nothing below this part.
+/// A column whose projection residual is below this share counts as linearly dependent.
 const NOTHING: f64 = 1e-6;
 /// Ridge of the small systems, as a share of the squared length.
 const RIDGE: f64 = 1e-9;
@@ -135,7 +135,7 @@ fn columns_of(
     let matrix = whitened(&all, chosen, noise, weights, every)?;
     let last = matrix.ncols() - 1;
     let mut columns: Vec<DVector<f64>> = (0..last).map(|j| matrix.column(j).into_owned()).collect();
-    // Residual of the believed model less that of this start: what the effect does there.
+    // Residual of the believed model minus the residual of this start: the response to the effect.
     let change = residual - matrix.column(last);
     if change.norm() > NOTHING * residual.norm() {
         columns.push(change);

@@ -83,7 +83,7 @@ impl Context<'_> {
         Ok(best)
     }
 
-    /// Effects of a set; those that follow time count twice, as they imitate more.
+    /// Number of effects of a set; functions of time count twice, because they are more flexible.
     fn size(&self, set: &Node) -> usize {
         let in_time = |&&i: &&usize| self.candidates[i].follows_time();
         set.added.len() + set.added.iter().filter(in_time).count()

@@ -73,13 +73,13 @@ impl ProblemBuilder {
         self
     }
 
-    /// What is kept of one of these effects from an earlier record ([`Problem::kept`]).
+    /// Keeps values of one of these effects from an earlier record ([`Problem::kept`]).
     pub fn kept(mut self, effect: impl Into<String>, kept: Kept) -> Self {
         self.problem.kept.insert(effect.into(), kept);
         self
     }
 
-    /// Records that take part in no fit and no choice; the errors on them are said.
+    /// Held-out records: they are not used for fits or for selection; the errors on them are reported.
     pub fn test(mut self, records: impl Into<Vec<Record>>) -> Self {
         self.problem.test = records.into();
         self
@@ -91,7 +91,7 @@ impl ProblemBuilder {
         self
     }
 
-    /// What is known of a parameter beside the records.
+    /// Prior knowledge of a parameter.
     pub fn prior(mut self, parameter: impl Into<String>, prior: PriorValue) -> Self {
         self.problem.priors.insert(parameter.into(), prior);
         self

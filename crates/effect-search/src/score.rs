@@ -1,4 +1,4 @@
-//! What each candidate would do to a set of effects: its predicted fall of the cost, in one step of Gauss-Newton from its best start.
+//! Score of each candidate for a set of effects: the predicted fall of the cost in one Gauss-Newton step from its best start.
 //!
 //! An effect whose outputs have a derivative where it is absent is linearised there, for each start of its shapes; a threshold at each
 //! of its starts. One linearisation in the metric of the noise gives the cost after the step, all parameters free: the score test, and its
@@ -60,7 +60,7 @@ struct Place {
 const PERIODIC: &str = "periodic";
 /// The effect whose time is looked for between its starts.
 const STEP: &str = "step";
-/// So far from the best starts of a time others are scored, round by round, as shares of the longest record.
+/// Distances from the best instants at which further starts are scored, round by round, as shares of the longest record.
 const BETWEEN: [f64; 2] = [0.05, 0.025];
 
 impl Context<'_> {
@@ -99,7 +99,7 @@ impl Context<'_> {
         self.trials_among(node, &all, noise)
     }
 
-    /// The same of some candidates, by their positions.
+    /// Trials of some candidates, by their positions.
     pub fn trials_among(&self, node: &Node, among: &[usize], noise: &Noise) -> Vec<Trial> {
         let others: Vec<usize> = among
             .iter()
@@ -135,7 +135,7 @@ impl Context<'_> {
         estimation::rows(&self.setup(&node.model).ok()?, &node.fit.x)
     }
 
-    /// The same beside a set whose rows are known.
+    /// Trial of a candidate for a set with known Jacobian.
     fn trial_beside(
         &self,
         node: &Node,
@@ -195,7 +195,8 @@ impl Context<'_> {
         let count = self.samples();
         let set = self.setup(&node.model)?;
         let columns = self.columns_beside(node, &set, &setup);
-        // Where an effect is absent its shapes change nothing: their columns hold rounding errors, and no step follows from these.
+        // While an effect is absent, its shape parameters have no influence: their columns contain rounding errors, and no step is computed
+        // from them.
         let silent: Vec<usize> = candidate
             .parameters
             .iter()
@@ -270,7 +271,7 @@ impl Context<'_> {
             scored.retain(|place| std::mem::take(&mut first) || (place.x[at] - best).abs() >= near);
         }
         if !smooth {
-            // Where the effect acts the set's own derivatives are others.
+            // The presence of the effect changes the derivatives of the other parameters.
             scored.truncate(self.thresholds.linearised_starts);
             scored = scored
                 .into_iter()
@@ -307,7 +308,8 @@ impl Context<'_> {
                     let both = place.x.iter().zip(&place.stepped);
                     both.map(|(x, stepped)| x + share * (stepped - x)).collect()
                 };
-                // Where the whole step raises the cost the fit begins with a part of it: at an absent effect no shape can be fitted.
+                // If the whole step raises the cost, the fit begins with a part of the step: shape parameters cannot be fitted while the
+                // effect is absent.
                 let parts = SHARES.iter().map(|&share| to(share));
                 parts
                     .map(|x| (cost(&x), x))

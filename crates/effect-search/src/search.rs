@@ -16,7 +16,7 @@ use crate::score::Trial;
 /// What is left out where the time has passed.
 const LARGER: &str = "larger sets of effects";
 
-/// What a search in one metric found.
+/// Result of a search with one noise model.
 pub(crate) struct Grown {
     /// The model that the search began with.
     pub base: Node,
@@ -24,11 +24,11 @@ pub(crate) struct Grown {
     pub singles: Vec<Node>,
     /// The set with the least criterion.
     pub best: Node,
-    /// Candidates that are scored beside sets of several: what does next to nothing beside the believed model is not.
+    /// Candidates that are scored for sets of several effects: candidates with almost no influence on the believed model are left out.
     among: Vec<usize>,
     /// Sets that may grow, best first.
     beam: Vec<Node>,
-    /// All sets that were fitted.
+    /// All fitted sets.
     pub fitted: Vec<Node>,
     /// The time ended the search.
     pub cut_short: bool,
@@ -88,7 +88,7 @@ impl Context<'_> {
         sort_by_criterion(nodes);
     }
 
-    /// Where a set ends that is fitted from starts of its own, in white noise.
+    /// Minimum of a set that is fitted from its own starts with white noise.
     fn own_minimum(&self, node: &Node) -> Result<Vec<f64>, Error> {
         let options = FitOptions {
             starts: self.thresholds.own_starts,
@@ -130,7 +130,7 @@ impl Context<'_> {
             .max(self.thresholds.kept_candidates)
             .min(trials.len());
         let mut among: Vec<usize> = trials[..many].iter().map(|t| t.candidate).collect();
-        // What repeats one of them has no score before that is there.
+        // A candidate that repeats another one is scored only if the other one is in the set.
         for i in 0..self.candidates.len() {
             if self.candidates[i].repeats.is_some()
                 && !among.contains(&i)
@@ -262,12 +262,12 @@ impl Context<'_> {
     }
 }
 
-/// The same effects in any order.
+/// Whether two sets contain the same effects in any order.
 pub(crate) fn same_set(a: &Node, b: &Node) -> bool {
     a.added.len() == b.added.len() && a.added.iter().all(|i| b.added.contains(i))
 }
 
-/// By the criterion.
+/// Sorted by the criterion.
 pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     sort_by_criterion(&mut nodes);
     nodes

@@ -47,7 +47,7 @@ pub fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
     if transform.process(&mut flat, &mut spectrum).is_err() {
         return Ok(None);
     }
-    // Without the mean, and without the line at half the sampling rate, which has one degree of freedom.
+    // Without frequency zero, and without the Nyquist frequency, whose line has one degree of freedom.
     let lines: Vec<f64> = spectrum[1..n.div_ceil(2)]
         .iter()
         .map(|line| line.norm_sqr())

@@ -48,7 +48,7 @@ pub fn stationary_p(noise: &ArModel, residual: &[f64], thresholds: &Thresholds) 
         lines.clear();
         let (mut from, mut to) = (0, thresholds.stationary_lines);
         while to <= power.len() {
-            // What does not fill another band belongs to the last one.
+            // Lines that do not fill another band belong to the last band.
             let end = if 2 * to > power.len() {
                 power.len()
             } else {
@@ -102,7 +102,7 @@ mod tests {
             let model = ArModel::fit(&[&e], 6).unwrap();
             chance += usize::from(stationary_p(&model, &e, &Thresholds::DEFAULT) < 0.01);
         }
-        // One in a hundred is asked for, of 400.
+        // The nominal level is one in a hundred, of 400 records.
         assert!(chance <= 10, "{chance}");
     }
 

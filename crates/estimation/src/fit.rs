@@ -27,14 +27,14 @@ pub struct Fit {
     /// The noise in whose metric it was fitted. After [`coloured`] its innovations are those of the residual; in a
     /// metric that was given they are as they were given.
     pub noise: Noise,
-    /// What the rows of each output were multiplied by, beside whitening ([`crate::Squares::weights`]).
+    /// Weights of the rows of each output, in addition to whitening ([`crate::Squares::weights`]).
     pub weights: Vec<f64>,
     /// Minus twice the logarithm of the Gaussian likelihood, the innovations' variance of each output at its best; priors are part of it, but
     /// for what does not change.
     pub deviance: f64,
     /// Fitted numbers, those of the noise included.
     pub parameters: usize,
-    /// What they cost in [`Fit::bic`].
+    /// BIC penalty of the parameters, in [`Fit::bic`].
     pub price: f64,
     /// Samples of all outputs.
     pub samples: usize,
@@ -42,11 +42,11 @@ pub struct Fit {
     pub samples_per_output: Vec<usize>,
     /// Priors of fitted entries, which count as a sample each.
     pub priors: usize,
-    /// How many starts were tried.
+    /// Number of starts.
     pub starts: usize,
     /// How many of them ended in the best minimum.
     pub agree: usize,
-    /// Why the best one stopped.
+    /// Reason why the best fit stopped.
     pub stop: Stop,
     /// The folded rows at the minimum.
     pub triangle: Triangle,
@@ -82,7 +82,7 @@ impl Fit {
         best
     }
 
-    /// The same fit, with the starts counted of the one it continues.
+    /// The same fit; its number of starts includes those of the fit that it continues.
     #[must_use]
     pub fn continuing(mut self, first: &Self) -> Self {
         self.starts = first.starts;
@@ -202,12 +202,12 @@ impl Fit {
     }
 }
 
-/// Where a fit begins.
+/// Start of a fit.
 #[derive(Debug, Clone)]
 pub struct Start {
     /// The vector.
     pub x: Vec<f64>,
-    /// What [`crate::linearise`] gives there in the metric of the fit, where it is known: it is not computed again.
+    /// R factor from [`crate::linearise`] at the start, weighted as in the fit, if known: it is not computed again.
     pub triangle: Option<Triangle>,
 }
 
@@ -218,7 +218,7 @@ impl From<Vec<f64>> for Start {
 }
 
 impl Start {
-    /// Where a fit of the same model ended, for one in the metric of a given noise.
+    /// Start at the result of a fit of the same model, for a fit with a given noise model.
     #[must_use]
     pub fn at_end(fit: &Fit, noise: &Noise) -> Self {
         Self {
@@ -228,7 +228,7 @@ impl Start {
     }
 }
 
-/// Where a fit begins: within the bounds, and near the priors unless it is better where it was given, as the end of another fit is.
+/// Start of a fit: within the bounds, and near the priors unless the given start has a lower cost, as the result of another fit can have.
 fn begun(model: &impl Residuals, given: &[f64], noise: &Noise) -> Vec<f64> {
     let inside = |mut x: Vec<f64>| {
         for &i in model.free() {
@@ -312,7 +312,8 @@ pub fn fit_from(
         .ok_or(Error::NoFiniteStart { starts: count })?;
     let interior: Vec<usize> = (0..free.len())
         .filter(|&j| {
-            // What no sample speaks of has no error: the state behind a lag that is zero.
+            // A parameter without influence on any sample has no standard error, such as the initial state of a lag with time constant
+            // zero.
             minimum.triangle.column_norm(j) > 0.0
                 && !held(minimum.x[j], bounds[j], minimum.triangle.descent(j))
         })
@@ -350,7 +351,7 @@ pub fn fit_from(
     Ok(fit)
 }
 
-/// What one pass over the residuals at the end of a fit says.
+/// Results of one pass over the residuals at the end of a fit.
 struct End {
     rmse: Vec<f64>,
     weights: Vec<f64>,

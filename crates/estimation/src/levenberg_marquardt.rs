@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Triangle;
 
-/// When to stop.
+/// Stopping criteria.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stopping {
     /// Most evaluations.
@@ -19,7 +19,7 @@ pub struct Stopping {
     pub cost: f64,
 }
 
-/// Why the iteration stopped.
+/// Reason why the iteration stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Stop {
@@ -52,7 +52,7 @@ pub fn within(x: f64, (lower, upper): (f64, f64)) -> f64 {
 
 /// Whether the gradient holds a parameter at its bound.
 pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
-    // Of a parameter with one bound the width is infinite, and every value would lie within a share of it.
+    // With only one bound, the width is infinite, and every value would be within a share of the width.
     let width = upper - lower;
     let room = if width.is_finite() {
         1e-12 * width
@@ -62,10 +62,9 @@ pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
     (x <= lower + room && descent <= 0.0) || (x >= upper - room && descent >= 0.0)
 }
 
-/// From `x`, which lies in the box, and its rows `at`, where they are known. `evaluate` gives the folded rows `[J, r]`, `r` =
-/// measured minus model, and may give nothing where the cost is above its second argument; `worse` says, without derivatives
-/// and so much sooner, that it is. No step is taken once it is
-/// `out_of_time`.
+/// Minimises from `x`, which is within the bounds, and its Jacobian `at`, if known. `evaluate` gives the R factor of `[J, r]`, `r` =
+/// measured minus model, and may return nothing if the cost is above its second argument; `worse` tests this condition without derivatives,
+/// and so much faster. After `out_of_time` no step is taken.
 pub(crate) fn minimise(
     mut x: Vec<f64>,
     at: Option<Triangle>,
@@ -84,7 +83,7 @@ pub(crate) fn minimise(
             stop: Stop::NotFinite,
         };
     };
-    // What an undamped step promises says whether it is a minimum; small steps alone may be the damping's doing.
+    // The predicted reduction of an undamped step shows whether this is a minimum; a small step alone can be caused by the damping.
     let promised = |at: &Triangle, free: &[usize]| {
         let step = at.solve(free, &vec![1.0; p], 0.0);
         (at.cost() - at.predicted(&step)) / at.cost()

@@ -183,7 +183,7 @@ impl Criterion {
         let mut volume = 0.0;
         for j in 0..p {
             let diagonal = triangle.at(j, j).abs();
-            // A direction that the record does not show takes nothing from the residual.
+            // A direction that the record does not determine removes nothing from the residual.
             if diagonal > 1e-10 * triangle.column_norm(j) {
                 rank += 1.0;
                 volume += 2.0 * diagonal.ln();

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// One noise model for each output.
+/// Noise model of each output. Its scales are the standard deviations of the innovations, in the outputs' units. A fit estimates the scales
+/// itself and uses only the AR coefficients of the given noise model.
 ///
 /// Its scales (the innovations' standard deviations) are those of the outputs, in their units. A fit estimates the scales itself and
 /// takes from the noise that it is given the colour alone.
@@ -71,7 +72,7 @@ impl Noise {
         })
     }
 
-    /// How many outputs there are.
+    /// Number of outputs.
     #[must_use]
     pub fn outputs(&self) -> usize {
         self.outputs.len()
@@ -124,7 +125,7 @@ impl Noise {
         })
     }
 
-    /// The same with the memory of each at most so many samples ([`ArModel::with_memory_at_most`]).
+    /// The noise model with the memory of each output limited to this number of samples ([`ArModel::with_memory_at_most`]).
     #[must_use]
     pub fn with_memory_at_most(&self, samples: f64) -> Self {
         Self {
@@ -152,7 +153,8 @@ impl Noise {
         outputs.map(|model| model.whitener(lanes)).collect()
     }
 
-    /// With scales relative to that of the first output, and the square of that: of one output the relative scale is one.
+    /// Noise model with scales relative to that of the first output, and the square of the first scale. With one output the relative scale
+    /// is one.
     pub(crate) fn relative(&self) -> (Self, f64) {
         let first = self.outputs[0].sigma();
         let relative = |model: &ArModel| {
@@ -163,7 +165,7 @@ impl Noise {
         (Self { outputs }, first * first)
     }
 
-    /// One over the scale of each output.
+    /// Inverse scale of each output.
     pub(crate) fn inverse_scales(&self) -> Vec<f64> {
         let outputs = self.outputs.iter();
         outputs.map(|model| 1.0 / model.sigma()).collect()

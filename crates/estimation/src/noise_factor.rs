@@ -29,7 +29,7 @@ enum Row {
     There {
         /// Standard deviation of its prediction error over the innovations'.
         scale: f64,
-        /// How many rows before it a missing one is, and the share of the prediction error that corrects its estimate.
+        /// Distance to each missing row before this one, and the gain that corrects its estimate by the prediction error.
         gains: Vec<(usize, f64)>,
     },
 }
@@ -60,7 +60,7 @@ impl Gains {
 }
 
 impl Factor {
-    /// Of a record with one entry for each row: false where it is missing.
+    /// For a record with one entry per row: false if the reading is missing.
     pub(crate) fn new(noise: &ArModel, observed: &[bool]) -> Self {
         let reflections = noise.reflections();
         let mut scales = vec![1.0; reflections.len() + 1];
@@ -145,7 +145,7 @@ impl Factor {
             match row {
                 Row::Missing => out.fill(0.0),
                 Row::There { scale, gains } => {
-                    // To the prediction error.
+                    // Converts to the prediction error.
                     let error = &mut input;
                     for (error, x) in error.iter_mut().zip(&*out) {
                         *error = if colour { *error + x } else { x / scale };

@@ -1,4 +1,4 @@
-//! What is known of an entry beside the records: a reading of it, with a standard error.
+//! Prior knowledge of a parameter: a measured value with a standard error.
 //!
 //! A prior is one more row of the least squares: it is added to the logarithm of the likelihood as a Gaussian reading of the entry with a
 //! known variance, independent of the records ([`crate::Squares`] has the cost).
@@ -10,9 +10,9 @@ use crate::Residuals;
 pub struct Prior {
     /// Position of the entry in the vector.
     pub entry: usize,
-    /// What was read \[unit of the entry\].
+    /// Measured value \[unit of the entry\].
     pub value: f64,
-    /// Its standard error, above zero \[unit of the entry\].
+    /// Standard error of the value, above zero \[unit of the entry\].
     pub std_error: f64,
 }
 

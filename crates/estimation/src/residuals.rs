@@ -1,4 +1,4 @@
-//! What is fitted: residuals with their Jacobian, and what a fit folds them to.
+//! Least-squares problem: residuals with their Jacobian, and the R factor that a fit computes from them.
 
 use ct_signals::Whitener;
 
@@ -6,17 +6,17 @@ use crate::{Noise, Prior, Rows, Squares, Triangle, prior::prior_rows};
 
 /// More than sums of squares over a record differ by where they are taken in another order.
 const ROUNDING: f64 = 1e-9;
-/// Of several outputs the cost is looked at after so many samples.
+/// With several outputs, the cost is checked after this number of samples.
 const LOOK: usize = 64;
 
-/// What is known of a row's sample before it is simulated.
+/// Properties of a sample that are known before the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sample {
-    /// Its output, counted from zero.
+    /// Number of the output, from zero.
     pub output: usize,
-    /// It is the first one of its series.
+    /// The sample is the first one of its series.
     pub first: bool,
-    /// It is missing: the row has no residual.
+    /// The sample is missing: the row has no residual.
     pub missing: bool,
 }
 
@@ -31,25 +31,25 @@ pub trait Residuals: Sync {
     /// Bounds of all entries.
     fn bounds(&self) -> &[(f64, f64)];
 
-    /// How many samples of each output there are, missing ones aside.
+    /// Number of samples of each output without missing ones.
     fn samples(&self) -> &[usize];
 
     /// Shows every row `[d model/d x_free, measured - model]` with what is known of its sample, until `each` says that it has seen enough;
     /// `None` then, and where the model is not finite.
     fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()>;
 
-    /// The same without derivatives: rows of the residual alone.
+    /// Rows of the residual alone, without derivatives.
     fn each_residual(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()>;
 
-    /// What the fitted numbers cost in [`crate::Fit::bic`] with so many coefficients of the noise: the logarithm of the samples each, scales of
-    /// the outputs' noise included.
+    /// BIC penalty of the fitted parameters, with this number of noise coefficients: the logarithm of the number of samples for each
+    /// parameter, including the scales of the outputs' noise.
     fn price(&self, noise_order: usize) -> f64 {
         let samples: usize = self.samples().iter().sum();
         let fitted = self.free().len() + self.samples().len() + noise_order;
         fitted as f64 * (samples as f64).ln()
     }
 
-    /// Standard deviation below which no noise of this output is believed where there are several \[output unit\].
+    /// Lower bound for the noise standard deviation of this output if there are several outputs \[output unit\].
     fn floor(&self, _output: usize) -> f64 {
         0.0
     }
@@ -59,12 +59,12 @@ pub trait Residuals: Sync {
         None
     }
 
-    /// What is known of entries beside the records. Those of entries that are not fitted play no part.
+    /// Priors of parameters. Priors of parameters that are not fitted have no influence.
     fn priors(&self) -> &[Prior] {
         &[]
     }
 
-    /// No time is left: no further step is taken.
+    /// The time is over: no further step is taken.
     fn out_of_time(&self) -> bool {
         false
     }
@@ -121,7 +121,7 @@ pub fn linearise(model: &impl Residuals, x: &[f64], noise: &Noise) -> Option<Tri
     linearise_below(model, x, noise, f64::INFINITY)
 }
 
-/// The same; `None` too where the cost is above a limit, which is known long before the last sample as a rule.
+/// As `linearise`; also `None` if the cost exceeds a limit, which is usually known long before the last sample.
 #[must_use]
 pub fn linearise_below(
     model: &impl Residuals,
@@ -193,7 +193,7 @@ pub fn residuals(model: &impl Residuals, x: &[f64]) -> Option<Vec<Vec<f64>>> {
 /// Rows that come in any order of outputs, sorted by series.
 struct Collected {
     rows: Rows,
-    /// Of each output what has come of the present record.
+    /// Results of the present record for each output.
     own: Vec<Vec<f64>>,
 }
 

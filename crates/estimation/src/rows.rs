@@ -100,8 +100,7 @@ impl Rows {
         }
     }
 
-    /// The rows of the priors with columns chosen and put in this order, times the standard deviation `sigma` of the rows that they stand
-    /// beside.
+    /// Rows of the priors with selected columns in this order, scaled by the standard deviation `sigma` of the data rows.
     pub fn each_prior(&self, order: &[usize], sigma: f64, mut each: impl FnMut(&[f64])) {
         let mut chosen = vec![0.0; order.len()];
         for row in &self.priors {

@@ -29,7 +29,7 @@ pub struct Robust {
 }
 
 impl Robust {
-    /// Half the width of the interval that holds the truth with probability `level` (0.95, say).
+    /// Half the width of the interval that contains the true value with probability `level` (0.95, say).
     #[must_use]
     pub fn half_widths(&self, level: f64) -> Vec<Option<f64>> {
         self.std_errors
@@ -50,8 +50,8 @@ pub fn robust(model: &impl Residuals, fit: &Fit, order: usize) -> Result<Robust,
     robust_with_memory(model, fit, order, f64::INFINITY)
 }
 
-/// The same, the memory of the noise model at most so many samples ([`ct_signals::ArModel::with_memory_at_most`]): where a residual holds slow
-/// physics, no record says how large a noise with a root near one is.
+/// As [`robust`], with the memory of the noise model limited to this number of samples ([`ct_signals::ArModel::with_memory_at_most`]): if a
+/// residual contains slow model error, the record does not determine the variance of an AR noise with a root near one.
 ///
 /// # Errors
 /// As [`robust`].
@@ -93,14 +93,14 @@ fn diagonal(matrix: &[Vec<f64>]) -> Vec<f64> {
 struct Sandwich {
     bread: Option<Vec<Vec<f64>>>,
     lanes: usize,
-    /// For each series its output, its rows, zero where missing, and whether each is there.
+    /// For each series its output, its rows (zero if missing), and whether each row is present.
     series: Vec<(usize, Vec<f64>, Vec<bool>)>,
     /// The rows `M J` of the priors, of variance one.
     priors: Vec<Vec<f64>>,
 }
 
 impl Sandwich {
-    /// From the rows' columns of these entries, the metric of the fit, `W` (noise and weights), and `C` over them.
+    /// From the Jacobian's columns of these parameters, the weighting of the fit, `W` (noise and weights), and `C` over them.
     fn new(
         rows: &Rows,
         columns: &[usize],

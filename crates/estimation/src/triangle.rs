@@ -23,10 +23,10 @@ pub struct Triangle {
     /// Rows not yet folded in, column by column.
     block: Vec<f64>,
     filled: usize,
-    /// For folding: the product of each column of the block with the pivot's.
+    /// Work memory: the product of each column of the block with the pivot's column.
     products: Vec<f64>,
     rows: usize,
-    /// Of several outputs, or with priors, the triangle of each: their weights follow from the residuals.
+    /// With several outputs, or with priors: the R factor of each, because their weights depend on the residuals.
     outputs: Option<Box<Outputs>>,
 }
 
@@ -247,13 +247,13 @@ impl Triangle {
         (0..last).map(|i| 2.0 * self.at(i, i).abs().ln()).sum()
     }
 
-    /// No entry is infinite or NaN.
+    /// Whether all entries are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.r.iter().all(|value| value.is_finite())
     }
 
-    /// No column of J is a combination of those before it to within `1e-10` of its length: the rows determine all parameters.
+    /// Whether no column of J is a combination of earlier columns to within `1e-10` of its length: the rows determine all parameters.
     #[must_use]
     pub fn determined(&self) -> bool {
         (0..self.columns - 1).all(|j| self.independent(j))

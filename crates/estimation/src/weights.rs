@@ -1,4 +1,4 @@
-//! What outputs of unknown noise count against each other.
+//! Weights of outputs with unknown noise variances.
 //!
 //! **Model**: the whitened residuals of output `o`, `N_o` of them, have the unknown variance `s_o^2`. At its best for a sum of squares `C_o`
 //! it is `C_o/N_o`, and minus twice the logarithm of the likelihood is, but for constants,
@@ -66,7 +66,7 @@ impl Squares {
         }
     }
 
-    /// The same sums with the priors' squares replaced.
+    /// The sums with the priors' part replaced.
     pub(crate) fn with_prior(mut self, squares: f64) -> Self {
         self.prior = squares;
         self

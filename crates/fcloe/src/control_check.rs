@@ -25,7 +25,7 @@ const SLOWEST: f64 = 20.0;
 /// Added to the diagonal, as a share of it, so that dependent columns do no harm.
 const RIDGE: f64 = 1e-9;
 
-/// How far a controller is from the u that was measured, unit of u.
+/// Difference between the controller's output and the measured u, unit of u.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mismatch {
     /// Root mean square of what the controller does not explain.
@@ -63,12 +63,12 @@ pub fn controller_mismatch(
     let law = StateSpace::controllable(&law)?;
     let high = TransferFunction::new(Polynomial::p().pow(integrators), slow)?;
     let high = StateSpace::controllable(&high)?;
-    // u jumps with r by the direct term, and is smooth beside that.
+    // u has steps with r because of the direct term; the remaining part of u is smooth.
     let direct = law.d();
     let smooth = u.iter().zip(r).map(|(u, r)| u - direct * r);
     let mean = smooth.clone().sum::<f64>() / n;
     let smooth = response(&high, Hold::First, smooth.map(|u| u - mean), record.step)?;
-    // About its mean too, as the smooth part: else raw levels count as a jump at the beginning.
+    // Also subtract the mean, as for the smooth part: otherwise raw levels count as a step at the beginning.
     let level = r.iter().sum::<f64>() / n;
     let moves = r.iter().map(|r| r - level);
     let jumps = response(&high, record.r_hold, moves, record.step)?;
@@ -184,16 +184,16 @@ fn ladder(r: &[f64], record: &LoopRecord) -> Result<Vec<Vec<f64>>, Error> {
     Ok(columns)
 }
 
-/// What is left of a signal beside its projection on the columns.
+/// Residual of a signal after projection on the columns.
 fn residual(columns: &[Vec<f64>], signal: &[f64]) -> Vec<f64> {
     Projection::new(columns, signal).left(columns, signal)
 }
 
 /// Least squares of a signal on columns, dependent ones weighed down.
 struct Projection {
-    /// Of the columns and the signal.
+    /// R factor of the columns and the signal.
     triangle: Triangle,
-    /// The same with the ridge.
+    /// The same R factor with the ridge.
     damped: Triangle,
     all: Vec<usize>,
 }

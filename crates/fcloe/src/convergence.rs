@@ -17,14 +17,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::{ClosedLoop, Controller, Error, PlantModel};
 
-/// What is known of condition (14) for one filter and one plant.
+/// Result of condition (14) for one filter and one plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
     /// The answer.
     pub verdict: Verdict,
     /// The smallest `Re (P^/P)(jw)` over all frequencies; NaN where P is not Hurwitz.
     pub least: f64,
-    /// Where that is \[rad/time\]; infinite where it is the limit at high frequencies, NaN where P is not Hurwitz.
+    /// Frequency of the minimum \[rad/time\]; infinite if it is the limit at high frequencies, NaN if P is not Hurwitz.
     pub frequency: f64,
 }
 
@@ -58,7 +58,7 @@ impl Condition {
                     frequency: f64::NAN,
                 });
             }
-            // At infinity the condition has to hold with something to spare, too.
+            // At infinite frequency the condition needs a positive margin too.
             Positivity::Strict => Verdict::Holds,
             _ if ratio.exceeds(0.0)?.is_strict() => Verdict::Positive,
             _ => Verdict::Negative,
@@ -86,7 +86,7 @@ impl Condition {
         )
     }
 
-    /// Whether it holds.
+    /// Whether the condition is satisfied.
     pub fn holds(&self) -> bool {
         self.verdict == Verdict::Holds
     }

@@ -1,5 +1,5 @@
-//! What can be wrong with a model, a controller, a record or a fit: each message names what it is about, the numbers
-//! that disagree and the mend, in one line.
+//! Errors of models, controllers, records and fits: each message names the object, the numbers that disagree and the correction, in one
+//! line.
 
 /// Everything this crate can refuse.
 #[derive(Debug, thiserror::Error)]
@@ -8,7 +8,7 @@ pub enum Error {
     /// A polynomial, a transfer function or a sampling step that is no such thing.
     #[error(transparent)]
     Lti(#[from] ct_lti::Error),
-    /// What the recursive least squares refuse.
+    /// Error of the recursive least squares.
     #[error(transparent)]
     Rls(#[from] ct_rls::Error),
     /// A series or a setting that `ct-signals` refuses.
@@ -56,7 +56,7 @@ pub enum Error {
         "a sensor filter of {zeta} belongs to a loop, but there is no controller; apply the same filter to u and leave it out here"
     )]
     FilterWithoutLoop {
-        /// Its bandwidth \[1/time\].
+        /// Bandwidth of the filter \[1/time\].
         zeta: f64,
     },
     /// The loop's polynomial is not Hurwitz.
@@ -75,10 +75,10 @@ pub enum Error {
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What is allowed.
+        /// Allowed range.
         range: &'static str,
     },
-    /// No record at all.
+    /// No record is given.
     #[error("there is no record; give at least one")]
     NoRecord,
     /// A record of a loop without its reference.
@@ -205,7 +205,7 @@ pub enum Error {
     ConstantDrive {
         /// `r` or `u`.
         signal: &'static str,
-        /// Its value in the first record.
+        /// Value in the first record.
         value: f64,
     },
     /// The measured u is not what the controller makes of r - y.
@@ -256,7 +256,7 @@ pub enum Error {
         /// The controller's period \[time\].
         period: f64,
     },
-    /// No regression gave a plant whose loop is stable.
+    /// No regression gave a plant with a stable loop.
     #[error(
         "none of the plants from {tried} filter bandwidths has a stable loop; check the controller's sign and units, or give bandwidths lambda of 2 to 10 times the loop's poles"
     )]

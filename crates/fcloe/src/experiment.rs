@@ -10,12 +10,12 @@ use rand::Rng;
 
 use crate::{ClosedLoop, Controller, Error, LoopSimulator, PlantModel};
 
-/// Where noise enters. One value for each sample, unit of y, held until the next.
+/// Point where noise enters the loop. One value for each sample, unit of y, held until the next.
 #[derive(Debug, Clone, Copy)]
 pub enum Noise<'a> {
-    /// There is none.
+    /// No noise.
     None,
-    /// Added to the output that the controller sees: it circulates, and the record holds `A S/P w`.
+    /// Noise is added to the output that the controller reads: it is fed back, and the record contains `A S/P w`.
     InLoop(&'a [f64]),
     /// Added to the recorded y alone: the controller never sees it.
     OnRecord(&'a [f64]),

@@ -37,7 +37,7 @@ use serde::Serialize;
 use self::series::{Series, autoregression};
 use crate::{ClosedLoop, Error};
 
-/// Where the noise enters.
+/// Point where the noise enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePath {
@@ -89,7 +89,7 @@ impl NoiseModel {
             let sampled = system.sampled(Hold::Zero, residual.step)?;
             let (v, ones) = (&residual.values, vec![1.0; residual.values.len()]);
             let unfilter = |v: &[f64]| unfiltered(&system, &sampled, v);
-            // What the residual may hold beside the noise, as it looks on each path.
+            // Deterministic signals that the residual may contain besides the noise, for each path.
             let (mut here, mut there) = (Vec::new(), Vec::new());
             if blind {
                 here.push(filtered(&system, &sampled, &ones));
@@ -179,7 +179,7 @@ impl NoiseModel {
         let segments: Vec<&[f64]> = all.iter().map(|s| &s.values[..]).collect();
         let none = StateSpace::new(vec![], vec![], vec![], 1.0)?;
         let of = |system: &StateSpace| -> Result<(f64, ArModel), Error> {
-            // What cannot be sampled is refused here once.
+            // Errors of sampling are found here once.
             let known: Vec<Sampled> = residuals
                 .iter()
                 .map(|residual| system.sampled(Hold::Zero, residual.step))

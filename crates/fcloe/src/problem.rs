@@ -35,7 +35,7 @@ pub struct Levels {
     pub y: f64,
 }
 
-/// One record, ready to be fitted.
+/// One record with the data for a fit.
 #[derive(Debug, Clone)]
 struct Prepared {
     name: String,
@@ -47,27 +47,27 @@ struct Prepared {
     lacks_readings: bool,
     /// The operating point of the two.
     levels: Levels,
-    /// Where its two columns begin, if its offsets are estimated.
+    /// First of the record's two columns, if its offsets are estimated.
     column: Option<usize>,
     /// Spread of drive and y.
     spread: [f64; 2],
 }
 
-/// What is fitted to what.
+/// The least-squares problem.
 #[derive(Debug, Clone)]
 pub struct Problem {
     controller: Controller,
     orders: Orders,
     records: Vec<Prepared>,
     mismatches: Vec<Option<Mismatch>>,
-    /// All columns: the parameters of the plant, then the estimated levels.
+    /// All columns: the parameters of the plant, followed by the estimated levels.
     free: Vec<usize>,
     bounds: Vec<(f64, f64)>,
-    /// Of the one output.
+    /// Number of samples of the single output.
     samples: [usize; 1],
 }
 
-/// Why parameters have no criterion.
+/// Reason why the criterion is undefined for these parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Refused {
     /// P^ is not Hurwitz.
@@ -184,7 +184,7 @@ impl Problem {
         self.samples[0]
     }
 
-    /// How far the controller is from each record's u; none for a record without u, and in open loop.
+    /// Difference between the controller's output and each record's u; none for a record without u, and in open loop.
     pub fn mismatches(&self) -> &[Option<Mismatch>] {
         &self.mismatches
     }

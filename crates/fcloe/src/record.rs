@@ -50,11 +50,11 @@ pub struct LoopRecord {
     pub u: Option<Vec<f64>>,
     /// Output as the controller sees it, at the sampling instants; NaN where the reading is missing.
     pub y: Vec<f64>,
-    /// What r does between samples.
+    /// Hold of r between samples.
     pub r_hold: Hold,
     /// What u does between samples. In a loop with a continuous controller it is not quite either of the two.
     pub u_hold: Hold,
-    /// Where zero is.
+    /// Operating point.
     pub offsets: Offsets,
 }
 

@@ -225,7 +225,7 @@ impl LoopSimulator {
         (y, u)
     }
 
-    /// Moves the chains over at most [`BLOCK`] samples and computes y^ there.
+    /// Advances the filter chains by at most [`BLOCK`] samples and computes y^.
     fn chains(&mut self, drive: &[f64]) {
         let Self {
             transition,
@@ -320,7 +320,7 @@ impl Transition {
         }
     }
 
-    /// A number of states that the compiler knows: the states stay in registers.
+    /// A number of states that is known at compile time: the states stay in processor registers.
     fn fixed<const N: usize>(
         &self,
         state: &mut State,

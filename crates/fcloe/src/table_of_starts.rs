@@ -1,4 +1,4 @@
-//! From which starts the recursive estimator converges, beside what condition (14) says of them.
+//! Table of starts from which the recursive estimator converges, compared with condition (14).
 //!
 //! A start is the true plant with its gain times one factor and its time scale times another, `B -> k B(t p)`,
 //! `A -> A(t p)`; for `K/(1 + tau p)` these are `K0/K` and `tau0/tau`.

@@ -24,14 +24,14 @@ use crate::{ClosedLoop, Error, Fit, Problem};
 /// Orders of autoregressive noise that are tried: 0 to this.
 const MAX_ORDER: usize = 8;
 
-/// How well a fit is known.
+/// Uncertainty of a fit.
 #[derive(Debug, Clone, Serialize)]
 pub struct Uncertainty {
     /// Covariance of theta, and of the estimated levels behind it (drive, then y, record by record).
     pub covariance: Vec<Vec<f64>>,
     /// Roots of its diagonal for theta.
     pub std_errors: Vec<f64>,
-    /// What the residual was found to be.
+    /// Noise model of the residual.
     pub noise: NoiseModel,
     /// Standard errors of a white residual, for comparison: what is usually printed.
     pub white_std_errors: Vec<f64>,
@@ -87,7 +87,7 @@ impl Problem {
             .collect();
         let noise = NoiseModel::of_residuals(&residuals, &closed, path, MAX_ORDER)?;
 
-        // Each record has its own filter, from rest; from the process of the noise at its sampling interval.
+        // Each record has a separate filter that starts at rest, for the noise process at its sampling interval.
         let mut meat = vec![0.0; q * q];
         let processes = residuals
             .iter()

@@ -21,7 +21,7 @@ pub enum Error {
         /// The names that there are.
         known: String,
     },
-    /// What is known of a parameter beside the records is no number with an error.
+    /// A prior is not a finite number with a positive standard error within the bounds.
     #[error(
         "[prior] {name} = [{value}, {std_error}]: the parameter lies between {lower:.4e} and {upper:.4e}; give a value there and a standard error above zero, in its unit"
     )]
@@ -30,7 +30,7 @@ pub enum Error {
         name: String,
         /// The value.
         value: f64,
-        /// Its standard error.
+        /// Standard error of the prior.
         std_error: f64,
         /// The smallest value that a fit takes.
         lower: f64,
@@ -44,9 +44,9 @@ pub enum Error {
     Outputs {
         /// The record.
         record: String,
-        /// How many it has.
+        /// Number in the record.
         given: usize,
-        /// How many the structure has.
+        /// Number in the model.
         needed: usize,
     },
     /// A record has another number of inputs than the model.
@@ -58,13 +58,13 @@ pub enum Error {
         record: String,
         /// How many it has.
         given: usize,
-        /// How many the model has.
+        /// Number in the model.
         needed: usize,
     },
     /// The least squares have no answer.
     #[error(transparent)]
     Estimation(#[from] estimation::Error),
-    /// Somebody said so by [`Setup::stop`](crate::Setup::stop).
+    /// Cancelled by [`Setup::stop`](crate::Setup::stop).
     #[error("stopped before it was done")]
     Stopped,
     /// The loop cannot be simulated without what it was to follow.
@@ -82,7 +82,7 @@ pub enum Error {
     ConstantReference {
         /// The record.
         record: String,
-        /// Where it stays.
+        /// Constant value of the reference.
         value: f64,
     },
     /// A controller's command is held from sample to sample.

@@ -97,7 +97,7 @@ pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error>
         (triangle, beside, rms)
     };
     let free: Vec<usize> = (0..n).collect();
-    // What it would be at no error, in the state that the command sees.
+    // Command at zero control error, for the state before saturation.
     let seen = controller.linear(1.0).c;
     let mut states: Vec<f64> = seen
         .iter()
@@ -143,7 +143,7 @@ pub struct LinearPlant {
     pub a: Vec<Vec<f64>>,
     /// b.
     pub b: Vec<f64>,
-    /// Of each output, which level it is.
+    /// Level of each output.
     pub outputs: Vec<usize>,
 }
 
@@ -237,7 +237,7 @@ impl Feedback {
             .collect()
     }
 
-    /// What the commands of rows of so many columns do to the plant.
+    /// Response of the plant to the controller's commands, for rows with this number of columns.
     pub(crate) fn response(&self, columns: usize) -> Response {
         Response {
             plant: self.plant.clone(),
@@ -270,7 +270,7 @@ impl Response {
     /// A step under the commands of a row.
     pub(crate) fn advance(&mut self, commands: &[f64]) {
         let (a, b) = (&self.plant.a, &self.plant.b);
-        // One pass over the columns: a row is short, and every loop over it would cost more than its sums.
+        // A single loop over the columns: rows are short, and the overhead of a loop exceeds the cost of its sums.
         if let [b0, b1] = b[..] {
             let [[a00, a01], [a10, a11]] = [[a[0][0], a[0][1]], [a[1][0], a[1][1]]];
             let (first, second) = self.levels.split_at_mut(commands.len());

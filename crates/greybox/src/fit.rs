@@ -9,7 +9,7 @@ use crate::{Error, Setup, random_starts, starts::extend_levels};
 /// How to fit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FitOptions {
-    /// How many random starts.
+    /// Number of random starts.
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
@@ -57,7 +57,7 @@ pub fn fit_from(
     fit_onward(setup, starts, noise, stopping)
 }
 
-/// As [`fit_from`], from starts of which more may be known.
+/// As [`fit_from`], from starts with additional data.
 ///
 /// # Errors
 /// As [`fit_from`].

@@ -11,12 +11,12 @@ use rayon::prelude::*;
 
 use crate::Setup;
 
-/// What hides much of the command from the plant, and so how quick the plant is.
+/// Effects that keep much of the command from the plant, and so affect its apparent speed.
 const STICKS: &str = "stiction_backlash";
 const SATURATES: &str = "pump_saturation";
 /// Time constants of linear plants, in samples, from which their fits begin beside the one that the model without them has, ...
 const TIME_CONSTANTS: [f64; 3] = [1.0, 12.0, 150.0];
-/// ... and one in lengths of the record: a plant that integrates.
+/// ... and one in multiples of the record's length: an integrating plant.
 const INTEGRATES: f64 = 10.0;
 /// Tanks: by how much quicker than the model without them has it.
 const QUICKER: [f64; 3] = [0.3, 3.0, 9.0];
@@ -43,7 +43,7 @@ pub fn with_other_speeds(setup: &Setup, placed: Placed, x: &[f64]) -> Vec<Vec<f6
         let all = sampled.into_iter().chain([INTEGRATES * scales.duration]);
         return all.filter(|_| !lags.is_empty()).map(with).collect();
     }
-    // Where a valve sticks there are too many starts already.
+    // With valve stiction there are already many starts.
     let own = plant.parameters(&setup.structure.scales).len();
     let all_free = (0..own).all(|at| setup.free().contains(&at));
     if plant.joined() || effect != SATURATES || !all_free {
@@ -59,7 +59,7 @@ pub fn with_other_speeds(setup: &Setup, placed: Placed, x: &[f64]) -> Vec<Vec<f6
     QUICKER.map(with).to_vec()
 }
 
-/// Where the fitted time constants of a plant stand in the vector.
+/// Positions of the fitted time constants of a plant in the parameter vector.
 fn time_constants(setup: &Setup) -> Vec<usize> {
     let lags = ["tau", "tau1", "tau2"];
     let free = setup.free().iter().copied();
@@ -67,13 +67,13 @@ fn time_constants(setup: &Setup) -> Vec<usize> {
         .collect()
 }
 
-/// What is left out where the time limit has passed.
+/// Step that is left out if the time limit has passed.
 const STARTS: &str = "further starts of effects at the actuator";
 /// Damping of the step by the other parameters, against what the data do not determine.
 const DAMPING: f64 = 1e-9;
-/// With more starts than this an effect at the actuator is simulated from all of them, without derivatives, before it is linearised ...
+/// With more starts than this, an effect at the actuator is simulated from all of them, without derivatives, before it is linearised ...
 const MANY: usize = 20;
-/// ... at so many, the best.
+/// ... at this number of the best ones.
 const LINEARISED: usize = 12;
 
 /// Of many starts of an effect at the actuator keeps those whose simulations fit best, once the gain of the pump and, to first order,
@@ -99,7 +99,7 @@ pub fn keep_best_simulated(
         .filter(|&j| !apart.contains(&setup.free()[j]))
         .collect();
     let best = ranked.into_par_iter().map(|(simulated, mut start)| {
-        // With a gain of the wrong sign the slopes by time constants would have the wrong sign too.
+        // With the wrong sign of the gain, the derivatives with respect to time constants would have the wrong sign too.
         if let Some(gain) = simulated.gain {
             start[placed.vessel] = within(gain, setup.bounds()[placed.vessel]);
         }
@@ -129,7 +129,7 @@ fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &Noise) -> V
     }
 }
 
-/// Where the effect's own parameters stand in the vector, and those of time constants, which are not fitted at a start.
+/// Positions of the effect's own parameters in the vector, and of time constants, which are not fitted at a start.
 fn apart(setup: &Setup, placed: Placed) -> Vec<usize> {
     let own = format!("{}.", placed.effect.id);
     let named = setup.names()[..setup.parameter_count()].iter().enumerate();
@@ -141,16 +141,16 @@ fn apart(setup: &Setup, placed: Placed) -> Vec<usize> {
     apart
 }
 
-/// What a simulation says of a start.
+/// Result of the simulation from a start.
 #[derive(Clone, Copy)]
 struct Simulated {
-    /// What is left of the sum of squares.
+    /// Sum of squares after the linear fit.
     left: f64,
     /// The pump's gain, where it is fitted.
     gain: Option<f64>,
 }
 
-/// What the simulation of each start says.
+/// Scores of the simulations from all starts.
 fn scores_of_simulations(
     setup: &Setup,
     placed: Placed,
@@ -230,7 +230,7 @@ fn scores_of_simulations(
     Some(scores.map(|score| score.unwrap_or(none)).collect())
 }
 
-/// What a model leaves of the records, whitened and weighted.
+/// Residuals of a model on the records, whitened and weighted.
 fn whitened(setup: &Setup, x: &[f64], noise: &Noise, weights: &[f64]) -> Option<Vec<f64>> {
     let series = noise.whiten(&setup.disturbance(x).ok()?);
     let weighted = series.iter().zip(weights.iter().cycle());
@@ -327,7 +327,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Takes out of a column what lies along an orthonormal basis.
+/// Subtracts the projection of a column on an orthonormal basis.
 fn project(column: &mut [f64], basis: &[Vec<f64>]) {
     for unit in basis {
         let along = dot(column, unit);

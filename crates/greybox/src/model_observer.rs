@@ -70,7 +70,7 @@ fn observed(spec: &ModelSpec, shown: &[(usize, usize)], rate: f64) -> ModelSpec 
 }
 
 impl ModelSetup<'_> {
-    /// Where fits beside observers of falling rates lead from a start; `None` where no output shows a state.
+    /// Result of observer fits with decreasing gain from a start; `None` if no output depends on a state.
     pub(crate) fn observed_from(&self, start: &[f64]) -> Option<Vec<f64>> {
         let rows: usize = self.records().iter().map(|record| record.len() - 1).sum();
         let duration: f64 = self.records().iter().map(Record::duration).sum();

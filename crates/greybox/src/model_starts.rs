@@ -1,4 +1,4 @@
-//! Where fits of a model of its user's text begin.
+//! Start values of fits of a user's own model.
 //!
 //! What such a model is like nobody knows ahead, so starts are of four kinds: the values of the text; the best of many points around them, by
 //! a simulation of each without derivatives; what fits beside observers lead to ([`crate::model_observer`]); and what fits of growing first
@@ -16,19 +16,19 @@ use crate::ModelSetup;
 
 /// Spread of the starts of parameters, of their logarithm: a guess is off by a factor of two as often as not ...
 const SPREAD: f64 = 0.8;
-/// ... and of the initial states that no output reads.
+/// ... and of the initial states that no output measures.
 const STATE_SPREAD: f64 = 0.5;
-/// So many points are simulated for every start that is fitted.
+/// Number of simulated points per fitted start.
 const POINTS: usize = 16;
 /// The first parts of the records that are fitted one after the other, as shares of each.
 const HORIZONS: [f64; 3] = [0.03, 0.1, 0.3];
 /// The least samples of a first part for every fitted number.
 const LEAST: usize = 4;
-/// From so many starts the first parts are fitted.
+/// Number of starts for the fits of growing first parts.
 const GROWING: usize = 4;
-/// From so many starts fits beside observers begin.
+/// Number of starts for the observer fits.
 const OBSERVED: usize = 2;
-/// The sequence has so many dimensions; what comes after them stays at its start.
+/// Dimensions of the sequence; later parameters keep their start values.
 const DIMENSIONS: usize = 256;
 
 impl ModelSetup<'_> {
@@ -69,7 +69,7 @@ impl ModelSetup<'_> {
         starts.into_iter().map(Start::from).collect()
     }
 
-    /// Where fits of growing first parts of the records lead from a start; `None` where these are too short.
+    /// Result of fits of growing first parts of the records from a start; `None` if these are too short.
     fn grown(&self, start: &[f64], noise: &Noise, stopping: Stopping) -> Option<Vec<f64>> {
         let mut x = None;
         for share in HORIZONS {

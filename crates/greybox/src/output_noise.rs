@@ -1,4 +1,4 @@
-//! How large the noise of each measured output is, whatever the model lacks.
+//! Noise level of each measured output, estimated independently of model errors.
 //!
 //! The residual of a model that lacks something holds more than noise, and more at one output than at another. What the noise is shows in a
 //! linear prediction of the reading from all that is known at its instant: the model's own output and its past, the readings before it,
@@ -15,7 +15,7 @@ use estimation::Triangle;
 const PAST: usize = 24;
 /// Rows of inputs and readings of other outputs before.
 const PAST_OF_OTHERS: usize = 12;
-/// So many samples for every coefficient are needed at least; with fewer the prediction takes less of the past.
+/// Least number of samples per coefficient; with fewer samples the prediction uses a shorter past.
 const SAMPLES: usize = 5;
 
 /// The standard deviation of each output's noise \[its unit\]; `None` where there are too few samples to tell.

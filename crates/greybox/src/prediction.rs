@@ -21,12 +21,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// How well the parameters of a fit are known, and how large the noise of readings is.
+/// Uncertainty of the parameters of a fit, and standard deviation of the readings' noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitUncertainty {
     /// Positions in the vector of the parameters that have an error: fitted ones that are not at a bound.
     pub entries: Vec<usize>,
-    /// Their covariance, row by row \[product of their units\].
+    /// Covariance of the parameters, row by row \[product of their units\].
     pub covariance: Vec<Vec<f64>>,
     /// Degrees of freedom: the quantile of Student's distribution with as many makes a band of a standard error.
     pub freedom: f64,
@@ -37,8 +37,8 @@ pub struct FitUncertainty {
 }
 
 impl FitUncertainty {
-    /// Of the first `parameters` entries of a fit's vector, under autoregressive noise of order zero to `order` at each output; `None` where
-    /// the records do not determine all that was fitted.
+    /// Uncertainty of the first `parameters` entries of a fit's vector, under autoregressive noise of order zero to `order` at each output;
+    /// `None` if the records do not determine all fitted entries.
     ///
     /// # Errors
     /// Where the model is not finite at the fit.
@@ -87,7 +87,7 @@ impl FitUncertainty {
         }))
     }
 
-    /// Half the width of the band that holds with probability `level` (0.95, say), for one standard error.
+    /// Half the width of the band with coverage `level` (0.95, say), in standard errors.
     #[must_use]
     pub fn quantile(&self, level: f64) -> f64 {
         ct_signals::student_half_width(level, self.freedom)
@@ -106,9 +106,9 @@ impl FitUncertainty {
 /// Initial states of a simulation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InitialStates {
-    /// Their values \[unit of the state\].
+    /// Values of the initial states \[unit of the state\].
     pub values: Vec<f64>,
-    /// How each moves with each of [`FitUncertainty::entries`], a row for each state.
+    /// Derivatives with respect to [`FitUncertainty::entries`], a row for each state.
     by_parameters: Vec<Vec<f64>>,
     /// Covariance of what else is not known of them, row by row.
     covariance: Vec<Vec<f64>>,
@@ -126,7 +126,7 @@ impl InitialStates {
         }
     }
 
-    /// What the text of a model says for these parameters; `entries` as [`FitUncertainty::entries`].
+    /// Initial states from the text of a model for these parameters; `entries` as [`FitUncertainty::entries`].
     #[must_use]
     pub fn of_text(model: &Model, parameters: &[f64], entries: &[usize]) -> Self {
         const LANES: usize = 4;

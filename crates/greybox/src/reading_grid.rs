@@ -56,7 +56,7 @@ impl ReadingGrid {
         self.step / self.median_change
     }
 
-    /// The step shows beside the noise: it is no mere digit of the file.
+    /// Whether the quantisation step is large compared with the noise, and not only the last digit of the file.
     #[must_use]
     pub fn is_coarse(&self) -> bool {
         self.coarseness() >= COARSE

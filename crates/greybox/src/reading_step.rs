@@ -5,14 +5,14 @@ use ct_signals::Record;
 
 use crate::reading_grid;
 
-/// How well readings must lie on the multiples: the mean of `cos(2 pi y/D)`, one where all of them do. With white noise of
-/// a tenth of the step, 0.82.
+/// Least agreement of the readings with multiples: the mean of `cos(2 pi y/D)`, one for exact multiples. With white noise of a tenth of the
+/// step, 0.82.
 const ALIGNED: f64 = 0.8;
 /// The most steps between the least and the largest reading that are looked for.
 const MOST_STEPS: f64 = 100.0;
 /// The fewest: below, any few distinct levels would do.
 const FEWEST_STEPS: f64 = 4.0;
-/// Readings that the first look takes.
+/// Number of readings in the first test.
 const FIRST_LOOK: usize = 400;
 
 /// The largest `D` that nearly all readings of an output are multiples of \[output unit\], if there is one that is coarse enough to be
@@ -21,14 +21,14 @@ pub(crate) fn reading_step(records: &[Record], output: usize) -> Option<f64> {
     exact_reading_step(records, output).or_else(|| noisy_step(records, output))
 }
 
-/// The same where the readings themselves are multiples, as a converter leaves them.
+/// Quantisation step if the readings themselves are exact multiples, as after an A/D converter.
 #[must_use]
 pub fn exact_reading_step(records: &[Record], output: usize) -> Option<f64> {
     let grid = reading_grid(records, output).filter(|grid| grid.is_coarse() && grid.has_zero());
     grid.map(|grid| grid.step)
 }
 
-/// The same where noise comes behind the steps.
+/// Quantisation step if noise is added after the quantisation.
 fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
     let all = || {
         records
@@ -70,7 +70,7 @@ fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
     Some(1.0 / best.1)
 }
 
-/// How well readings lie on the multiples of one over `steps`.
+/// Agreement of readings with multiples of one over `steps`.
 fn aligned(steps: f64, readings: &[f64]) -> f64 {
     let turn = std::f64::consts::TAU * steps;
     let sum: f64 = readings.iter().map(|y| (turn * y).cos()).sum();

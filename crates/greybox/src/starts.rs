@@ -13,7 +13,7 @@ use estimation::within;
 
 use crate::{Setup, at_rest};
 
-/// One start for the plant's own parameters and the initial levels; effects start at their first start value.
+/// One start for the plant's own parameters and the initial levels; effects use their first start value.
 #[must_use]
 pub fn random_starts(setup: &Setup, n: usize, seed: u64) -> Vec<Vec<f64>> {
     use rand::SeedableRng;
@@ -126,7 +126,7 @@ fn joined_tanks(setup: &Setup, (read, mean): (usize, f64), flow: f64, heads: [f6
     let u = middle(|record| Some(&record.inputs[0]));
     let all = u + middle(|record| record.inputs.get(1));
     let gain = if all > 0.0 { flow / all } else { flow };
-    // What goes through the valves comes from the first pump; where that hardly runs, any flow says as much.
+    // The flow through the valves comes from the first pump; if that pump is nearly off, any flow is as good a guess.
     let through = (gain * u).max(0.1 * flow);
     let [d13, d32] = heads.map(|share| share * mean);
     // Levels in the row, T1, T3, T2, from the measured one.
@@ -172,7 +172,7 @@ fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
     let h2 = head(all.max(0.0), x[pumps + 2]);
     let h3 = h2 + head(first, x[pumps + 1]);
     let mut levels = [h3 + head(first, x[pumps]), h3, h2];
-    // They stand about the lowest that is read as they would at rest.
+    // Levels that are not measured start at the lowest measured one, as at rest.
     let read = scales.outputs[scales.lowest_output()].vessel;
     let shift = first_reading(setup, record, read).unwrap_or(0.0) - levels[read];
     for (vessel, level) in levels.iter_mut().enumerate() {

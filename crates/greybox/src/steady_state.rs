@@ -1,4 +1,4 @@
-//! Where a plant comes to rest under the first inputs of a record.
+//! Steady state of a plant under the first inputs of a record.
 //!
 //! The plant is simulated on these inputs over steps that double until its levels stay where they are. A plant that integrates, or that is
 //! driven by the clock, comes to no rest.

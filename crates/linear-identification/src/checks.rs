@@ -1,4 +1,4 @@
-//! What is refused of any method.
+//! Checks of records that all methods share.
 
 use ct_signals::{Channel, Record};
 
@@ -81,7 +81,7 @@ mod tests {
         Method::Rivc,
     ];
 
-    /// Of every method.
+    /// Errors that all methods share.
     fn refused(record: &Record, order: Order) -> Vec<Error> {
         let refused = |method| identify(record, &Request::new(method, order)).unwrap_err();
         METHODS.map(refused).into()

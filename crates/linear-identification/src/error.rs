@@ -1,11 +1,11 @@
-//! What identification refuses: every message names the record and the mend.
+//! Errors of identification: every message names the record and the correction.
 
 use ct_signals::quoted;
 use missing_effect::numbers::significant;
 
 use crate::{MAX_ORDER, Method, Order, warnings::or_lower};
 
-/// Why no model came of it.
+/// Reason why no model was identified.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -17,7 +17,7 @@ pub enum Error {
     NoSignal {
         /// Name of the record.
         record: String,
-        /// What is not there: `input` or `output`.
+        /// Missing signal: `input` or `output`.
         kind: &'static str,
     },
     /// An order that no model has.
@@ -25,7 +25,7 @@ pub enum Error {
         "an order is n,m with n from 1 to {MAX_ORDER} and m from 0 to n, as in 2,1; found {order}"
     )]
     WrongOrder {
-        /// What was asked for.
+        /// Requested order.
         order: Order,
     },
     /// A signal that does not move.
@@ -37,13 +37,13 @@ pub enum Error {
         record: String,
         /// Name of the signal.
         signal: String,
-        /// Where it stands, in its unit.
+        /// Constant value, in the signal's unit.
         value: f64,
     },
     /// A setting that has to be above 0.
     #[error("{option} is {value}, but must be a number of {unit} above 0")]
     NotPositive {
-        /// As it is typed.
+        /// Option as typed.
         option: &'static str,
         /// Its unit.
         unit: &'static str,
@@ -55,7 +55,7 @@ pub enum Error {
         "--bandwidth is {found:e} 1/s, but the filters need one from {low:.1e} to {high:.1e} 1/s for this record; without the option it is found"
     )]
     Bandwidth {
-        /// What was given, 1/s.
+        /// Given value, 1/s.
         found: f64,
         /// The least, 1/s.
         low: f64,
@@ -69,7 +69,7 @@ pub enum Error {
         record: String,
         /// The order.
         order: Order,
-        /// What the model lacks.
+        /// Reason in words.
         why: String,
     },
     /// The information of the record is singular.
@@ -118,7 +118,7 @@ pub enum Error {
     /// Every one of several methods has refused.
     #[error("{reason}")]
     AllRefused {
-        /// What the first one said.
+        /// Message of the first error.
         reason: String,
     },
     /// The fit ended where the loop would become unstable.
@@ -141,7 +141,7 @@ pub enum Error {
         record: String,
         /// Measured command less the controller's, root mean square, in `unit`.
         mismatch: f64,
-        /// What the command moves, root mean square, in `unit`.
+        /// Standard deviation of the command, in `unit`.
         size: f64,
         /// Unit of the command.
         unit: String,
@@ -167,7 +167,7 @@ pub enum Error {
         /// The method.
         method: Method,
     },
-    /// What an estimator refuses, with the record that it is about.
+    /// Error of an estimator, with its record.
     #[error("{record}: {what}")]
     InRecord {
         /// Name of the record.
@@ -185,7 +185,7 @@ pub enum Error {
         /// Why.
         why: String,
     },
-    /// Nothing is left of a record between its gaps.
+    /// No part of a record between its gaps is long enough.
     #[error(transparent)]
     NoStretch(missing_effect::Error),
     /// A record.

@@ -19,9 +19,9 @@ use crate::{
     refined,
 };
 
-/// For the first fit inputs are held for so many sampling intervals.
+/// For the first fit, inputs are held for this number of sampling intervals.
 const FIRST_HOLD: f64 = 20.0;
-/// What a plant has kept of a gap where it counts as forgotten.
+/// A gap is forgotten when the plant's response to it has decayed to this share.
 const FORGOTTEN: f64 = 0.01;
 
 /// A record without gaps.
@@ -31,7 +31,7 @@ pub struct Mended {
     pub whole: Record,
     /// Between long gaps.
     pub parts: Vec<Record>,
-    /// What was done; nothing where there are no gaps.
+    /// Handling of gaps; `None` if there are no gaps.
     pub gaps: Option<MendedGaps>,
 }
 
@@ -138,7 +138,7 @@ fn cut(record: &Record, limit: f64, memory: f64) -> Result<Mended, Error> {
     })
 }
 
-/// Of a first fit, by SRIVC, of the highest order that is determined.
+/// Time constants of a first fit by SRIVC, with the highest order that is determined.
 fn time_constants(
     records: &[Mended],
     order: Order,

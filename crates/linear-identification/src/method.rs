@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// How the parameters are found.
+/// Estimation method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
@@ -17,7 +17,7 @@ pub enum Method {
     Iv,
     /// Closed-loop output error of the whole record: the loop is simulated from the reference; without a controller output error
     Fcloe,
-    /// The same, recursively
+    /// Closed-loop output error, recursive
     RecursiveFcloe,
     /// Refined instruments for white noise; where the reference moves those of a loop, whatever its controller (CLSRIVC)
     Srivc,
@@ -40,12 +40,12 @@ impl Method {
         }
     }
 
-    /// Whether it has to do with the loop's controller.
+    /// Whether the method uses the loop's controller.
     pub fn is_of_loop(self) -> bool {
         !matches!(self, Self::StabilizedOe | Self::CtRls) && !self.is_refined()
     }
 
-    /// Whether it is SRIVC or RIVC: with delays, integrators, a second input, several records.
+    /// Whether the method is SRIVC or RIVC: with delays, integrators, a second input, several records.
     pub fn is_refined(self) -> bool {
         matches!(self, Self::Srivc | Self::Rivc)
     }

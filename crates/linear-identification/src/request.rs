@@ -1,4 +1,4 @@
-//! What may be asked for.
+//! Options of an identification.
 
 use crate::{DelayChoice, LevelChoice, Method, Order};
 
@@ -15,7 +15,7 @@ pub struct Request {
     pub bandwidth: Option<f64>,
     /// The controller of the loop, time in s; for the methods that have to do with it. Without one they work in open loop.
     pub controller: Option<fcloe::Controller>,
-    /// Where zero is; for the same methods.
+    /// Operating point; for the same methods.
     pub levels: LevelChoice,
     /// Smallest and largest command, in the input's unit; infinite where there is none.
     pub limits: (f64, f64),

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::{Drift, InLoop, Method, Order, Refined};
 
-/// What was used.
+/// Settings that were used.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Settings {
     /// Memory of the recursion, `1/eta`, s.
@@ -30,7 +30,7 @@ pub struct Identification {
     pub order: Order,
     /// Name of the record.
     pub record: String,
-    /// What a recursion without a loop used.
+    /// Settings of a recursion without a loop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub settings: Option<Settings>,
     /// a_1 to a_n, b_0 to b_m, offset, at the end of the record. The standard error is of the recursion with its memory.
@@ -49,15 +49,15 @@ pub struct Identification {
     /// The parameters over the record; of a recursion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trajectory: Option<Trajectory>,
-    /// What a method that has to do with the loop says besides.
+    /// Additional results of a method for a loop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_loop: Option<InLoop>,
-    /// What SRIVC and RIVC say besides.
+    /// Additional results of SRIVC and RIVC.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refined: Option<Refined>,
     /// Gain and time constant over the level; nothing where the level stands, or the record is too short to tell.
     pub drift: Option<Drift>,
-    /// What was done about missing rows and samples of the input; nothing where there are none.
+    /// Handling of missing rows and samples of the input; `None` if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<MendedGaps>,
     /// The plant, without offsets.
@@ -71,7 +71,7 @@ pub struct Identification {
 /// A pair of complex poles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Oscillation {
-    /// Without damping, s.
+    /// Natural period without damping, s.
     pub period: f64,
     /// Relative damping, 0 to 1.
     pub damping: f64,
@@ -82,7 +82,7 @@ pub struct Oscillation {
 pub struct Trajectory {
     /// Time, s.
     pub time: Vec<f64>,
-    /// Which samples those are, from 0.
+    /// Numbers of these samples, from 0.
     #[serde(skip)]
     pub samples: Vec<usize>,
     /// One series for each parameter.
@@ -92,7 +92,7 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// From when on the start is forgotten as far as it will be: half the record.
+    /// Time from which the start is forgotten as far as possible: half the record.
     #[must_use]
     pub fn settled(&self) -> f64 {
         match (self.time.first(), self.time.last()) {

@@ -1,4 +1,4 @@
-//! What should be known before a model is used.
+//! Warnings about the use of a model.
 
 use ct_signals::Record;
 use missing_effect::Parameter;
@@ -91,7 +91,7 @@ pub(crate) fn or_lower(order: Order) -> String {
         .map_or_else(String::new, |lower| format!("--order {lower}, or "))
 }
 
-/// What to try where the model is too fast for the record.
+/// Advice if the model is too fast for the record.
 pub(crate) fn lower_or_faster(order: Order) -> String {
     match order.lower() {
         None => "sample faster".to_owned(),

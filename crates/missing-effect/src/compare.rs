@@ -52,7 +52,7 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
     Ok(diagnosis)
 }
 
-/// One model has to be fitted, and no sets of effects are searched.
+/// Only one model is fitted, and no sets of effects are searched.
 fn of_one_model<'a>(options: &Options<'a>) -> Options<'a> {
     Options {
         time_limit: options.time_limit.map(|limit| limit.mul_f64(SHARE)),
@@ -60,7 +60,7 @@ fn of_one_model<'a>(options: &Options<'a>) -> Options<'a> {
     }
 }
 
-/// The believed model as a comparison shows it.
+/// The believed model for a comparison.
 pub(crate) struct Believed<'a> {
     /// The fit that is shown.
     pub shown: Node<'a>,
@@ -117,7 +117,7 @@ pub(crate) fn believed<'a>(
     })
 }
 
-/// The same of records without gaps.
+/// Comparison of records without gaps.
 fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
     let Believed {
         shown,

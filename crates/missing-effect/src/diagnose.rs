@@ -196,7 +196,7 @@ fn diagnose_whole(
             &problem.records[0].outputs,
         ));
         let longer = judge.longer(course.nodes.clone(), rounded.node)?;
-        // What nothing explains stays unexplained where rounding leaves something that is not noise.
+        // If rounding leaves structure in the residual, the error stays unexplained.
         if longer.left.is_none() || !course.last().added.is_empty() {
             course = longer;
             groups.push(rounded.group);

@@ -1,4 +1,4 @@
-//! What can go wrong in a diagnosis.
+//! Errors of a diagnosis.
 
 /// What can go wrong in a diagnosis.
 #[derive(Debug, thiserror::Error)]
@@ -34,7 +34,7 @@ pub enum Error {
     OtherOutput {
         /// The record.
         record: String,
-        /// Which of its outputs, counted from one.
+        /// Number of the output, from one.
         output: usize,
         /// The column there, or that it is missing.
         column: String,
@@ -46,9 +46,9 @@ pub enum Error {
     /// The controller reads an output that there is not.
     #[error("controller: it reads output {output}, but the model has {outputs}: name one of these")]
     ControlledOutput {
-        /// Which output, counted from one.
+        /// Number of the output, from one.
         output: usize,
-        /// How many there are.
+        /// Number of outputs.
         outputs: usize,
     },
     /// The controller and the fitted plant do not make a stable loop.
@@ -57,7 +57,7 @@ pub enum Error {
         growth(*radius)
     )]
     UnstableLoop {
-        /// Its settings, as [`plants::controller::Controller::describe`] writes them.
+        /// Settings of the controller, as [`plants::controller::Controller::describe`] writes them.
         controller: String,
         /// Largest magnitude of the sampled loop's eigenvalues.
         radius: f64,

@@ -9,14 +9,14 @@ use crate::{
     fit::noise_model::NOISE_ORDER,
 };
 
-/// What a fit of the believed model gives.
+/// Result of a fit of the believed model.
 #[derive(Debug, Clone, Copy)]
 pub struct Fitted<'f, 'a> {
     /// The plant with its effects against the records, cut where gaps are long.
     pub setup: &'f Setup<'a>,
     /// The fit.
     pub fit: &'f Fit,
-    /// How well its parameters are known; `None` where the records do not determine them.
+    /// Uncertainty of its parameters; `None` if the records do not determine them.
     pub uncertainty: Option<&'f FitUncertainty>,
     /// The model lacks something: its residual is more than noise.
     pub lacking: bool,

@@ -34,7 +34,7 @@ pub fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Option<St
     if largest < 6 && last > -7 {
         (decimals(value, -last), Some(decimals(error, -last)))
     } else {
-        // So many digits, or so large, that only powers of ten can be read.
+        // Numbers with so many digits, or so large, that only powers of ten are readable.
         (
             significant(value, (largest - last + 1).min(8)),
             Some(significant(error, 2)),
@@ -97,7 +97,7 @@ pub fn decimals(value: f64, places: i32) -> String {
             format!("{:.0}", (value / step).round() * step)
         }
     };
-    // No minus before a number that is all zeros.
+    // No minus sign before a number that is rounded to zero.
     match text.strip_prefix('-') {
         Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_string(),
         _ => text,

@@ -41,7 +41,7 @@ pub struct ReadSummary {
     /// The header of the time.
     #[serde(skip)]
     pub time_header: String,
-    /// Rows before or behind what is wanted.
+    /// Rows outside the required range of time.
     pub outside: usize,
     /// Rows without a time, which are not used.
     pub without_time: usize,

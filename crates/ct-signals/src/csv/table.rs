@@ -25,11 +25,11 @@ pub(super) struct Table {
     /// For each channel, the words that mark missing samples, with their number.
     pub(super) missing: Vec<Vec<(String, usize)>>,
     pub(super) calendar: Option<Calendar>,
-    /// Rows before or behind what is wanted.
+    /// Rows outside the required range of time.
     pub(super) outside: usize,
     /// Rows without a time.
     pub(super) without_time: usize,
-    /// Row where the first group of rows without time ends, and the contents of their time cells.
+    /// Place where the first row without a time ends, and the contents of the time cells.
     pub(super) untimed: (usize, Vec<(String, usize)>),
 }
 

@@ -62,7 +62,7 @@ pub(super) fn controller(
         file: model_name.to_string(),
         what: error.to_string(),
     })?;
-    // With several levels, the last level is compared with the bound.
+    // With several levels, the controller controls the last one.
     let outputs = records.first().map_or(1, |record| record.outputs.len());
     Ok(controller.at_output(outputs.saturating_sub(1)))
 }

@@ -226,7 +226,7 @@ pub(super) fn plants() -> Value {
             "known": known_of(plant),
             "pumps": plant.pumps(),
             "levels": vessel_names(plant),
-            // With one reading, the list has one more level: the last one.
+            // With one reading, a plant whose tanks are not joined measures its last level.
             "joined": plant.joined(),
             "model": equation(plant),
         })

@@ -19,13 +19,13 @@ pub(super) struct Comparison<'s, 'a> {
     noise: &'s Noise,
     /// Standard deviation of the innovations of each output.
     scales: Vec<f64>,
-    /// What each knows of its parameters.
+    /// R factor of the parameters of each model.
     known: [Triangle; 2],
     /// The existing records as each has them, free of noise.
     simulated: [Vec<Record>; 2],
     /// `before[i]`: misfit of the other to what `i` shows.
     before: [f64; 2],
-    /// What each output visited.
+    /// Range of each output.
     visited: Vec<(f64, f64)>,
 }
 
@@ -65,7 +65,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
             for output in simulated.iter_mut().flat_map(|record| &mut record.outputs) {
                 let model = series.next().unwrap_or_default();
                 for (value, model) in output.values.iter_mut().zip(model) {
-                    // What was not measured was not.
+                    // Missing readings stay missing.
                     if !value.is_nan() {
                         *value = model;
                     }
@@ -103,7 +103,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
         &self.scales
     }
 
-    /// By how much the criterion of each is below that of the other.
+    /// Amount by which the criterion of each is below that of the other.
     pub fn ahead(&self) -> [f64; 2] {
         let ahead = self.nodes[0].gain_over(&self.nodes[1]);
         [ahead, -ahead]
@@ -136,7 +136,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
         self.nodes[i].fit.x[..length].to_vec()
     }
 
-    /// What an experiment would show, were one of them true.
+    /// Simulated record of an experiment, if one of the two models is true.
     fn simulated_record(
         &self,
         truth: usize,
@@ -245,7 +245,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
         Some(power([apart(0)?, apart(1)?], self.ahead()))
     }
 
-    /// What the longest record had, once more.
+    /// Repetition of the longest record's experiment.
     pub fn again(&self, bounds: &Bounds) -> Option<Experiment> {
         let records = &self.context.problem.records;
         let longest = records

@@ -1,4 +1,4 @@
-//! What the user allows an experiment to do, checked against the records.
+//! Limits of an experiment from the user, checked against the records.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,10 @@ use crate::Problem;
 
 /// Samples for every fitted number at least, ...
 const SAMPLES_PER_PARAMETER: usize = 3;
-/// ... and in all at most.
+/// ... and largest total number of samples.
 const MOST_SAMPLES: usize = 20_000;
 
-/// What an experiment may do; what is not given follows from the records.
+/// Limits of an experiment; missing values are derived from the records.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Limits {
     /// Inputs that are applied; where none is named, all that moved in the records. The others are held at their median.
@@ -32,7 +32,7 @@ pub struct Limits {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refused {
-    /// One effect twice.
+    /// The two effects are the same.
     #[error("--between {effect} {effect}: an effect cannot be told from itself; name two")]
     SameEffect {
         /// The effect.
@@ -57,7 +57,7 @@ pub enum Refused {
     /// A model without inputs.
     #[error("the model has no input that an experiment could move")]
     NoInput,
-    /// No such input.
+    /// The model has no input of this name.
     #[error("--input {name}: the model has no such input; it has {known}")]
     UnknownInput {
         /// As given.
@@ -75,7 +75,7 @@ pub enum Refused {
         /// Second end.
         high: f64,
     },
-    /// What is applied never moved, and nobody says how far it may.
+    /// The input is constant in the records, and no range is given.
     #[error("the records hold one value of {input}, {}, so its permitted range is not known; give --input {input}=LOW..HIGH", shown(*value))]
     NoRange {
         /// The input.
@@ -114,9 +114,9 @@ pub enum Refused {
 
 /// The limits as they hold.
 pub(super) struct Bounds {
-    /// Of each input that is applied, by its position in the model.
+    /// For each applied input, by its position in the model.
     pub applied: Vec<(usize, InputRange, Room)>,
-    /// What the others are held at.
+    /// Constant values of the other inputs.
     pub held: Vec<f64>,
     pub duration: f64,
     pub interval: f64,

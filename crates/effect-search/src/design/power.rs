@@ -1,4 +1,4 @@
-//! From a separation to what may be hoped for.
+//! Expected result of an experiment, from the separation of two models.
 
 use std::cmp::Ordering;
 
@@ -8,18 +8,18 @@ use serde::Serialize;
 
 use crate::thresholds::Thresholds;
 
-/// How far an experiment takes two effects apart.
+/// How well an experiment distinguishes two effects.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Power {
     /// The smaller of the two below.
     pub power: f64,
-    /// By how much the deviance of the other is above that of the true one on average, were the first true, were the second true.
+    /// Expected excess of the deviance of the wrong model over the true one, if the first is true and if the second is true.
     pub if_true: [f64; 2],
     /// Probability that all records together then decide for the true one, by more than 6 in the criterion; the smaller of the two.
     pub decides: f64,
 }
 
-/// What can be hoped for.
+/// Expected result of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Prospect {
@@ -27,7 +27,7 @@ pub enum Prospect {
     Decides,
     /// It may.
     May,
-    /// It will hardly, within these limits.
+    /// The experiment will probably not decide, within these limits.
     Hardly,
     /// The two give the same response in every experiment that was tried.
     Twins,
@@ -56,7 +56,7 @@ fn decides(lambda: f64, ahead: f64) -> f64 {
     Normal::standard().cdf(margin / (2.0 * lambda.sqrt()))
 }
 
-/// From the noncentralities, were the first true and were the second, and by how much each is ahead before.
+/// Power from the noncentralities, if the first and if the second is true, and from the present advantage of each.
 #[must_use]
 pub fn power(if_true: [f64; 2], ahead: [f64; 2]) -> Power {
     let [a, b] = if_true;
@@ -67,7 +67,7 @@ pub fn power(if_true: [f64; 2], ahead: [f64; 2]) -> Power {
     }
 }
 
-/// What a power lets hope for.
+/// Expected result for a power.
 #[must_use]
 pub fn prospect(power: &Power) -> Prospect {
     if power.power < NOTHING {
@@ -81,7 +81,7 @@ pub fn prospect(power: &Power) -> Prospect {
     }
 }
 
-/// So many times as long should decide with a probability of 0.95, where a noncentrality grows as the length.
+/// Number of repetitions after which the experiment decides with a probability of 0.95, if the noncentrality is proportional to the length.
 ///
 /// `lambda + ahead - 6 = 1.645 x 2 sqrt(lambda)`, solved for the root of `lambda`.
 #[must_use]

@@ -1,4 +1,4 @@
-//! How far an experiment takes two models apart: the least misfit of the one to what the other would show.
+//! Separation of two models by an experiment: the least misfit of one model to the response of the other.
 //!
 //! Let A be true. The experiment shows `y_A + v`. Model B answers with the parameters that imitate `y_A` best, but it still has
 //! to fit the existing record, and its initial states are free. In the metric of the noise, linearised at B's fit:

@@ -6,14 +6,14 @@ use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use serde::Serialize;
 
-/// What sequences may do.
+/// Limits for sequences.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Room {
     /// Smallest value \[unit of the input\].
     pub low: f64,
     /// Largest value.
     pub high: f64,
-    /// From where to where the records went.
+    /// Range in the records.
     pub visited: (f64, f64),
     /// Largest change in a second.
     pub slew: Option<f64>,
@@ -64,9 +64,9 @@ pub struct Sequence {
     pub clock: f64,
     /// Levels of a staircase.
     pub levels: Option<usize>,
-    /// Which of several draws.
+    /// Number of the random draw.
     pub draw: Option<u64>,
-    /// It changes by at most so much in a second, where it was made slower than the limits ask for.
+    /// Largest change per second, if it is smaller than the limits require.
     pub slew: Option<f64>,
     /// Smallest value.
     pub low: f64,
@@ -97,7 +97,7 @@ fn parts(room: &Room) -> Vec<(f64, f64)> {
     let (from, to) = room.visited;
     for more in [0.0, 0.5 * (to - from)] {
         let part = ((from - more).max(low), (to + more).min(high));
-        // What hardly moves shows nothing, and what is hardly narrower is the whole.
+        // A sequence over a very narrow range shows nothing, and a range slightly narrower than the whole is the whole.
         let share = (part.1 - part.0) / (high - low);
         if (0.01..0.9).contains(&share) {
             parts.push(part);
@@ -106,7 +106,7 @@ fn parts(room: &Room) -> Vec<(f64, f64)> {
     parts
 }
 
-/// So many bits from anywhere in the register's sequence, not all alike.
+/// Consecutive bits from a random position of the shift register's sequence, not all equal.
 fn bits(n: usize, low: f64, high: f64, rng: &mut ChaCha8Rng) -> Result<Vec<f64>, Error> {
     loop {
         let from = rng.random_range(0..1 << (REGISTER - 1));
@@ -118,7 +118,7 @@ fn bits(n: usize, low: f64, high: f64, rng: &mut ChaCha8Rng) -> Result<Vec<f64>,
     }
 }
 
-/// All sequences within a room, of a plant with this slowest time constant \[s\].
+/// All sequences within the limits, for a plant with this slowest time constant \[s\].
 ///
 /// # Errors
 /// Where the room holds no sequence: no sample, a range without width.
@@ -195,7 +195,7 @@ pub fn sequences(room: &Room, time_constant: f64, seed: u64) -> Result<Vec<Seque
 }
 
 impl Sequence {
-    /// The same, changing by at most so much in a second.
+    /// The sequence with its change per second limited to `slew`.
     ///
     /// # Errors
     /// Where the slew is not positive.
@@ -206,7 +206,7 @@ impl Sequence {
         Ok(slower)
     }
 
-    /// The same over and over, within the slew of the limits.
+    /// The sequence repeated, within the slew limit.
     ///
     /// # Errors
     /// Where the slew is not positive.
@@ -251,7 +251,7 @@ mod tests {
                     let most = slew.unwrap_or(f64::INFINITY) * 2.0 * (1.0 + 1e-12);
                     let steps = sequence.values.windows(2).map(|w| (w[1] - w[0]).abs());
                     assert!(steps.fold(0.0, f64::max) <= most, "{:?}", sequence.kind);
-                    // It moves: an experiment that stands still shows nothing.
+                    // The sequence has to change the input.
                     let (low, high) = sequence
                         .values
                         .iter()

@@ -11,7 +11,7 @@ pub(super) struct Outputs {
     triangles: Vec<Triangle>,
     /// The rows of priors, in standard errors.
     priors: Triangle,
-    /// What outputs count by; its sums are those of the residuals.
+    /// Weights of the outputs, from the sums of squared residuals.
     pub(super) squares: Squares,
 }
 
@@ -48,7 +48,7 @@ impl Triangle {
         all
     }
 
-    /// The same rows, those of priors with another weight.
+    /// The same rows with another weight of the priors' rows.
     #[must_use]
     pub(crate) fn with_prior_weight(self, weight: f64) -> Self {
         match self.outputs {
@@ -86,7 +86,7 @@ impl Triangle {
 }
 
 impl Outputs {
-    /// What a step leaves of each output, and of the priors.
+    /// Predicted sums of squares of each output and of the priors after a step.
     pub(super) fn left(&self, x: &[f64]) -> Squares {
         let mut squares = self.squares.clone().with_prior(self.priors.left(x));
         for (sum, triangle) in squares.sums.iter_mut().zip(&self.triangles) {

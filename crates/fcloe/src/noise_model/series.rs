@@ -41,7 +41,7 @@ pub(super) fn autoregression(
 }
 
 impl Series {
-    /// The values less what they hold of the signals beside the noise.
+    /// The values after subtraction of the estimated deterministic signals.
     pub(super) fn without_others(mut self) -> Self {
         let (triangle, x) = match self.values.iter().any(|v| v.is_nan()) {
             true => self.there().regression(),

@@ -20,7 +20,7 @@ impl Problem {
         if !closed.is_stable() {
             return Err(Refused::Unstable);
         }
-        // Each record's rows have few columns other than zero: they are folded by themselves.
+        // Each record's rows have few nonzero columns: each record is reduced separately.
         let of_record = |index| {
             let places = self.places(index, sensitivities);
             (index, Triangle::new(places.len()), places)
@@ -65,7 +65,7 @@ impl Problem {
         }
     }
 
-    /// Where the columns that a record shows have their places: those of theta, its levels, the residual; or the residual alone.
+    /// Column positions of a record's quantities: those of theta, its levels, the residual; or the residual alone.
     fn places(&self, index: usize, sensitivities: bool) -> Vec<usize> {
         if !sensitivities {
             return vec![0];

@@ -1,4 +1,4 @@
-//! How the recursive estimator fares, condition (14) included.
+//! State of the recursive estimator, including condition (14).
 
 use ct_rls::RecursiveEstimator;
 use nalgebra::DMatrix;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::RecursiveFcloe;
 use crate::{ClosedLoop, Condition, Error, PlantModel};
 
-/// What an operator wants to see now and then.
+/// State of the estimator for an operator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LoopHealth {
     /// The least squares inside, in the relative parameters `delta = theta/scale - 1`: the smallest eigenvalue of the

@@ -72,7 +72,7 @@ pub struct RecursiveFcloe {
     rate: f64,
     time: f64,
     last_drive: f64,
-    /// Of the output error, and how much of it has been seen.
+    /// Variance of the output error, and the sum of weights it is based on.
     variance: (f64, f64),
     shortened: u64,
     refused: u64,
@@ -300,7 +300,7 @@ impl RecursiveEstimator for RecursiveFcloe {
         })
     }
 
-    /// Of the least squares inside, in the relative parameters; [`RecursiveFcloe::loop_health`] says more.
+    /// State of the least squares inside, in the relative parameters; [`RecursiveFcloe::loop_health`] has more information.
     fn health(&self) -> Result<Health, Error> {
         Ok(self.rls.health()?)
     }

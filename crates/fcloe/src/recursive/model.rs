@@ -67,7 +67,7 @@ impl MovingLoop {
         }
     }
 
-    /// Takes other parameters; the states stay.
+    /// Sets other parameters; the states do not change.
     pub(super) fn set(&mut self, theta: &[f64], renew_filter: bool) {
         let n = self.orders.n;
         let leading = theta[n - 1];
@@ -226,7 +226,7 @@ fn characteristic(p: &mut [f64], theta: &[f64], n: usize, r: &[f64], s: &[f64]) 
     }
 }
 
-/// No root of the polynomial has a larger modulus.
+/// An upper bound of the modulus of all roots.
 fn root_bound(p: &[f64]) -> f64 {
     let (Some(leading), n) = (p.last(), p.len() - 1) else {
         return 0.0;
@@ -251,7 +251,7 @@ mod tests {
     use super::*;
     use crate::{LoopSimulator, PlantModel};
 
-    /// With parameters that rest it is the batch fit's simulation, to rounding: y^ and all sensitivities, for any step.
+    /// With constant parameters the recursion equals the simulation of the batch fit, to rounding: y^ and all sensitivities, for any step.
     #[test]
     fn as_the_exact_simulation() {
         let pid = Controller::pid(0.3, 0.004, 4.0, 10.0).unwrap();

@@ -1,4 +1,4 @@
-//! How the recursive estimator learns, forgets and is held back.
+//! Settings of the recursive estimator: gain, forgetting and limits.
 
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +28,7 @@ pub enum Filter {
 /// forgotten either. To follow a drift: a gain of 1, the forgetting rate 1 over the memory, and no fading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RecursiveSettings {
-    /// Which polynomial filters.
+    /// Polynomial of the filter.
     pub filter: Filter,
     /// F(0), the same for each scaled parameter: its relative variance over the noise's \[1/unit of y^2\], above 0.
     pub gain: f64,
@@ -39,7 +39,7 @@ pub struct RecursiveSettings {
     pub fading: f64,
     /// Largest relative change of a parameter in one step, above 0.
     pub step_limit: f64,
-    /// No parameter grows beyond this many times its scale, nor `a_n` falls below its scale over this; above 1.
+    /// No parameter grows above its scale times this factor, and `a_n` does not fall below its scale divided by this factor; above 1.
     pub range: f64,
     /// The levels about which the model holds, subtracted from the signals.
     pub operating_point: OperatingPoint,
@@ -59,7 +59,7 @@ impl RecursiveSettings {
         }
     }
 
-    /// The same with another filter.
+    /// The same settings with another filter.
     #[must_use]
     pub fn with_filter(mut self, filter: Filter) -> Self {
         self.filter = filter;

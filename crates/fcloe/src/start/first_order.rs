@@ -18,7 +18,7 @@ use super::signals::solve;
 use crate::controller::positive;
 use crate::{Error, LoopRecord, PlantModel};
 
-/// How `lambda/(p + lambda)` is sampled.
+/// Discretisation of `lambda/(p + lambda)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Discretisation {
@@ -42,7 +42,7 @@ impl Discretisation {
     }
 }
 
-/// What the instruments are used in.
+/// Form of the equation for the instruments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {

@@ -1,4 +1,4 @@
-//! From orders alone to a few plants to start the batch fit from.
+//! Start values of the batch fit, from orders alone.
 //!
 //! For each bandwidth of a ladder: least squares, instruments up to three times, refinement. What comes out at each stage
 //! is kept if its loop is stable, and ranked by how well its loop, simulated from r, gives the record. Which stage wins
@@ -16,7 +16,7 @@ use crate::{ClosedLoop, Controller, Error, LoopRecord, Orders, PlantModel};
 /// Bandwidths over the loop's poles.
 const RUNGS: [f64; 4] = [2.0, 3.5, 6.0, 10.0];
 
-/// Where a candidate comes from.
+/// Source of a candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stage {
@@ -26,7 +26,7 @@ pub enum Stage {
     Instruments,
     /// SRIVC: filter and instruments renewed with the estimates.
     Srivc,
-    /// All poles at one place, and the gain that y and u have in step with r: nothing better had a stable loop.
+    /// All poles at one place, and the gain from the correlation of y and u with r: no other candidate had a stable loop.
     Guess,
 }
 
@@ -35,7 +35,7 @@ pub enum Stage {
 pub struct Candidate {
     /// The plant.
     pub plant: PlantModel,
-    /// Where it comes from.
+    /// Source of the candidate.
     pub stage: Stage,
     /// Bandwidth of the filter it began with \[1/time\].
     pub lambda: f64,
@@ -43,7 +43,7 @@ pub struct Candidate {
     pub residual_rms: f64,
 }
 
-/// What the pipeline tries.
+/// Settings of the pipeline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PipelineSettings {
     /// Bandwidths \[1/time\]; empty for those of [`lambda_ladder`] without a guess.
@@ -188,7 +188,7 @@ fn alike(a: &PlantModel, b: &PlantModel) -> bool {
     pairs.all(|(a, b)| (a - b).abs() <= 0.01 * a.abs())
 }
 
-/// Of the loop simulated from r; none where it is not stable.
+/// Error of the loop simulated from r; none if the loop is not stable.
 fn residual(records: &[LoopRecord], controller: &Controller, plant: &PlantModel) -> Option<f64> {
     let closed = ClosedLoop::new(plant, controller).ok()?;
     if !closed.is_stable() {

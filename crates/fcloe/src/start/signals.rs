@@ -1,4 +1,4 @@
-//! What all regressions share: signals with their derivatives, filtered alike, and the equations' solution.
+//! Shared parts of all regressions: signals with their derivatives, all with the same filter, and the solution of the equations.
 
 use ct_lti::{Hold, Polynomial, ReadingFilter, StateVariableFilter};
 use nalgebra::{DMatrix, DVector};
@@ -36,7 +36,7 @@ impl Signals {
         Self::new(u, y, record, controller)
     }
 
-    /// Of a model of the loop driven by r, or by u in open loop: free of the record's noise.
+    /// Signals of a model of the loop driven by r, or by u in open loop: without the record's noise.
     pub(super) fn simulated(
         model: &PlantModel,
         record: &LoopRecord,
@@ -67,7 +67,7 @@ impl Signals {
             for u in &mut u {
                 *u = filter.update(*u, record.step)?[0];
             }
-            // It has no jumps any more.
+            // The filtered signal has no steps any more.
             u_hold = Hold::First;
         }
         Ok(Self {
@@ -83,7 +83,7 @@ impl Signals {
         self.y[k].is_nan()
     }
 
-    /// With other readings where some are missing.
+    /// Replaces missing readings by those of another record.
     pub(super) fn filled(mut self, from: &Self) -> Self {
         for (y, from) in self.y.iter_mut().zip(&from.y) {
             if y.is_nan() {

@@ -70,7 +70,7 @@ pub fn standard_errors(
     for (record, e) in records.iter().zip(&errors) {
         let sampled = system.sampled(Hold::Zero, record.step)?;
         let w = unfiltered(&system, &sampled, e);
-        // Not finite, as with missing readings, compares as not bounded.
+        // A value that is not finite, as with missing readings, counts as not bounded.
         if size(&w) * system.d().powi(2) <= UNBOUNDED * size(e) {
             noise.push(w);
         }

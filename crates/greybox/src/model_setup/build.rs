@@ -9,7 +9,7 @@ use super::{ModelSetup, STATE_REACH};
 use crate::Error;
 use crate::clock::Clock;
 
-/// Where the text sets no bound a parameter stays within this factor of its value there, ...
+/// If the text sets no bound, a parameter stays within this factor of its value in the text, ...
 const REACH: f64 = 30.0;
 
 /// Scales of the noise have settled when none changes by more than this share.
@@ -112,7 +112,7 @@ impl<'a> ModelSetup<'a> {
                 } else {
                     format!("{}(0)", about.name)
                 });
-                // Where an output reads the state, the record knows better.
+                // If an output measures the state, the initial value comes from the record.
                 let read = spec
                     .outputs
                     .iter()

@@ -14,7 +14,7 @@ impl<'a> ModelSetup<'a> {
         let residuals = estimation::residuals(self, x)?;
         let measured = self.records.iter().flat_map(|record| &record.outputs);
         let simulated = measured.zip(residuals);
-        // Where nothing was measured the residual says nothing: those are simulated on their own.
+        // Rows without any reading have no residual: they are simulated separately.
         if simulated
             .clone()
             .all(|(measured, _)| measured.missing() == 0)

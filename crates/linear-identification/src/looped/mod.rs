@@ -33,38 +33,39 @@ const LIMITED: f64 = 0.01;
 
 /// A simulation error below this share of the output's deviation is not compared with another.
 const SURELY_GOOD: f64 = 0.02;
-/// So many times the simulation error of the batch fit says that the end of a recursion is not the plant of the record.
+/// If the recursion's final model has a simulation error above the batch fit's times this factor, the final model is not the plant of the
+/// record.
 const MUCH_WORSE: f64 = 1.5;
 
-/// What a method that has to do with the loop says besides the model.
+/// Results of a method for a loop, in addition to the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InLoop {
     /// R of the controller from the constant on, in s; empty in open loop.
     pub r: Vec<f64>,
     /// S of the controller.
     pub s: Vec<f64>,
-    /// What the zero of the signals was taken from.
+    /// Source of the zero of the signals.
     pub levels_from: LevelChoice,
     /// The levels: of the reference (of the input in open loop), and of the output.
     pub levels: [f64; 2],
-    /// How far the controller is from the command that was measured, if it is.
+    /// Difference between the controller's output and the measured command, if it is measured.
     pub mismatch: Option<Mismatch>,
-    /// Where the fit or the recursion began.
+    /// Start of the fit or the recursion.
     pub start: Start,
-    /// Of a batch fit.
+    /// Result of a batch fit.
     pub batch: Option<Batch>,
     /// Memory of a recursion, `1/eta`, s.
     pub memory: Option<f64>,
-    /// Of a recursion, at its end.
+    /// State of a recursion at its end.
     pub health: Option<LoopHealth>,
     /// Condition (14) of a recursion with the filter of the start, if the estimates are the plant; not where it is doubtful that they are.
     pub convergence: Option<Convergence>,
 }
 
-/// Where an estimate began.
+/// Start of an estimate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Start {
-    /// What gave it.
+    /// Source of the start.
     pub from: &'static str,
     /// Bandwidth of the filter that it began with, 1/s.
     pub bandwidth: f64,
@@ -72,7 +73,7 @@ pub struct Start {
     pub theta: Vec<f64>,
 }
 
-/// How a batch fit ended.
+/// End of a batch fit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Batch {
     /// Why.
@@ -81,7 +82,7 @@ pub struct Batch {
     pub iterations: usize,
     /// Starts that were tried.
     pub starts: usize,
-    /// Where the noise enters, as the residual tells.
+    /// Point where the noise enters, according to the residual.
     pub noise: NoisePath,
     /// Standard errors for a residual that is white, for comparison.
     pub white_std_errors: Vec<f64>,
@@ -105,7 +106,7 @@ struct Task<'a> {
     orders: Orders,
 }
 
-/// What a method gives.
+/// Result of a method.
 struct Found {
     plant: PlantModel,
     std_errors: Vec<Option<f64>>,
@@ -118,7 +119,7 @@ struct Found {
     warnings: Vec<String>,
 }
 
-/// How a recursion went.
+/// Result of a recursion.
 struct Run {
     trajectory: Trajectory,
     health: LoopHealth,
@@ -141,7 +142,7 @@ pub(super) fn identify(record: &Record, request: &Request) -> Result<Identificat
 
 impl Task<'_> {
     fn identify(&self) -> Result<Identification, Error> {
-        // What is refused is the same for all methods.
+        // The checks are the same for all methods.
         let centred = self.centred(self.offsets_at_rest()?)?;
         let problem = Problem::new(
             std::slice::from_ref(&centred),
@@ -162,7 +163,7 @@ impl Task<'_> {
         Ok(LoopRecord::from_record(self.record, offsets)?)
     }
 
-    /// What the loop does with a plant in it.
+    /// Simulation of the loop with a plant.
     fn simulated(
         &self,
         record: &LoopRecord,
@@ -259,8 +260,8 @@ impl Task<'_> {
         })
     }
 
-    /// Why the end of a recursion is not to be taken for the plant, if there is a reason: its loop was about to become unstable, or one
-    /// model for the whole record simulates it much better.
+    /// Reason why the end of a recursion is not reliable, if there is one: its loop was nearly unstable, or one model for the whole record
+    /// has a much smaller simulation error.
     fn astray(&self, health: &LoopHealth, rmse: f64, deviation: f64, unit: &str) -> Option<String> {
         let untold = "so condition (14) is not told";
         if health.refused > 0 {

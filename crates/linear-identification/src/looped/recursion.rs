@@ -116,7 +116,7 @@ impl Task<'_> {
         record.offsets == Offsets::Means && self.request.levels == LevelChoice::Auto
     }
 
-    /// What a recursion starts from: the batch fit where it has to find the levels too, else the best regression.
+    /// Start of a recursion: the batch fit if the levels have to be estimated too, else the best regression.
     fn begun(&self, record: LoopRecord) -> Result<Found, Error> {
         if self.finds_levels(&record) {
             let mut found = self.batch(record)?;
@@ -131,7 +131,7 @@ impl Task<'_> {
         }
     }
 
-    /// Those of `fcloe`, for the amplitude of this loop.
+    /// Settings of `fcloe`, for the amplitude of this loop.
     fn recursive_settings(
         &self,
         record: &LoopRecord,
@@ -141,7 +141,7 @@ impl Task<'_> {
         let (drive, _) = record.drive(&self.controller)?;
         let mean = drive.iter().sum::<f64>() / drive.len().max(1) as f64;
         let power = rms(drive.iter().map(|v| v - mean)).powi(2);
-        // They were tried on loops of the first and the second order.
+        // These values were tested on loops of first and second order.
         let (gain, step_limit) = match self.orders.n {
             1 => (10.0, 0.05),
             _ => (1.0, 0.02),
@@ -152,8 +152,8 @@ impl Task<'_> {
         })
     }
 
-    /// What was asked for; else a part of the record, and enough of the plant's time constants. It does not fade, as parameters that
-    /// drift are followed by forgetting alone.
+    /// The requested memory; else a share of the record, and enough of the plant's time constants. The memory stays constant, because only
+    /// forgetting makes the estimates follow drifting parameters.
     fn memory(&self, record: &LoopRecord, start: &PlantModel) -> f64 {
         let n = self.orders.n;
         let theta = start.theta();

@@ -71,7 +71,7 @@ fn covariance(ends: &[&Point], now: &Point, eta: f64) -> Option<DMatrix<f64>> {
         weights += weight;
         squares += weight * weight;
     }
-    // As many stretches of one weight would say as much.
+    // Number of segments of equal weight with the same information.
     let count = weights * weights / squares;
     if count.is_nan() || count <= p as f64 + SPARE {
         return None;

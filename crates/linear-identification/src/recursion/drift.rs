@@ -18,7 +18,7 @@ use crate::{Order, Trajectory};
 /// Stretches of the level.
 const STRETCHES: usize = 8;
 
-/// The estimates move with the level where the ends of its way are so many standard errors apart.
+/// The estimates depend on the level if their values at both ends of the level's range differ by this number of standard errors.
 const APART: f64 = 3.0;
 
 /// The longest memory, of the record's length, and the least way of the remembered level, of the output's range, with which estimates
@@ -48,19 +48,19 @@ impl Drift {
         self.gain.moves() || self.time_constant.moves()
     }
 
-    /// Whether the level has moved enough for estimates that stand still to say that the process is linear.
+    /// Whether the range of the level is large enough to conclude from constant estimates that the process is linear.
     #[must_use]
     pub fn tells(&self) -> bool {
         self.memory_part <= LONGEST_MEMORY && self.level_part >= LEAST_WAY
     }
 }
 
-/// One parameter over the level.
+/// One parameter as a function of the level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OverLevel {
     /// Its values.
     pub values: Vec<f64>,
-    /// Their standard errors.
+    /// Standard errors of the means.
     pub std_errors: Vec<f64>,
     /// Difference between the highest and the lowest level, in its standard errors. The two estimates are taken for independent; where
     /// they share data the difference is known better than that.
@@ -79,7 +79,7 @@ impl OverLevel {
         }
     }
 
-    /// Whether it moves more than chance would have it.
+    /// Whether the parameter changes by more than chance.
     #[must_use]
     pub fn moves(&self) -> bool {
         self.difference.abs() > APART
@@ -117,7 +117,7 @@ impl Stretch {
     }
 }
 
-/// Nothing where the level stands, or where too little has been seen for standard errors.
+/// `None` if the level is constant, or if the record is too short for standard errors.
 pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order) -> Option<Drift> {
     let levels = remembered(scaled);
     let at = |i: usize, k: usize| (trajectory.values[i][k], trajectory.std_errors[i][k]);
@@ -133,7 +133,7 @@ pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order)
         .collect();
     let of = |pick: fn(f64, f64) -> f64, from| points.iter().map(|p| p.0).fold(from, pick);
     let (low, high) = (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY));
-    // Without points: from infinity down to minus infinity.
+    // Without points the range is from infinity down to minus infinity.
     if high <= low {
         return None;
     }

@@ -16,7 +16,7 @@ use super::{
 use crate::{Error, Order, warnings::lower_or_faster};
 
 const P_OUTPUT_ERROR: f64 = 10.0;
-/// How far the plausible plants reach about the start, and the bounds on c: factors, the widest that are sure come first.
+/// Ranges of the plausible plants around the start, with bounds on c: factors; the widest range with guaranteed convergence is used.
 const PLAUSIBLE: [f64; 4] = [2.0, 1.5, 1.25, 1.1];
 const BOUNDS: [f64; 4] = [2.0, 1.5, 1.2, 1.05];
 /// The output error keeps every lag above this part of the sampling interval, where the others are those of the start. Less cannot be
@@ -50,7 +50,7 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
         SMatrix::identity() * P_OUTPUT_ERROR,
         Weights::least_squares(scaled.eta)?,
     )?;
-    // Nothing is forgotten: the regressor of c vanishes where the model is right.
+    // No forgetting: the regressor of c vanishes if the model is right.
     let filter = ContinuousRls::with_integrator(
         SVector::from(a),
         SMatrix::identity(),

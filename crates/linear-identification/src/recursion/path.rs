@@ -5,22 +5,22 @@ use nalgebra::{DMatrix, DVector};
 use super::scaled::Scaled;
 use crate::{Error, Order};
 
-/// Points of the way that are kept.
+/// Number of stored points of the trajectory.
 const POINTS: usize = 500;
 
-/// Where the recursion was.
+/// A point of the recursion's trajectory.
 #[derive(Debug, Clone)]
 pub(super) struct Point {
     /// Which sample.
     pub sample: usize,
-    /// In which there were readings, scaled.
+    /// Time with readings, scaled.
     pub time: f64,
     pub theta: DVector<f64>,
     /// `P^-1`
     pub information: DMatrix<f64>,
 }
 
-/// Its way over the record.
+/// Trajectory of the recursion over the record.
 #[derive(Debug, Clone)]
 pub(super) struct Path {
     pub order: Order,
@@ -64,7 +64,7 @@ impl Path {
     }
 }
 
-/// Whether the k-th of `count` samples is kept.
+/// Whether the k-th of `count` samples is stored.
 pub(super) fn is_kept(k: usize, count: usize) -> bool {
     k + 1 == count || k.is_multiple_of(count.div_ceil(POINTS))
 }

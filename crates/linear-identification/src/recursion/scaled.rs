@@ -15,7 +15,7 @@ const BANDWIDTH: f64 = 3.0;
 /// Below this over the time constant of first order the filters hide what is looked for.
 const LEAST_BANDWIDTH: f64 = 0.1;
 
-/// So many times below that, and above the sampling rate, nothing is left of the signals.
+/// At frequencies below that, or above the sampling rate, by more than this factor the filtered signals vanish.
 const WIDEST: f64 = 100.0;
 
 /// The least memory, in time constants.
@@ -48,12 +48,12 @@ pub(super) struct Scaled {
     pub eta: f64,
     /// Gain and offset of the model of first order.
     pub first_order: [f64; 2],
-    /// Its simulation error, root mean square.
+    /// Simulation error, root mean square.
     first_order_error: f64,
 }
 
 impl Scaled {
-    /// The record must have rows, and signals that move. Also says what is doubtful.
+    /// The record must have rows, and signals that change. Also collects warnings.
     pub fn new(record: &Record, request: &Request) -> (Self, Vec<String>) {
         let begin = record.time.first().copied().unwrap_or(0.0);
         let (duration, step) = (record.duration(), record.sample_interval());

@@ -1,4 +1,4 @@
-//! What a linear model says from the input alone.
+//! Simulation of a linear model from the input alone.
 
 use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
 use nalgebra::{DMatrix, DVector};

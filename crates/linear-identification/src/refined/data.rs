@@ -5,7 +5,7 @@ use rivc::{Data, Structure};
 
 use crate::Mended;
 
-/// A record as the crate takes it; its reference only where it moves.
+/// A record for the crate `rivc`; its reference only if it changes.
 pub(crate) fn data(record: &Record) -> Data {
     let moves = record.references.first().is_some_and(|reference| {
         let (low, high) = reference.range();

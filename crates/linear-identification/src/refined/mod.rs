@@ -266,14 +266,14 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
     Ok(identification)
 }
 
-/// Of a second input and of further records with their number: `b0_2`, `offset_2`.
+/// Name and unit of a parameter. Parameters of a second input and of further records have a number: `b0_2`, `offset_2`.
 fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, String) {
     let numbered = |name: String, index: usize| match index {
         0 => name,
         index => format!("{name}_{}", index + 1),
     };
     let output = &record.outputs[0].unit;
-    // With an integrator A begins with p: everything is divided by a time.
+    // With an integrator, A begins with p: all units are divided by a time.
     let lower = usize::from(integrator);
     match kind {
         Kind::A { power } => (format!("a{power}"), power_of_time(power - lower)),

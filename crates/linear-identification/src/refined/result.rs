@@ -1,4 +1,4 @@
-//! What SRIVC and RIVC say besides the model.
+//! Results of SRIVC and RIVC in addition to the model.
 
 use serde::Serialize;
 
@@ -30,7 +30,7 @@ pub struct Refined {
 /// The noise of a record, an autoregression counted in samples: of the residual for SRIVC.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordNoise {
-    /// Its coefficients; none where it is white.
+    /// Coefficients of the noise model; none for white noise.
     pub coefficients: Vec<f64>,
     /// Standard deviation of what drives it, output unit.
     pub deviation: f64,

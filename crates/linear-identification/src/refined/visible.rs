@@ -6,14 +6,14 @@ use crate::{Error, Shown};
 
 /// Lags of the test that the error has nothing of a signal, at most.
 const MOST_LAGS: usize = 25;
-/// A signal that shows in the error with less than this probability by chance is said.
+/// Significance level: a correlation of a signal with the error below this p-value is reported.
 const UNLIKELY: f64 = 0.01;
 
 /// The parts of a record, one behind the other.
 #[derive(Default)]
 pub(super) struct Joined {
     pub shown: Shown,
-    /// Of the signals that must not show in the error, and the error; with rows without a value between the parts.
+    /// Signals that must be uncorrelated with the error, and the error; with rows without a value between the parts.
     signals: Vec<ct_signals::Channel>,
     error: Vec<f64>,
     pub readings: Vec<f64>,

@@ -33,15 +33,15 @@ pub use self::result::{Outcome, Row, SideBySide};
 pub use crate::order::Orders;
 use crate::{Error, Mended, Method, Order, Request, Shown, identify_mended};
 
-/// A test with a smaller probability says that an assumption does not hold.
+/// Significance level of the tests of assumptions.
 const UNLIKELY: f64 = 0.01;
-/// A simulation error so many times the least one of its order says that something is wrong ...
+/// A simulation error above the least one of its order times this factor is reported ...
 const WORSE: f64 = 1.05;
-/// ... where the difference is this part of the output's deviation too.
+/// ... if the difference also exceeds this share of the output's standard deviation.
 const SEEN: f64 = 0.01;
 
 impl Method {
-    /// What has to hold for its estimates to be right.
+    /// Assumptions under which the method's estimates are consistent.
     #[must_use]
     pub fn assumes(self) -> &'static str {
         match self {

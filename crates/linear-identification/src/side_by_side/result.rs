@@ -1,4 +1,4 @@
-//! What came of all methods.
+//! Results of all methods.
 
 use missing_effect::{MendedGaps, Parameter};
 use serde::Serialize;
@@ -19,9 +19,9 @@ pub struct SideBySide {
     pub gaps: Option<MendedGaps>,
     /// Names of the records that were not fitted.
     pub test: Vec<String>,
-    /// One for each method, of the order with the least BIC; best simulation first, then those that were refused.
+    /// One row per method, with the order of least BIC; best simulation first, then the methods that failed.
     pub methods: Vec<Row>,
-    /// All methods with all orders, where there are several orders.
+    /// All methods with all orders, if there are several orders.
     pub orders: Vec<Row>,
     /// The record.
     #[serde(skip)]
@@ -37,15 +37,15 @@ pub struct Row {
     pub order: Order,
     /// Wall time beside the others, s.
     pub seconds: f64,
-    /// What the method assumes.
+    /// Assumptions of the method.
     pub assumes: &'static str,
     /// What it found.
     pub found: Option<Outcome>,
-    /// Why it found nothing.
+    /// Reason why the method failed.
     pub refused: Option<String>,
 }
 
-/// What a method found.
+/// Result of a method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     /// a_1 to a_n, b_0 to b_m, and an offset where the method estimates one.
@@ -56,7 +56,7 @@ pub struct Outcome {
     pub rmse: f64,
     /// 100 (1 - rmse over the standard deviation of the output), %.
     pub fit_percent: f64,
-    /// The same on the records that were not fitted, all together.
+    /// Simulation error on the records that were not fitted, over all of them.
     pub test_rmse: Option<f64>,
     /// %; nothing where the outputs stand still.
     pub test_fit_percent: Option<f64>,
@@ -70,9 +70,9 @@ pub struct Outcome {
     pub whiteness_p: f64,
     /// p-value of the test that the simulation error holds nothing of the input.
     pub input_p: f64,
-    /// Which assumptions the record violates, in words.
+    /// Assumptions that the record violates, in words.
     pub violated: Vec<String>,
-    /// What the method itself says of doubts.
+    /// Warnings of the method.
     pub warnings: Vec<String>,
     /// The simulated output.
     #[serde(skip)]
@@ -80,7 +80,7 @@ pub struct Outcome {
 }
 
 impl Row {
-    /// What makes one order better than another: less is better.
+    /// Sort key of orders: less is better.
     pub(super) fn key(&self) -> (bool, f64) {
         let found = self.found.as_ref();
         found.map_or((true, f64::INFINITY), |found| {

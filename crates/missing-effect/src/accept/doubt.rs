@@ -1,5 +1,4 @@
-//! What a confirmed set of effects is still held against: the colour of each model's own residual, a jump of the reading, and
-//! any course of time.
+//! Tests of a confirmed set of effects against alternatives: AR noise alone, a level shift of the reading, and a function of time.
 
 use greybox::{Fit, coloured};
 use rayon::prelude::*;
@@ -20,10 +19,10 @@ use crate::{
     search::{confirm::confirm, find::Found, growth::by_clock},
 };
 
-/// What a doubt leaves.
+/// Result of the comparison with alternatives.
 pub(crate) struct Doubted<'a> {
     pub confirmed: Node<'a>,
-    /// The believed model with the colour of its own residual.
+    /// The believed model with a noise model fitted to its own residual.
     pub own_base: Fit,
     /// The jump that explains more than what was confirmed.
     pub jumped: Option<Jump>,
@@ -37,8 +36,8 @@ pub(crate) fn doubt<'a>(
 ) -> Result<Doubted<'a>, Error> {
     let noise = &found.noise;
     let mut confirmed = found.confirmed.clone();
-    // Each model with the colour of its own residual: what a coloured noise explains needs no effect. The richest model has
-    // taken a part of a slow noise for effects, and the colour that it leaves is too fast: chance is counted here too.
+    // Each model has a noise model of its own residual: an error that coloured noise explains needs no effect. The largest model explains a
+    // part of a slow noise by effects, so the noise model of its residual is too fast; chance is also evaluated with the own noise models.
     let own = |node: &Node<'a>| coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING);
     let (own_base, own_last) = rayon::join(|| own(base), || own(&confirmed));
     let (own_base, own_last) = (own_base?, own_last?);
@@ -51,7 +50,7 @@ pub(crate) fn doubt<'a>(
     if !confirmed.added.is_empty() && !needed_in_colour {
         confirmed = found.base.clone();
     }
-    // What is claimed has to be better than the simplest course of which no effect is the cause.
+    // A set of effects has to be better than the simplest course that no effect causes.
     let jumped = if confirmed.added.is_empty() {
         None
     } else {
@@ -96,7 +95,7 @@ pub(crate) fn doubt<'a>(
             confirmed = simpler;
         }
     }
-    // What was made smaller since is no longer what was held against it.
+    // If the set became smaller since, the earlier comparison is not valid any more.
     if !beyond_small_walk(&confirmed)? {
         confirmed = found.base.clone();
     }

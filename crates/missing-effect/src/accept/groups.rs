@@ -1,4 +1,4 @@
-//! What cannot be told apart: the effects that fit as well in the place of another.
+//! Ambiguity: effects that fit as well in the place of an accepted one.
 
 use greybox::Noise;
 use plants::Placed;
@@ -22,7 +22,7 @@ pub(crate) struct Group {
     pub places: Vec<PlaceScore>,
 }
 
-/// For every added effect, itself and all that fit as well in its place.
+/// For every added effect: the effect, and all effects that fit as well in its place.
 ///
 /// `searched`: sets that the search has fitted, among them stand-ins that a new start may miss; `in_loop`: the records come from a loop
 /// that is not simulated.
@@ -120,7 +120,7 @@ pub(crate) fn groups<'a>(
         .collect()
 }
 
-/// What a set has in the place of the effect at a position of another set, where they differ in that alone.
+/// Effect of a set in the place of another set's effect at this position, if the sets differ only there.
 fn stand_in(set: &Node, last: &Node, position: usize) -> Option<Placed> {
     let kept = last.added.iter().enumerate();
     let mut kept = kept.filter(|(k, _)| *k != position);

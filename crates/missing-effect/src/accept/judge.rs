@@ -1,4 +1,4 @@
-//! Whether a confirmed set of effects is the answer, beside what it leaves.
+//! Whether a confirmed set of effects explains the data, depending on its residual.
 
 use ct_signals::ArModel;
 use greybox::{Fit, Noise, coloured};
@@ -23,32 +23,32 @@ use crate::{
     search::confirm::confirm,
 };
 
-/// Where something remains that is not noise, effects are the whole answer if they explain this share at least of the excess
-/// error: the mean squared simulation error above the noise floor.
+/// If the residual is not noise, effects are the whole explanation if they explain at least this share of the excess error: the mean
+/// squared simulation error above the noise floor.
 ///
 /// The tests that confirm an effect take what remains for noise. Against a disturbance from outside, which is none, their
 /// probabilities do not hold: whatever effect happens to resemble it is "beyond chance". Over records of nine
 /// simulated disturbances such effects imitate up to six sevenths of one as a rule; a true effect beside which something small
 /// remains explains nineteen twentieths and more.
 pub(crate) const WHOLE: f64 = 0.9;
-/// They are a partial answer if they explain this share.
+/// Effects are a partial explanation from this share on.
 pub(crate) const PART: f64 = 0.38;
 
 /// A noise floor below this part of the error is none.
 const NOTHING: f64 = 1e-9;
 
-/// How much of an answer a set of effects is.
+/// Grade of the explanation by a set of effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Grade {
-    /// It leaves noise, or explains [`WHOLE`] of the excess error.
+    /// The residual is noise, or the set explains [`WHOLE`] of the excess error.
     Whole,
-    /// It explains [`PART`] of it.
+    /// The set explains [`PART`] of the excess error.
     Part,
     /// Less.
     None,
 }
 
-/// What a set is judged by.
+/// Data for the acceptance test of a set.
 pub(crate) struct Judge<'s, 'a> {
     pub base: &'s Node<'a>,
     pub noise: &'s Noise,
@@ -59,7 +59,7 @@ pub(crate) struct Judge<'s, 'a> {
     pub by_simulation: bool,
     /// The set was cut to as many effects as may be added.
     pub stopped: bool,
-    /// What a jump of the reading leaves, where that is what there is.
+    /// Structure of the residual after a level shift of the reading, if the structure is a level shift.
     pub jumped: Option<Left>,
     /// The single effects, in the metric in which they were refitted last.
     pub singles: &'s [Node<'a>],
@@ -67,20 +67,20 @@ pub(crate) struct Judge<'s, 'a> {
     pub searched: &'s [&'s Node<'a>],
 }
 
-/// What was found of a set.
+/// Result of the acceptance test of a set.
 pub(crate) struct Judged<'a> {
     pub course: Course<'a>,
     pub grade: Grade,
     /// The share of the excess error that it explains.
     pub share: f64,
-    /// Of an answer: what stands in for each of its effects, and where each may act.
+    /// For an accepted set: the alternatives to each of its effects, and the places where each may act.
     pub groups: Vec<Group>,
-    /// What was taken out of it.
+    /// Effects that were removed from the set.
     pub dropped: Vec<Placed>,
 }
 
 impl<'a> Judge<'_, 'a> {
-    /// The set, or what stays of it.
+    /// The accepted set, or the accepted part of it.
     ///
     /// Beside something that is not noise, an effect that one of the clock stands in for is no answer: it is some course of time, and
     /// whatever is left may have made it. That speaks against this effect alone. The others stay where they are called for
@@ -89,7 +89,7 @@ impl<'a> Judge<'_, 'a> {
         let mut judged = self.as_it_is(&set, None)?;
         loop {
             let courses = judged.courses_of_time();
-            // What remains beside a set that was cut is what was cut off, and the result says so.
+            // If a set was cut, its unexplained part includes the effects that were cut off, and the result reports this.
             if self.stopped || courses.is_empty() || judged.grade != Grade::Whole {
                 return Ok(judged);
             }
@@ -106,7 +106,7 @@ impl<'a> Judge<'_, 'a> {
                     dropped.extend(courses);
                     judged = Judged { dropped, ..others };
                 }
-                // What follows time alone may be a part of the answer, and no more.
+                // A function of time can be a part of the explanation only.
                 _ => {
                     return Ok(Judged {
                         grade: Grade::Part,
@@ -117,7 +117,8 @@ impl<'a> Judge<'_, 'a> {
         }
     }
 
-    /// `beside`: what remains beside a larger set. A colour that takes it up, with what that set explained, makes no noise of it.
+    /// `beside`: structure in the residual of a larger set. A noise model that absorbs this structure, and the part that the larger set
+    /// explained, does not make it noise.
     fn as_it_is(&self, set: &Node<'a>, beside: Option<Left>) -> Result<Judged<'a>, Error> {
         let mut course = self.course(set)?;
         course.left = course.left.or(beside);
@@ -202,7 +203,7 @@ impl<'a> Judge<'_, 'a> {
         in_noise: Fit,
     ) -> Result<Course<'a>, Error> {
         let own = coloured(&last.setup, in_noise, NOISE_ORDER, STOPPING)?;
-        // That the residual wanders says less than that it jumps.
+        // A slow drift of the residual is weaker evidence than an abrupt change.
         let left = match remains(&last, &own)? {
             Some(left) if !matches!(left.what, Remains::Slow(..)) => Some(left),
             left => self.jumped.or(left),
@@ -218,7 +219,7 @@ impl<'a> Judge<'_, 'a> {
 }
 
 impl Judged<'_> {
-    /// The effects of an answer that one of the clock stands in for, where something remains beside them.
+    /// Effects of a set that a function of time can replace, if the residual is not noise.
     fn courses_of_time(&self) -> Vec<Placed> {
         if self.grade != Grade::Whole || self.course.left.is_none() {
             return Vec::new();
@@ -232,11 +233,11 @@ impl Judged<'_> {
     }
 }
 
-/// The models from the believed one to the last, and what the last one leaves.
+/// The models from the believed one to the last, and the residual structure of the last one.
 pub(crate) struct Course<'a> {
     /// At least the believed one.
     pub nodes: Vec<Node<'a>>,
-    /// The last one with the colour of its own residual.
+    /// The last model with the noise model of its own residual.
     pub own: Fit,
     pub left: Option<Left>,
 }
@@ -246,7 +247,7 @@ impl<'a> Course<'a> {
         &self.nodes[self.nodes.len() - 1]
     }
 
-    /// What is reported of each model.
+    /// Report of each model.
     pub fn steps(
         &self,
         floor: &Floors,
@@ -346,7 +347,7 @@ mod tests {
             (kept, dropped),
             (vec!["pump_saturation"], vec!["sensor_drift"])
         );
-        // Where the swing is as large as what the saturation makes, the saturation is no answer either.
+        // If the oscillation is as large as the effect of the saturation, the saturation is not accepted either.
         let (fair, ..) = judged(1.0);
         assert!(!fair);
     }

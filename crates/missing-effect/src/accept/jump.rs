@@ -37,7 +37,7 @@ pub(crate) struct Jump {
 }
 
 impl Jump {
-    /// What it leaves to be explained of the record.
+    /// Description of the level shift as unexplained structure of the record.
     pub fn left(self, record: &Record) -> Left {
         Left {
             what: Remains::Instant(record.time[self.before + 1], 0.0),
@@ -54,7 +54,7 @@ pub(crate) fn jump(node: &Node, noise: &Noise) -> Result<Option<Jump>, Error> {
         return Ok(None);
     };
     let residuals = node.setup.disturbance(&node.fit.x)?;
-    // Beside all else that the model lacks, an instant stands out where the residual's own colour does not foretell it.
+    // In the presence of other model errors, an instant is abrupt only if the residual's own noise model does not predict it.
     let noise_of_residual = residual_colour(&node.setup, &residuals)?;
     let whitened = noise_of_residual.whiten(&residuals);
     let mut instants: Vec<(f64, usize, usize)> = Vec::new();
@@ -154,7 +154,7 @@ mod tests {
                 Remains::Instant(BEGIN + INTERVAL * AT as f64, 0.0)
             );
         }
-        // Where the reading does not jump, the best of several is less than its two parameters cost.
+        // Without a level shift, the best of several instants lowers the criterion by less than the penalty of its two parameters.
         let worth = (1..=10).filter(|seed| {
             let problem = problem(0.0, 1, *seed);
             let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();

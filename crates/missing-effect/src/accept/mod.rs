@@ -1,4 +1,4 @@
-//! Whether the effects that the search confirmed are the answer.
+//! Acceptance: whether the effects that the search confirmed explain the data.
 //!
 //! In this order: `doubt.rs` compares them with what would do in their place: coloured noise alone, one jump of the reading (`jump.rs`), a random walk
 //! (`random_walk.rs`). `judge.rs` asks what they explain and what they leave, with `trail.rs` (the models on the way, one effect after the other) and

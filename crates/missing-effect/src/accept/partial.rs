@@ -38,23 +38,23 @@ use crate::{
 const REFITTED: usize = 6;
 /// Largest set, but for the confirmed one.
 const MOST: usize = 3;
-/// A larger set leaves at most this part of what the smaller one leaves of the excess error.
+/// A larger set leaves at most this share of the excess error of the smaller set.
 const LEFT: f64 = 0.5;
 
 /// A set explains this part of the mean squared error at least on a half of the record that was not fitted.
 const CARRIED_OVER: f64 = 0.3;
 
-/// The innovations beside a set are at most so many times as large as those beside the base: what imitates a slow course by moves of its
-/// own is rougher than the record.
+/// Largest ratio of the innovation variance with a set to that with the base: a set that compensates for a slow course by its own fast
+/// changes is rougher than the record.
 const ROUGHER: f64 = 1.05;
 
-/// By how much the logarithm of the mean square with a jump has to lie below that of a set.
+/// Least difference between the logarithms of the mean square for a level shift and for a set.
 const JUMP_CLEARLY: f64 = 0.1;
 
-/// Stiction that the shape of the record shows is a partial answer from this share on.
+/// Stiction that the shape of the record confirms is a partial explanation from this share on.
 const PART_BY_SHAPE: f64 = 0.15;
 
-/// Why a narrow band of stiction is refused.
+/// Reason for rejecting a narrow band of stiction.
 const NARROW_BAND: &str = "in a loop that is not simulated, a disturbance fed back through the command looks like a periodic effect";
 
 /// A set that was tested, and with what result.
@@ -67,7 +67,7 @@ pub(crate) struct Tested<'a> {
     pub bic_fall: f64,
     /// The record has the shape of a valve that sticks, and the set is that.
     pub shape: bool,
-    /// Why it is refused; empty where it is accepted.
+    /// Reasons for the rejection; empty if the set is accepted.
     pub reasons: Vec<String>,
 }
 
@@ -134,7 +134,7 @@ pub(crate) fn largest_part<'a>(
                 }
                 Ok::<_, Error>(tested)
             })
-            // A set that cannot be fitted beside a noise model of its own, or to a half of the record, is no answer.
+            // A set that cannot be fitted with a separate noise model, or to a half of the record, is not accepted.
             .filter(|tested| {
                 !matches!(
                     tested,
@@ -198,7 +198,7 @@ fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
         let other = std::slice::from_ref(&halves[1 - fitted]);
         held_out_rmse(&half, other)
     };
-    // Outputs count by what the base leaves of them.
+    // Outputs are weighted by the residuals of the base.
     let both = |node: &Node| Ok::<_, Error>((error(node, 0)?, error(node, 1)?));
     let (of_base, of_node) = (both(base)?, both(node)?);
     let scales: Vec<f64> = of_base

@@ -43,7 +43,7 @@ const BENDING: f64 = 0.35;
 /// The random walks that may stand in the place of effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Walk {
-    /// Its first value is unknown (diffuse start); otherwise zero, so that an offset which stays is no walk.
+    /// The first value is unknown (diffuse start); otherwise it is zero, so that a constant offset is no random walk.
     pub anywhere: bool,
     /// Standard deviation at the end of a record over that of the noise, at most.
     pub largest: f64,
@@ -52,19 +52,19 @@ pub(crate) struct Walk {
 }
 
 impl Walk {
-    /// Of any size; the models are as they were fitted.
+    /// A walk of any size; the models keep their fitted parameters.
     pub const ANY: Self = Self {
         anywhere: true,
         largest: f64::INFINITY,
         fitted_again: false,
     };
-    /// No larger than the noise; it bends the parameters too.
+    /// A walk no larger than the noise; it also changes the parameters.
     pub const SMALL: Self = Self {
         anywhere: true,
         largest: 1.0,
         fitted_again: true,
     };
-    /// The same from zero, against which effects may be held that are hardly more than an offset.
+    /// A small walk that starts at zero, for a comparison with effects that are nearly an offset.
     pub const SMALL_FROM_ZERO: Self = Self {
         anywhere: false,
         ..Self::SMALL

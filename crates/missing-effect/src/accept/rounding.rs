@@ -28,7 +28,7 @@ const SHARE: RangeInclusive<f64> = 1.0 / 3.0..=1.1;
 pub(crate) struct Rounded<'a> {
     /// The model with rounding at the first of the outputs.
     pub node: Node<'a>,
-    /// What is named with it.
+    /// Group of the rounding effect.
     pub group: Group,
     /// The outputs whose readings are rounded, at least one: that first of whose error rounding makes most.
     pub outputs: Vec<RoundedOutput>,

@@ -15,7 +15,7 @@ use statrs::statistics::{Data, OrderStatistics};
 const JUMP: (f64, usize) = (0.4, 4);
 /// Between two jumps the output stands still where it varies (80 %) by less than this part of its range ...
 const STILL: f64 = 0.35;
-/// ... while the command moves over more than this part of its own, and relatively more than the output by this factor.
+/// ... while the command moves over more than this share of its own range, and relatively more than the output by this factor.
 const MOVED: (f64, f64) = (0.25, 1.2);
 /// Fewest samples of a plateau.
 const SHORTEST: usize = 6;

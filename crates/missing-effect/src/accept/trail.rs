@@ -15,8 +15,8 @@ use crate::{
 
 /// Further starts of every step, because its minimum must not hang on where the search came from: so many, ...
 const STARTS_AROUND: usize = 6;
-/// ... and as many again and again while it was not found twice, in so many rounds at most on the way and at its end. The model that
-/// names the effects is held to the same as the believed one.
+/// ... and the same number again until the minimum is found twice; largest number of rounds for intermediate models and for the last one.
+/// The model that names the effects has to meet the same condition as the believed one.
 const ROUNDS: (u64, u64) = (2, 4);
 
 /// The believed model, then one effect after the other, first what lowers the error most.

@@ -137,7 +137,7 @@ fn one_by_one(setup: &Setup, seed: u64) -> Result<Option<Vec<f64>>, Error> {
         remaining.retain(|placed| Some(placed) != first.added.last());
         node = first;
     }
-    // What was not put on for want of time is as any start has it.
+    // Parameters that were not estimated because of the time limit have the values of any start.
     let mut x = random_starts(setup, 1, seed).swap_remove(0);
     let own = node.setup.names();
     for (name, value) in setup.names().iter().zip(&mut x) {

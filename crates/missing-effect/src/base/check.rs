@@ -96,7 +96,7 @@ mod tests {
         simulated::problem(Plant::CascadedTanks, known, records)
     }
 
-    /// What both commands say, before they have fitted anything.
+    /// Checks that `compare` and `diagnose` share, before any fit.
     fn refused(problem: &Problem) -> String {
         let stopped = std::sync::atomic::AtomicBool::new(true);
         let options = Options {

@@ -16,13 +16,13 @@ use crate::{
     },
 };
 
-/// Feedback is said to be there below this p-value.
+/// Significance level of the feedback test.
 const FEEDBACK: f64 = 1e-4;
 /// A controller whose command differs from the measured one by more than this part of what that moves is another one.
 /// What it differs by less is known, and simulated with the loop.
 const OTHER_CONTROLLER: f64 = 0.05;
 
-/// What follows where a model runs on the measured command of a loop.
+/// Consequence of running a model on the measured command of a loop.
 const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and scores are biased; the standard errors are enlarged for this.";
 
 /// Closes the loop around a fitted node where that is possible, and says what is known of the loop.
@@ -32,8 +32,8 @@ pub(crate) fn enclose<'a>(
     node: Node<'a>,
 ) -> Result<(Node<'a>, Option<ControlLoop>), Error> {
     let Some(controller) = &problem.controller else {
-        // A term in time that was kept from this record has followed its noise, what came later too: the residual beside it says
-        // nothing of what the command answers to.
+        // A function of time that was fitted to this record has also fitted its noise, with future values: its residual cannot be used to
+        // test for feedback.
         let timed = problem
             .terms
             .iter()
@@ -116,8 +116,8 @@ fn chance(p: f64) -> String {
     }
 }
 
-/// How far the measured commands are from the controller's own, and which part that is of what they move; the worst
-/// record's.
+/// Difference between the measured commands and the controller's output, and its ratio to the standard deviation of the command; for the
+/// worst record.
 fn disagreement(replays: &[Replay]) -> (f64, f64) {
     replays
         .iter()
@@ -140,7 +140,7 @@ fn feedback_p(node: &Node) -> Result<f64, Error> {
             let record = &node.setup.records[i / outputs];
             // The first parameter of every plant is its gain.
             let gain = record.references.is_empty().then_some(node.fit.x[0]);
-            // What was not read moved no controller.
+            // A missing reading has not affected the controller.
             let read: Vec<f64> = residual
                 .iter()
                 .map(|e| if e.is_nan() { 0.0 } else { *e })
@@ -165,7 +165,7 @@ pub(crate) fn widened(
         .collect())
 }
 
-/// Where the fit in another metric ends: white noise for one with a noise model, and the other way round.
+/// Fit with the other weighting: white noise for a fit with a noise model, and the reverse.
 pub(crate) fn other_metric(setup: &Setup, node: &Node) -> Result<Vec<f64>, Error> {
     Ok(if node.fit.noise.order() == 0 {
         coloured(setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.x

@@ -31,7 +31,7 @@ pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), E
         }
     }
     for i in 0..m {
-        // What stands for an operating point is a constant, and no part of the loop.
+        // A constant for an operating point is not a part of the loop.
         let constant = own.b[i] == 0.0 && (0..m).all(|j| own.a[i][j] == f64::from(i == j));
         for j in 0..m {
             a[(n + i, n + j)] = if constant { 0.0 } else { own.a[i][j] };

@@ -116,7 +116,7 @@ struct Regression {
     /// Sum of squares that is left.
     left: f64,
     coefficients: Vec<f64>,
-    /// Of the coefficients, for a residual of unit variance.
+    /// Variances of the coefficients for a residual of unit variance.
     variances: Vec<f64>,
 }
 

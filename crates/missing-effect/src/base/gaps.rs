@@ -9,7 +9,7 @@ use ct_signals::{Gaps, Record};
 use super::{believed::base, control_loop::fastest_time_constant};
 use crate::{Diagnosis, Error, LONGEST_HOLD, MendedGaps, Options, Problem, Shown};
 
-/// For the first fit it is held for so many sampling intervals.
+/// For the first fit, the input is held for this number of sampling intervals.
 const FIRST_HOLD: f64 = 20.0;
 /// Share of the time limit that the first fit has.
 const FITTED: f64 = 0.1;
@@ -24,7 +24,7 @@ pub(crate) struct Mended {
     fitted: usize,
 }
 
-/// All records with the parts that they fall into.
+/// All records, cut into their parts.
 fn cut(records: &[Record], longest: f64) -> (Vec<Record>, Vec<usize>, Gaps) {
     let (mut all, mut counts, mut gaps) = (Vec::new(), Vec::new(), Gaps::default());
     for record in records {
@@ -36,7 +36,7 @@ fn cut(records: &[Record], longest: f64) -> (Vec<Record>, Vec<usize>, Gaps) {
     (all, counts, gaps)
 }
 
-/// Something is left of every record where inputs are held for at most `limit` \[s\].
+/// Checks that every record keeps a part if inputs are held for at most `limit` \[s\].
 fn check_parts<'a>(
     mut records: impl Iterator<Item = &'a Record>,
     parts: &[usize],

@@ -1,4 +1,4 @@
-//! What is to be diagnosed and how.
+//! The problem of a diagnosis and its options.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
@@ -8,12 +8,12 @@ use ct_signals::Record;
 use greybox::PriorValue;
 use plants::{Known, Placed, Plant, Term, controller::Controller};
 
-/// What is to be diagnosed.
+/// The problem of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// The believed plant.
     pub plant: Plant,
-    /// What is known of it.
+    /// Known constants of the plant.
     pub known: Known,
     /// The effects that are on already.
     pub effects: Vec<Placed>,
@@ -33,7 +33,7 @@ pub struct Problem {
     pub test: Vec<Record>,
 }
 
-/// How to search.
+/// Options of the search.
 #[derive(Debug, Clone, Copy)]
 pub struct Options<'a> {
     /// Largest number of effects to add.
@@ -42,8 +42,8 @@ pub struct Options<'a> {
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
-    /// Where a controller is known and the records hold its reference: the loop is simulated; otherwise the model runs on
-    /// the measured command.
+    /// If a controller is known and the records contain its reference: the loop is simulated; otherwise the model runs on the measured
+    /// command.
     pub simulate_loop: bool,
     /// Cancellation flag: when set, the computation ends soon with [`greybox::Error::Stopped`].
     pub stop: Option<&'a AtomicBool>,
@@ -71,10 +71,10 @@ impl Default for Options<'_> {
     }
 }
 
-/// How far the computation is.
+/// Progress of the computation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// What is being done.
+    /// Name of the current phase.
     pub phase: &'static str,
     /// Steps done.
     pub done: usize,

@@ -11,7 +11,7 @@ pub(crate) fn allow(node: &Node, share: f64) {
     }
 }
 
-/// What the time limit left out of a search.
+/// Steps that the time limit left out of a search.
 pub(crate) fn effort(node: &Node, options: &Options) -> Effort {
     let limit = node.setup.time_limit.as_ref();
     let interrupted = options

@@ -1,4 +1,4 @@
-//! What could be done instead: the same again, over and over, over a wider range, or with a second sensor.
+//! Alternatives to an experiment: the same again, repetitions, a wider range, or a second sensor.
 
 use super::{
     experiments::{Before, Search, Tried},
@@ -28,7 +28,7 @@ impl Search<'_, '_> {
         (prospect(&tried.power) == Prospect::Decides && !tried.at_limit).then_some(times)
     }
 
-    /// What a wider range would give.
+    /// Result of a wider range.
     pub fn wider(
         &self,
         bounds: &Bounds,

@@ -21,14 +21,14 @@ use crate::{Error, Problem, Progress, base::time_limit::allow, fit::node::Node};
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 6;
 const MOST_REFITS: usize = 30;
-/// So many sequences are tried whatever the time limit.
+/// Number of sequences that are tried whatever the time limit is.
 const FEWEST: usize = 2;
 /// A sequence that drives a controller to a limit is applied so that it crosses its range in so many time constants.
 const SLOWER: [f64; 2] = [1.0, 4.0];
 /// A level below this share of the highest one is none.
 const DRAINED: f64 = 1e-6;
 
-/// What the search needs to know.
+/// Data of the search.
 pub(crate) struct Search<'s, 'a> {
     pub problem: &'s Problem,
     pub nodes: &'s [Node<'a>; 2],
@@ -39,7 +39,7 @@ pub(crate) struct Search<'s, 'a> {
     pub progress: &'s (dyn Fn(Progress) + Sync),
 }
 
-/// What it finds.
+/// Result of the search.
 pub(crate) struct Found {
     pub candidates: Vec<Candidate>,
     pub overfull: usize,
@@ -56,7 +56,7 @@ pub(crate) struct Found {
 /// A sequence and what it promises.
 pub(crate) type Tried = (Candidate, Sequence);
 
-/// What each node knows from the records, and how far each is from the other's simulation of them.
+/// Information of each model from the records, and the distance of each from the other's simulation of them.
 pub(crate) struct Before {
     pub known: [Triangle; 2],
     noise_free: [Vec<Record>; 2],
@@ -67,12 +67,12 @@ pub(crate) struct Before {
 }
 
 impl Search<'_, '_> {
-    /// By how much the criterion of the second is above that of the first.
+    /// Criterion of the second model minus that of the first.
     pub fn ahead(&self) -> f64 {
         self.nodes[0].gain_over(&self.nodes[1])
     }
 
-    /// By how much each is ahead of the other.
+    /// Advantage of each model over the other.
     pub fn ahead_of_each(&self) -> [f64; 2] {
         [self.ahead(), -self.ahead()]
     }
@@ -140,7 +140,7 @@ impl Search<'_, '_> {
                 let (low, high) = (either[0].0.min(either[1].0), either[0].1.max(either[1].1));
                 Reach {
                     level: plant.level_name(vessel).to_string(),
-                    // A tank that drains for long keeps a level that nobody would read.
+                    // A tank that drains for a long time has a level below any reading.
                     low: if low.abs() < DRAINED * high.abs() {
                         0.0
                     } else {
@@ -192,7 +192,8 @@ impl Search<'_, '_> {
         Some((first, sequence))
     }
 
-    /// The same, the other refitted; as it was where the time did not suffice, for what a refit misses would count as power.
+    /// Candidates with the other model refitted; unchanged if the time is over, because the error of an incomplete refit would count as
+    /// power.
     pub fn confirmed(
         &self,
         (candidate, sequence): &Tried,
@@ -221,14 +222,14 @@ impl Search<'_, '_> {
         })
     }
 
-    /// It would lead a level above the tank.
+    /// Whether a level would rise above the tank.
     fn overfills(&self, candidate: &Candidate) -> bool {
         let height = self.problem.known.tank_height.unwrap_or(f64::INFINITY);
         candidate.reaches.iter().any(|reach| reach.high > height)
     }
 
-    /// All sequences within limits, linearised, the best first; and how many would overfill a tank, or drive the controller to a
-    /// limit.
+    /// Predicted power of all sequences within limits, linearised, the best first; and the number that would overfill a tank, or drive the
+    /// controller to a limit.
     pub fn promises(
         &self,
         bounds: &Bounds,
@@ -239,7 +240,7 @@ impl Search<'_, '_> {
             .into_iter()
             .enumerate()
             .collect();
-        // Where the time does not suffice for all, those that are tried are drawn at random.
+        // If the time does not suffice for all, a random selection is tried.
         all.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
         let (total, begun, done) = (all.len(), AtomicUsize::new(0), AtomicUsize::new(0));
         let mut tried: Vec<(usize, Tried)> = all
@@ -290,7 +291,7 @@ impl Search<'_, '_> {
                 .into_par_iter()
                 .map(|i| (i, self.confirmed(&tried[i], bounds, before)))
                 .collect();
-            // From behind, so that what cannot be refitted can be left out.
+            // In reverse order, so that candidates without a refit can be removed.
             for (i, candidate) in confirmed.into_iter().rev() {
                 match candidate {
                     Some(candidate) => tried[i].0 = candidate,

@@ -1,4 +1,4 @@
-//! What the user allows an experiment to do, checked against the record and the plant.
+//! Limits of an experiment from the user, checked against the record and the plant.
 
 use ct_signals::{MIN_ROWS, ROWS_PER_PARAMETER, Record, shown};
 use effect_search::design::Room;
@@ -9,14 +9,14 @@ use crate::{Problem, numbers::significant};
 /// A range reaches so many times as far from zero as the records at most.
 const WIDEST: f64 = 1e6;
 
-/// So much, to three digits and not less.
+/// The value rounded up to three digits.
 fn at_least(value: f64) -> String {
     let digit = 10_f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 2.0);
     let rounded = (value / digit - 1e-9).ceil() * digit;
     format!("{}", significant(rounded, 3).parse().unwrap_or(rounded))
 }
 
-/// What an experiment may do; what is `None` follows from the records.
+/// Limits of an experiment; `None` is derived from the records.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
     /// Smallest and largest value of what is applied: the command, or in a loop the reference. Without it what the records visited.
@@ -80,7 +80,7 @@ pub enum Refused {
         low: f64,
         /// As given.
         high: f64,
-        /// How far either end may be from zero.
+        /// Largest distance of either end from zero.
         most: f64,
     },
     /// The range leaves what the plant can do.
@@ -100,7 +100,7 @@ pub enum Refused {
         from: f64,
         /// Upper end of what is possible.
         to: f64,
-        /// What bounds it.
+        /// Name of the bound.
         what: &'static str,
     },
     /// What is applied never moved, and nobody says how far it may.
@@ -131,7 +131,7 @@ pub enum Refused {
         /// The sampling interval \[s\].
         interval: f64,
     },
-    /// So many samples that nobody meant it.
+    /// More samples than any reasonable experiment has.
     #[error(
         "--duration {} s holds {samples} samples at one every {} s, and {most} are the most that are searched; give a shorter one",
         shown(*duration),
@@ -152,7 +152,7 @@ pub enum Refused {
     Slew {
         /// Largest change in a second.
         slew: f64,
-        /// How far that leads.
+        /// Resulting change.
         moves: f64,
         /// The length \[s\].
         duration: f64,
@@ -193,7 +193,7 @@ pub struct Bounds {
     pub high: f64,
     /// Smallest and largest value in the records.
     pub visited: (f64, f64),
-    /// Where the two come from.
+    /// Source of the two values.
     pub range_from: &'static str,
     /// Largest change in a second, where there is a limit.
     pub slew: Option<f64>,
@@ -205,7 +205,7 @@ pub struct Bounds {
     pub samples: usize,
 }
 
-/// What the records visited of what is applied.
+/// Range of the applied signal in the records.
 fn visited(records: &[Record], looped: bool) -> (f64, f64) {
     let applied = |record: &Record| match (record.references.first(), looped) {
         (Some(reference), true) => reference.range(),
@@ -232,7 +232,7 @@ fn possible(problem: &Problem, looped: bool) -> Option<(f64, f64, &'static str)>
 }
 
 impl Bounds {
-    /// What sequences may do within them.
+    /// Limits for sequences.
     pub(crate) fn room(&self) -> Room {
         Room {
             low: self.low,
@@ -344,12 +344,12 @@ impl Bounds {
             other => {
                 let more = 0.25 * (self.high - self.low);
                 let (from, to) = other.map_or((f64::NEG_INFINITY, f64::INFINITY), |p| (p.0, p.1));
-                // What has never been negative stays so.
+                // A signal that has never been negative stays nonnegative.
                 let from = if self.low >= 0.0 { from.max(0.0) } else { from };
                 ((self.low - more).max(from), (self.high + more).min(to))
             }
         };
-        // What the slew cannot cross is no wider range.
+        // A range that the slew limit cannot cross is no wider range.
         let reaches = self
             .slew
             .is_none_or(|slew| slew * self.duration >= high - low);

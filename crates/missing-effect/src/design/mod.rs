@@ -62,16 +62,16 @@ impl Candidacy {
 
 /// Shares of the time limit after which the phases end: the fit of the believed model, ...
 const BELIEVED: f64 = 0.15;
-/// ... the fits of both effects, ...
+/// ... fits of both effects, ...
 const BOTH: f64 = 0.3;
-/// ... the trial of experiments, ...
+/// ... trials of experiments, ...
 const TRIALS: f64 = 0.5;
-/// ... the refits of the best of them, ...
+/// ... refits of the best experiments, ...
 pub(crate) const REFITS: f64 = 0.7;
-/// ... and the look at what could be done instead.
+/// ... and evaluation of alternatives.
 pub(crate) const INSTEAD: f64 = 0.8;
 
-/// Both alternatives on the records, and the metric in which they are compared.
+/// Both alternatives on the records, and the noise model for their comparison.
 struct Fitted<'a> {
     nodes: [Node<'a>; 2],
     base: Node<'a>,
@@ -189,7 +189,7 @@ impl<'a> Fitted<'a> {
     }
 }
 
-/// Both effects fitted to the records, in the metric of the noise that the better of them leaves.
+/// Both effects fitted to the records, weighted by the noise model of the better one.
 fn fitted<'a>(
     problem: &'a Problem,
     between: [Candidacy; 2],
@@ -220,7 +220,7 @@ fn fitted<'a>(
         Ok(nodes)
     };
     let [first, second] = [fits(between[0])?, fits(between[1])?];
-    // Whichever vessels are still open, the two are told apart only where the nearest are.
+    // If the vessels of the effects are not determined, the comparison uses the closest pair.
     let rough = first
         .iter()
         .flat_map(|a| second.iter().map(move |b| [a, b]))
@@ -236,7 +236,7 @@ fn fitted<'a>(
     let fit = &nodes[usize::from(nodes[1].fit.bic() < nodes[0].fit.bic())].fit;
     let scales = fit.scales();
     let base = refine(&base, &noise, &[])?;
-    // What was fitted in part would seem to be a twin of the model without it.
+    // An incomplete fit would seem identical to the model without the effect.
     if base.setup.out_of_time() {
         return Err(Refused::OutOfTime.into());
     }

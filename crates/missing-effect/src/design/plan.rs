@@ -22,14 +22,14 @@ pub struct Alternative {
     pub rmse: f64,
     /// By how much it lowers the criterion of the believed model.
     pub bic_gain: f64,
-    /// How a person confirms it at the plant; empty outside hydraulics.
+    /// How to confirm the effect at the plant; empty outside hydraulics.
     pub confirm: String,
 }
 
-/// From where to where a level moves in an experiment, by either model.
+/// Range of a level in an experiment, for either model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reach {
-    /// Its name: `level`, or `level_upper` and `level_lower`.
+    /// Name of the level: `level`, or `level_upper` and `level_lower`.
     pub level: String,
     /// Lowest, in the output's unit.
     pub low: f64,
@@ -50,18 +50,18 @@ pub struct Candidate {
     pub clock: f64,
     /// Levels of a staircase.
     pub levels: Option<usize>,
-    /// Which of several draws of a multi-level sequence.
+    /// Number of the random draw of a multi-level sequence.
     pub draw: Option<u64>,
-    /// It changes by at most so much in a second, where it was made slower than the limits ask for, to keep a controller off its
-    /// limits.
+    /// Largest change per second, if it is smaller than the limits require in order to keep a controller off its limits.
     pub slew: Option<f64>,
     /// What it gives.
     pub power: Power,
     /// The power is that of a refit; otherwise that of the models linearised at their fits.
     pub refitted: bool,
-    /// Where the levels go.
+    /// Ranges of the levels.
     pub reaches: Vec<Reach>,
-    /// How far a level leaves what it visited in the records, as a part of that: beyond it neither model is known.
+    /// Largest excursion of a level outside its range in the records, as a share of that range: outside the range neither model is
+    /// validated.
     pub excursion: f64,
     /// In a loop: the controller comes to a limit, where the loop is open.
     pub at_limit: bool,
@@ -70,15 +70,15 @@ pub struct Candidate {
 /// What a wider range would give.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Wider {
-    /// Its lower end.
+    /// Lower end.
     pub low: f64,
-    /// Its upper end.
+    /// Upper end.
     pub high: f64,
     /// The best experiment within it.
     pub best: Candidate,
 }
 
-/// What another sensor would give: the other level measured too, with the same noise.
+/// Benefit of another sensor: the other level measured too, with the same noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SecondSensor {
     /// The level that is not measured.
@@ -131,7 +131,7 @@ pub struct Design {
     pub wider: Option<Wider>,
     /// Repeated so many times, the best experiment would decide; `None` where it does already, or would not.
     pub times_as_long: Option<usize>,
-    /// What a second sensor would give, where the plant has another level.
+    /// Benefit of a second sensor, if the plant has another level.
     pub second_sensor: Option<SecondSensor>,
     /// The best experiment.
     pub experiment: Sequence,
@@ -139,7 +139,7 @@ pub struct Design {
     pub noise_floor: f64,
     /// The findings in words.
     pub sentences: Vec<String>,
-    /// What the time limit left out.
+    /// Steps that the time limit left out.
     pub effort: Effort,
     /// The plant, as the model file names it.
     pub plant: String,
@@ -150,7 +150,7 @@ pub struct Design {
 }
 
 impl Design {
-    /// The domain of the model, which says what things are called.
+    /// Physical domain of the model, which determines the words.
     #[must_use]
     pub fn domain(&self) -> Domain {
         domain_of(&self.plant, &self.output_unit)

@@ -1,4 +1,4 @@
-//! What a sensor in a tank whose level is not measured would add: it is measured too, with the noise of the first output.
+//! Benefit of a sensor in a tank whose level is not measured: the level is measured too, with the noise of the first output.
 
 use ct_signals::Record;
 use effect_search::design::least;

@@ -55,12 +55,12 @@ fn with_power(power: &Power) -> String {
     )
 }
 
-/// The same of an experiment, with what is to be known of it.
+/// Power of an experiment in words, with reservations.
 fn promised(candidate: &Candidate) -> String {
     format!("{}{}", with_power(&candidate.power), reservation(candidate))
 }
 
-/// What a power that is not confirmed is followed by.
+/// Reservation about a power that is not confirmed.
 fn reservation(candidate: &Candidate) -> &'static str {
     if candidate.refitted {
         ""
@@ -99,7 +99,7 @@ pub(super) fn described(candidate: &Candidate, unit: &str) -> String {
     sequence + &slowly
 }
 
-/// What the records say already.
+/// Evidence in the existing records.
 fn so_far(design: &Design) -> Vec<String> {
     let domain = design.domain();
     let [a, b] = &design.between;
@@ -156,7 +156,7 @@ fn so_far(design: &Design) -> Vec<String> {
     said
 }
 
-/// What there is to say, the experiment first.
+/// All sentences, the experiment first.
 pub(super) fn of(design: &Design) -> Vec<String> {
     let mut said = so_far(design);
     let unit = &design.experiment.unit;

@@ -1,4 +1,4 @@
-//! How far apart an experiment takes two models: the least misfit of the one to what the other would show.
+//! Separation of two models by an experiment: the least misfit of one model to the response of the other.
 //!
 //! [`effect_search::design`] has the noncentrality and its linear form.
 //!
@@ -39,7 +39,7 @@ pub(crate) struct Metric {
 }
 
 impl Metric {
-    /// What costs are divided by: the variance of the first output's innovations, in units of which outputs count \[output unit squared\].
+    /// Divisor of costs: the innovation variance of the first output, with the scaling of the outputs \[output unit squared\].
     pub fn variance(&self) -> f64 {
         self.scales[0].powi(2)
     }
@@ -101,7 +101,7 @@ pub(crate) fn linear(
     Some(effect_search::design::least(&rows, known) / metric.variance())
 }
 
-/// One model's simulation of the existing records.
+/// Simulation of the existing records by one model.
 pub(crate) fn noise_free(truth: &Node) -> Result<Vec<Record>, Error> {
     let mut series = truth.setup.simulate(&truth.fit.x)?.output.into_iter();
     let mut records = truth.setup.records.to_vec();
@@ -120,7 +120,7 @@ pub(crate) fn unlooped(node: &Node) -> Vec<f64> {
     x
 }
 
-/// What is known of a model's parameters beside the records, free of noise as the simulation of another model is: that one's values.
+/// Priors of a model's parameters with the values of another model, without noise like that model's simulation.
 pub(crate) fn priors_of_truth(truth: &Node, stand_in: &Node) -> BTreeMap<String, PriorValue> {
     let mut priors = stand_in.setup.prior_values();
     let names = truth.setup.names()[..truth.setup.parameter_count()].iter();
@@ -145,7 +145,8 @@ pub(crate) fn misfit_before(
     Ok(fit_from(&setup, &[unlooped(stand_in)], &metric.noise, FINE)?.cost)
 }
 
-/// The same with the experiment among the records, in units of the noise and beyond what was there `before`.
+/// Separation with the experiment among the records and the parameters refitted, in units of the noise and in excess of the separation
+/// `before`.
 pub(crate) fn refitted(
     existing: &[Record],
     simulated: &SimulatedExperiment,

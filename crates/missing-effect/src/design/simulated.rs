@@ -5,7 +5,7 @@ use plants::{Command, MAX_VESSELS, Simulator, Structure, controller::Controller}
 
 use crate::fit::node::Node;
 
-/// What the experiment is applied to.
+/// Open or closed loop of the experiment.
 #[derive(Debug, Clone)]
 pub(crate) enum Loop<'a> {
     /// The command itself.
@@ -33,7 +33,7 @@ const MOST_SETTLING: usize = 20_000;
 /// Parts of a time constant in which a plant without a loop settles.
 const PARTS: f64 = 4.0;
 
-/// Where it settles under the first value: levels, and the command.
+/// Steady state under the first value: levels, and the command.
 struct Rest {
     levels: [f64; MAX_VESSELS],
     command: f64,
@@ -85,7 +85,7 @@ fn rest(node: &Node, into: &Loop, first: f64, interval: f64, time_constant: f64)
         Loop::Closed(controller) => {
             let mut simulator = Simulator::<f64>::new(&structure, &theta, levels, middle).ok()?;
             simulator.set_substeps(node.setup.substeps);
-            // All of the command in the state that it sees.
+            // The command without its state before saturation.
             let seen = controller.linear(interval).c;
             let states: Vec<f64> = seen.iter().map(|c| c * middle).collect();
             let mut regulator = controller.start(&states);

@@ -12,7 +12,7 @@ const HEAD: usize = 5;
 pub(crate) struct HeldOut {
     /// A series for each record and output.
     pub series: Vec<Vec<f64>>,
-    /// Of each output: samples that are scored, their root mean square error, and its parts.
+    /// For each output: number of scored samples, their root mean square error, and its parts.
     pub outputs: Vec<(usize, f64, HeldOutError)>,
 }
 

@@ -1,4 +1,4 @@
-//! What one fitted model shows: its errors, where it fails, and whether its residual is noise.
+//! Diagnostics of one fitted model: its errors, where it fails, and whether its residual is noise.
 //!
 //! In this order: `remains.rs` (tests whether the residual is noise), `locate/` (where it fails: times, levels, frequencies), `held_out.rs` (its error on
 //! other records), `step.rs` (all of these for the report), `unknown/` (the shape of what no effect explains), `assemble.rs` (the

@@ -31,14 +31,14 @@ use crate::{
 /// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
 const NOT_NOISE: f64 = 1e-4;
 
-/// What a residual shows that noise does not; the first that was found.
+/// Structure of a residual that noise does not explain; the first one found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Remains {
     /// The command.
     Input,
     /// A period \[s\].
     Period(f64),
-    /// Something from an instant on, for a while \[s\].
+    /// An abrupt change from an instant on, for a while \[s\].
     Instant(f64, f64),
     /// The level.
     Level,
@@ -46,7 +46,7 @@ pub(crate) enum Remains {
     Slow(f64, f64),
 }
 
-/// What a residual shows that noise does not, in which of the fitted records, where it is one of them, and at which output.
+/// Structure of a residual that noise does not explain, with its record, if it is in one of the fitted records, and its output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Left {
     pub what: Remains,
@@ -67,7 +67,7 @@ impl Left {
     }
 }
 
-/// What the residual of a model holds that is not noise; `own` is its fit with the colour of its own residual.
+/// Structure in the residual of a model that is not noise; `own` is the model's fit with the noise model of its own residual.
 pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
     let outputs = node.setup.outputs();
     let (p, series) = least_p(node, None, of_command)?;
@@ -125,7 +125,7 @@ pub(crate) fn input_p(node: &Node, output: usize) -> Result<f64, Error> {
     Ok(least_p(node, Some(output), |u| vec![u.to_vec()])?.0)
 }
 
-/// The same for all signals that are made of a record's commands, and the series that shows it most.
+/// The least p-value over all signals derived from a record's commands, and the series with this value.
 fn least_p(
     node: &Node,
     output: Option<usize>,
@@ -153,7 +153,7 @@ fn least_p(
             .par_iter()
             .map(
                 |signal| match prewhitened_input_test(signal, residual, lags) {
-                    // Too few pairs of samples are there: it says nothing.
+                    // Too few pairs of samples: no test is possible.
                     Err(ct_signals::Error::TooFewSamples { .. }) => Ok((Vec::new(), 1.0)),
                     tested => tested,
                 },

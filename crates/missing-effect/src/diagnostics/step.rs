@@ -1,4 +1,4 @@
-//! From a fitted node to what is reported of it.
+//! Report of a fitted model.
 
 use ct_signals::{ArModel, Clock, Record, residual_tests};
 use greybox::{Fit, Noise, Setup, robust, weighted_rms};
@@ -83,7 +83,7 @@ fn tests(node: &Node, residuals: &[Vec<f64>], output: usize) -> Result<ResidualT
         lags,
     ))?
     .unwrap_or((vec![f64::NAN; lags + 1], f64::NAN));
-    // As many pairs of samples are there as the square of the share of samples.
+    // The share of pairs of samples is the square of the share of samples.
     let bound = 1.96 * (record.len() as f64).sqrt() / samples.max(1) as f64;
     Ok(ResidualTests {
         autocorrelation: residual_tests::autocorrelation(residual, lags),
@@ -96,9 +96,8 @@ fn tests(node: &Node, residuals: &[Vec<f64>], output: usize) -> Result<ResidualT
     })
 }
 
-/// The report of one node; `bic` is its criterion under the colour of its own residual, `judge` the noise
-/// against which its residual is judged; `widen`: the standard errors allow
-/// for the bias of feedback.
+/// Report of one model; `bic` is its criterion with the noise model of its own residual, `judge` the noise for the residual tests; `widen`:
+/// the standard errors allow for the bias of feedback.
 pub(crate) fn report(
     node: &Node,
     bic: f64,

@@ -1,4 +1,4 @@
-//! When one set of effects is better than another: by the criterion (BIC), and by more than chance among all that was tried.
+//! Comparison of two sets of effects: by the criterion (BIC), and by significance over all trials.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -6,9 +6,9 @@ use super::node::Node;
 
 /// An effect is accepted where its criterion falls by more than this ...
 pub(crate) const BIC_MARGIN: f64 = 6.0;
-/// ... and where chance would let so large a fall happen less often than this, counted over all candidates.
+/// ... and if chance would cause such a fall less often than this, over all candidates.
 const FALSE_CLAIM: f64 = 0.003;
-/// What stands in for another lies within this of its criterion.
+/// An alternative to another effect is within this distance of its criterion.
 pub const GROUP_MARGIN: f64 = 6.0;
 
 /// Whether a set of effects lowers the deviance by more than chance would where there is nothing; each in the same metric, or

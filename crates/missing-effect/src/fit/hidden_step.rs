@@ -28,7 +28,7 @@ const STEPS: (f64, f64) = (2.0, 300.0);
 /// take long: then only coarse steps are looked for.
 const LOOKED_AT: f64 = 3e8;
 
-/// Where the step of a sensor stands in the vector.
+/// Position of a sensor's quantisation step in the parameter vector.
 pub(crate) fn step_of(setup: &Setup) -> Option<usize> {
     setup.names().iter().position(|name| name == STEP)
 }
@@ -78,7 +78,7 @@ pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, 
     };
     let finer = grid / FINER as f64;
     let best = best_of(near - grid, finer, 2 * FINER + 1);
-    // No coarser than a fit may take it: the start that was picked is known by its value (`Structure::ways`).
+    // The grid is no coarser than a fit needs: the selected start is identified by its value (`Structure::ways`).
     let structure = &node.setup.structure;
     let visited = structure.scales.level[structure.scales.outputs[output].vessel];
     let coarsest = 0.5 * (visited.1 - visited.0);
@@ -88,7 +88,7 @@ pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, 
     }))
 }
 
-/// What is left of a residual beside the sawtooth of a step, which is so many turns for a unit of the level.
+/// Residual without the sawtooth error of a quantisation step, with this number of periods per unit of the level.
 fn without_sawtooth(model: &[f64], residual: &[f64], turns: f64) -> Vec<f64> {
     // Added and taken off again, it leaves the nearest whole number; `f64::round` is a call for every sample.
     const WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
@@ -153,7 +153,7 @@ mod tests {
                 "{} for {step}",
                 found.value
             );
-            // It is what a fit needs to name it.
+            // A fit needs this frequency to name the step.
             let noise = node.setup.white_noise();
             assert_eq!(singles(&node, &noise)[0].added[0].effect.id, EFFECT);
         }
@@ -164,7 +164,7 @@ mod tests {
         let problem = simulated::tank(|u| u, |_, level| level, 0.0, 7);
         let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
         let found = hidden_step(&node, 0).unwrap().unwrap();
-        // From two to as many as the noise leaves room for, over the range of the readings.
+        // From two steps to as many as the noise permits, over the range of the readings.
         assert!(found.of > 100.0);
         let placed = Placed {
             effect: EffectInfo::find(EFFECT).unwrap(),

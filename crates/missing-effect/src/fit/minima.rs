@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// After one rough fit, a second one and a third one, so many times the least cost is out of reach of its minimum.
+/// After a first, second and third rough fit, a minimum is hopeless if the cost exceeds the least cost by this factor.
 const HOPELESS: [f64; 3] = [1.5, 1.15, 1.05];
 
 /// The node's minimum against those that so many starts around it reach.
@@ -61,7 +61,7 @@ fn descend(node: &mut Node, starts: Vec<Vec<f64>>, noise: &Noise) -> Result<(), 
             .into_par_iter()
             .filter_map(|start| fit_onward(&node.setup, vec![start], noise, ROUGH).ok())
             .collect();
-        // What is far behind by then ends elsewhere.
+        // Fits far above the least cost end in another minimum.
         let least = rough
             .iter()
             .map(|fit| fit.cost)

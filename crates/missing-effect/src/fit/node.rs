@@ -5,7 +5,7 @@ use plants::{ParameterInfo, Placed};
 
 use crate::Error;
 
-/// Where the fit of a believed model stops.
+/// Stopping criteria of the fit of a believed model.
 pub(crate) const STOPPING: Stopping = Stopping {
     evaluations: 120,
     cost: 1e-9,
@@ -16,19 +16,19 @@ pub(crate) const ROUGH: Stopping = Stopping {
     evaluations: 20,
     cost: 1e-3,
 };
-/// Which of many are worth a first fit.
+/// Stopping criteria of a first fit of many candidates.
 pub(crate) const QUICK: Stopping = Stopping {
     evaluations: 5,
     cost: 1e-3,
 };
-/// What a fit is taken to once its structure has a name.
+/// Stopping criteria of a final fit.
 pub(crate) const FINE: Stopping = Stopping {
     evaluations: 80,
     cost: 1e-8,
 };
 /// Random starts of a set without one of its effects, where it cannot be simulated with the parameters that it had.
 const OTHER_STARTS: usize = 12;
-/// What a valve does that sticks, and the width of its band, as a part of what the command moves over, below which a loop imitates it.
+/// Valve stiction, and the width of its band relative to the range of the command below which feedback resembles it.
 pub(crate) const STICTION: &str = "stiction_backlash";
 const NARROW: f64 = 0.25;
 
@@ -37,7 +37,7 @@ const NARROW: f64 = 0.25;
 pub(crate) struct Node<'a> {
     pub setup: Setup<'a>,
     pub fit: Fit,
-    /// What was added to the base, in order.
+    /// Effects added to the base, in order.
     pub added: Vec<Placed>,
 }
 
@@ -71,7 +71,7 @@ impl Node<'_> {
     }
 }
 
-/// Where a parameter of an effect stands in the vector.
+/// Position of an effect's parameter in the vector.
 pub(crate) fn position_of(setup: &Setup, placed: Placed, parameter: &str) -> Option<usize> {
     let name = format!("{}.{parameter}", placed.effect.id);
     setup.names().iter().position(|known| *known == name)
@@ -130,7 +130,7 @@ pub(crate) fn without<'a>(
         .with_structure(node.setup.structure.without(node.added[position].effect))?;
     let start = transfer(node, &setup);
     let fit = match fit_from(&setup, &[start], noise, stopping) {
-        // Some parameters hold beside the effect alone.
+        // Some parameters are valid only together with the effect.
         Err(greybox::Error::Estimation(greybox::NoFit::NoFiniteStart { .. })) => {
             let others = random_starts(&setup, OTHER_STARTS, 1);
             fit_from(&setup, &others, noise, stopping)?

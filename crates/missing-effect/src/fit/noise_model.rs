@@ -70,7 +70,7 @@ pub(crate) fn slowness_of(noise: &ArModel) -> f64 {
     ((noise.sigma() / (1.0 - sum)).powi(2) / noise.stationary_std().powi(2)).max(1.0)
 }
 
-/// The same of several outputs together: samples over independent samples.
+/// Samples per independent sample for several outputs together.
 pub(crate) fn slowness(noise: &Noise, samples: &[usize]) -> f64 {
     if let [only] = samples {
         return if *only > 0 {

@@ -17,8 +17,8 @@ use super::{
 const PERIOD: &str = "periodic_disturbance.period";
 const PERIODS_SHOWN: usize = 6;
 
-/// Of starts with many periods keeps those whose periods show most in what is not explained without the effect: a plant answers a
-/// swing with a swing of that period, and a Fourier sum costs far less than a simulation.
+/// Among starts with many periods, keeps those with the largest spectral lines in the residual without the effect: a plant responds to an
+/// oscillation with the same period, and a Fourier sum is much cheaper than a simulation.
 pub(crate) fn keep_shown_periods(
     setup: &Setup,
     placed: Placed,
@@ -83,7 +83,7 @@ fn power_at(frequency: f64, series: &[(&Record, Vec<f64>)]) -> f64 {
     series.iter().map(of_one).sum()
 }
 
-/// Where the period of a swing stands in the vector.
+/// Position of the period of an oscillation in the vector.
 pub(crate) fn period_of(setup: &Setup) -> Option<usize> {
     setup.names().iter().position(|name| name == PERIOD)
 }

@@ -1,4 +1,4 @@
-//! What a set may be extended by, and what that promises.
+//! Extensions of a set by one effect, and the predicted reduction of the cost.
 
 use std::sync::OnceLock;
 
@@ -13,7 +13,7 @@ use crate::fit::{
     starts::grid,
 };
 
-/// Damping of the step that a promise takes, against what the data do not determine.
+/// Damping of the step for the predicted reduction, against directions that the data do not determine.
 const PROMISE_DAMPING: f64 = 1e-6;
 /// Starts of a new effect that are followed down, the most promising of its grid.
 const FOLLOWED: usize = 2;
@@ -45,7 +45,7 @@ fn promise(setup: &Setup, x: &[f64], triangle: &Triangle) -> f64 {
     triangle.predicted(&step)
 }
 
-/// One effect more, at its most promising starts.
+/// One more effect, at its best starts by predicted reduction.
 #[derive(Clone)]
 pub(crate) struct Proposal<'a> {
     pub setup: Setup<'a>,
@@ -78,8 +78,8 @@ impl<'n, 'a> Parent<'n, 'a> {
         if placed.effect.id == hidden_step::EFFECT
             && structure.scales.outputs[output].reading_step == 0.0
         {
-            // One effect asks for it. It is looked for by all threads, and must not be kept in a cell: a thread that waits for the
-            // others may take up the next proposal, which would ask the cell that it is filling.
+            // Only one effect needs this step. All threads compute it, and it must not be stored in a cell: a thread that waits for the
+            // others may start the next proposal, which would read the cell that is being filled.
             let step = hidden_step(self.node, output).ok().flatten();
             structure.scales.outputs[output].hidden_step = step;
         }
@@ -120,7 +120,7 @@ pub(crate) fn promising(
 ) -> Option<(f64, Vec<Start>)> {
     let mut starts = grid(from, setup, placed);
     if from.added.len() > 1 {
-        // Beside a pair, what is the third is looked for on a coarser grid.
+        // For pairs, a third effect is searched on a coarser grid.
         starts = every_so_many(starts, COARSE);
     }
     keep_shown_periods(setup, placed, &mut starts, noise);
@@ -184,13 +184,13 @@ fn widened<'a>(node: Node<'a>, noise: &Noise, stopping: Stopping) -> Node<'a> {
     again().unwrap_or(node)
 }
 
-/// All single extensions of a node, refitted, best first.
+/// All extensions of a set by one effect, refitted, best first.
 pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &Noise) -> Vec<Node<'a>> {
     let proposals = proposals(parent, noise);
     best_first(realise_all(proposals, noise, ROUGH))
 }
 
-/// All extensions of a node by one effect, not fitted, the most promising first.
+/// All extensions of a set by one effect, not fitted, with the largest predicted reduction first.
 pub(crate) fn proposals<'a>(parent: &Node<'a>, noise: &Noise) -> Vec<Proposal<'a>> {
     let from = Parent::new(parent);
     let mut proposals: Vec<Proposal> = candidates(parent)
@@ -212,7 +212,7 @@ pub(crate) fn realise_all<'a>(
         .collect()
 }
 
-/// What may be added to a set.
+/// Effects that may be added to a set.
 pub(crate) fn candidates(parent: &Node) -> Vec<Placed> {
     let mut candidates = parent.setup.structure.candidates();
     let on = parent.setup.structure.effects().iter();

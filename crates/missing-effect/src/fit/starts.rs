@@ -1,12 +1,12 @@
-//! Where the fit of a set with one effect more begins: the grid of the effect's own starts, beside other values of the plant where these matter.
+//! Starts of a fit with one more effect: the grid of the effect's starts, combined with other values of the plant if these matter.
 
 use greybox::{Setup, with_other_speeds};
 use plants::{Place, Placed, Plant, Unit};
 
 use super::node::{Node, position_of, transfer};
 
-/// Effects that the believed model of two tanks imitates by too large a throughput: tanks that push on each other, and what water
-/// leaves the upper tank by beside its outlet.
+/// Effects that the believed model of two tanks compensates for by too large a flow: coupled tanks, and additional outflow from the upper
+/// tank.
 const COUPLED: &str = "coupled_tank";
 const LEAVES: [&str; 2] = ["overflow", "leak_at_height"];
 

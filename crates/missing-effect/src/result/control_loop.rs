@@ -12,7 +12,7 @@ pub struct ControlLoop {
     /// Measured command less the one that the controller gives on the measured reading, root mean square, in the input's
     /// unit; `None` where that was not looked at.
     pub mismatch: Option<f64>,
-    /// What the user should know of it, in words.
+    /// Notes on the loop for the user, in words.
     pub said: Vec<String>,
 }
 

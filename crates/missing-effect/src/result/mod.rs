@@ -34,12 +34,12 @@ pub(crate) use self::{
     unknown::SHAPES,
 };
 
-/// How times are said where no calendar is known.
+/// Format of times without a calendar.
 fn plain_clock() -> Clock {
     Clock::of([])
 }
 
-/// What was spent, and what the limit on the time left out.
+/// Time spent, and steps that the time limit left out.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Effort {
     /// Limit on the search \[s\]; `None`: no limit.
@@ -50,30 +50,30 @@ pub struct Effort {
     pub interrupted: bool,
 }
 
-/// What a diagnosis found. Read again from JSON it has all that is written there; records, simulated series and the clock are not.
+/// Result of a diagnosis. A result that is read from JSON has everything except records, simulated series and the clock.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Version of this layout.
     pub schema: u32,
     /// The finding; after a comparison, which searches nothing, `Unexplained` where the model lacks something.
     pub verdict: Verdict,
-    /// How the times of the records are said.
+    /// Format of the times of the records.
     #[serde(skip, default = "plain_clock")]
     pub clock: Clock,
-    /// What was done about rows and samples of inputs that are missing; `None` where none are.
+    /// Handling of missing rows and samples of inputs; `None` if there are none.
     pub gaps: Option<MendedGaps>,
     /// The effects that were added, in order.
     pub effects: Vec<String>,
-    /// For each of them itself, then all that cannot be told apart from it on these data, best first.
+    /// For each added effect: the effect and all effects that these data cannot distinguish from it, best first.
     pub groups: Vec<Vec<String>>,
-    /// For each of them whether it is uncertain: its size is at a bound of its plausible range, so that it describes the data
-    /// rather than explains them.
+    /// For each added effect whether it is uncertain: its size is at a bound of its plausible range, so that it may describe the data
+    /// without being the cause.
     pub in_doubt: Vec<bool>,
-    /// For each of them the places where it may act, most likely first; one where there is no choice.
+    /// For each added effect the places where it may act, most likely first; one place if there is no choice.
     pub places: Vec<Vec<PlaceScore>>,
     /// The acceptance test; `None` after a comparison, which searches nothing, and where the model is adequate.
     pub acceptance: Option<Acceptance>,
-    /// What the last model leaves is more than noise: something is missing still, or a disturbance acts.
+    /// The residual of the last model is more than noise: an effect is missing, or a disturbance acts.
     pub residual_unexplained: bool,
     /// The single effects, best first, at the first step; `none` first when the model is adequate.
     pub ranked: Vec<String>,
@@ -94,7 +94,7 @@ pub struct Diagnosis {
     pub effort: Effort,
     /// The scores of the single effects at the first step, best first.
     pub scores: Vec<Score>,
-    /// What is missing where the catalogue does not explain it.
+    /// The unexplained error, if the catalogue does not explain it.
     pub unknown: Option<Unknown>,
     /// The loop that the records come from, where there is one.
     pub control_loop: Option<ControlLoop>,

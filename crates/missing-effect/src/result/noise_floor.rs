@@ -44,7 +44,7 @@ impl Floors {
         Ok(Noise::of(models?))
     }
 
-    /// The floors, which no model that was fitted lies below: what it leaves holds the noise.
+    /// Limits the noise floors by the errors of the fitted models: a model's error contains the noise.
     pub fn at_most(mut self, rmse: &[f64]) -> Self {
         for (floor, rmse) in self.0.iter_mut().zip(rmse) {
             floor.level = floor.level.min(*rmse);

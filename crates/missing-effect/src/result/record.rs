@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Shown {
     /// Name.
     pub name: String,
-    /// It took no part in any fit or choice.
+    /// Whether the record was held out: not used for fits or selection.
     pub held_out: bool,
     /// Sampling instants \[s\].
     #[serde(deserialize_with = "crate::result::numbers")]
@@ -22,11 +22,11 @@ pub struct Shown {
 /// An input of a record as the report shows it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShownInput {
-    /// How it is called: `input`, `input 2`, or its own name.
+    /// Name of the signal: `input`, `input 2`, or its own name.
     pub name: String,
-    /// Its unit; empty where none is known.
+    /// Unit of the signal; empty if unknown.
     pub unit: String,
-    /// Its samples \[unit\].
+    /// Samples of the signal \[unit\].
     #[serde(deserialize_with = "crate::result::numbers")]
     pub values: Vec<f64>,
 }

@@ -18,7 +18,7 @@ pub(crate) const SHAPES: [Name; 8] = [
     "swing",
 ];
 
-/// How likely the missing term acts at a place.
+/// Likelihood of a place of the missing term.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlaceLikelihood {
     /// `actuator`, `vessel` (`upper` or `lower` of two) or `sensor` (`sensor upper` of several).
@@ -28,7 +28,7 @@ pub struct PlaceLikelihood {
     pub below_best: f64,
 }
 
-/// How much of the missing term a variable predicts.
+/// Share of the missing term that a variable predicts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Share {
     /// The place.
@@ -39,7 +39,7 @@ pub struct Share {
     /// Share of the fall of the squared error that is reached on parts of the data that were not fitted; one is all of it.
     #[serde(deserialize_with = "crate::result::number")]
     pub share: f64,
-    /// Its standard error, from the scatter between the parts.
+    /// Standard error of the share, from its variation between the parts.
     #[serde(deserialize_with = "crate::result::number")]
     pub std_error: f64,
 }
@@ -63,10 +63,10 @@ fn variable_name<'de, D: serde::Deserializer<'de>>(from: D) -> Result<&'static s
 /// A stretch of time in which the missing term is clearly not zero.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Window {
-    /// Its beginning, in the record's time \[s\].
+    /// Begin in the record's time \[s\].
     #[serde(deserialize_with = "crate::result::number")]
     pub from: f64,
-    /// Its end \[s\].
+    /// End \[s\].
     #[serde(deserialize_with = "crate::result::number")]
     pub to: f64,
     /// Mean of the missing term in it, in the term's unit.
@@ -77,7 +77,7 @@ pub struct Window {
 /// What is missing where the catalogue does not explain it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unknown {
-    /// Where it acts: `actuator`, `vessel` (of several by its name, `upper` or `T1`) or `sensor`.
+    /// Place of the term: `actuator`, `vessel` (of several by its name, `upper` or `T1`) or `sensor`.
     pub place: String,
     /// Unit of the term: of the command, of a flow, or of the reading.
     pub unit: String,
@@ -98,14 +98,14 @@ pub struct Unknown {
     /// Standard deviation of the measurement noise beside it, in the output's unit; of several outputs relative to the weighted mean.
     #[serde(deserialize_with = "crate::result::number")]
     pub noise: f64,
-    /// Where it is clearly not zero, the strongest first.
+    /// Windows in which the term differs clearly from zero, the strongest first.
     pub windows: Vec<Window>,
     /// Root mean square of the residual that it leaves, in the output's unit.
     #[serde(deserialize_with = "crate::result::number")]
     pub rmse: f64,
     /// Every variable, the best first.
     pub shares: Vec<Share>,
-    /// What it depends on: `level`, `rate`, `input`, or `time` where none of them predicts it.
+    /// Variable of the term: `level`, `rate`, `input`, or `time` if none of these predicts it.
     #[serde(deserialize_with = "variable_name")]
     pub variable: Name,
     /// Unit of the variable.
@@ -129,7 +129,7 @@ pub struct Primitive {
     /// `constant`, `line`, `square root`, `parabola`, `threshold`, `end of a range`, `step` or `swing`.
     #[serde(deserialize_with = "family_name")]
     pub name: Name,
-    /// Where a threshold or a step lies, or the period of a swing, in the variable's unit.
+    /// Location of a threshold or a step, or the period of an oscillation, in the variable's unit.
     pub at: Option<f64>,
     /// Effects of the catalogue that leave such a shape.
     #[serde(deserialize_with = "effect_names")]

@@ -12,15 +12,16 @@ use crate::{
     search::exchange::{NEAR, exchanges},
 };
 
-/// Of the exchanges that come near so many are followed, the best; ...
+/// Number of the best swap steps that are refitted; ...
 const EXCHANGES: usize = 6;
-/// ... one of as many effects is taken where the criterion falls by this.
+/// ... a swap to the same number of effects is accepted if the criterion falls by this.
 const CLEARLY: f64 = 1.0;
 
 /// Takes out, one by one, what the noise explains as well, first what is worth least.
 pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     loop {
-        // Each has its own share of the risk: that the one which is worth least is beyond chance says nothing of the others.
+        // Each effect is tested with a share of the significance level: a significant weakest effect does not imply that the others are
+        // significant.
         let lacking = each_lacking(&node, noise)?.into_iter();
         let doubtful = lacking.filter(|lacking| {
             node.gain_over(lacking) <= BIC_MARGIN || !beyond_chance(&node, lacking)

@@ -19,7 +19,7 @@ const EXCHANGED: usize = 12;
 /// In a set of more than so many effects half as many, and a few steps for so many: a fit costs several times as much.
 const LARGE: usize = 2;
 const QUICKLY: usize = 16;
-/// What is behind by more than this part of an effect's own gain after a few steps does not catch up.
+/// A swap that is worse by more than this share of an effect's own gain after a few steps is dropped.
 const OUT_OF_REACH: f64 = 0.5;
 
 /// The node with one of its effects exchanged for each other candidate, refitted, best first.
@@ -77,7 +77,7 @@ fn carried(node: &Node, own: Placed, stand_in: &Node) -> Option<Vec<f64>> {
     }
     let mut x = transfer(node, &stand_in.setup);
     x[into] = node.fit.x[at].clamp(to.lower, to.upper);
-    // What else the stand-in has is where it is.
+    // The other parameters of the alternative keep their values.
     for (name, (value, fitted)) in stand_in
         .setup
         .names()
@@ -105,8 +105,8 @@ fn begin_exchanges<'a>(
         .filter_map(|placed| {
             let mut proposal = propose(&from, placed, noise)?;
             proposal.starts.truncate(1);
-            // The model that lacks the effect has bent the other parameters to imitate it, and may have lost its way back.
-            // Beside a true stand-in they are where they are beside the effect itself.
+            // In the model without the effect, the other parameters have changed to compensate for it, and a fit from there may miss the
+            // minimum. With an equivalent alternative, the parameters have nearly the values that they have with the effect.
             if let Some((promise, starts)) = promising(node, &proposal.setup, placed, noise) {
                 proposal.starts.extend(starts.into_iter().take(1));
                 proposal.promise = proposal.promise.min(promise);
@@ -121,8 +121,8 @@ fn begin_exchanges<'a>(
         proposals.truncate(QUICKLY);
         EXCHANGED / 2
     };
-    // A promise is that of a straight line: where a time constant or a threshold bends it, only a few steps show what it is
-    // worth. A few steps are too few where parameters nearly imitate each other, and there the promise holds.
+    // The predicted reduction is linear: with nonlinear parameters such as a time constant or a threshold, only a few iterations show the
+    // actual reduction. If parameters are nearly collinear, a few iterations are too few, and the predicted reduction is used.
     let mut begun: Vec<(usize, Node)> = proposals
         .into_par_iter()
         .enumerate()

@@ -24,12 +24,12 @@ const BEAM: usize = 3;
 const REFITS: usize = 12;
 /// Sets are grown side by side up to so many effects, ...
 const SIDE_BY_SIDE: usize = 3;
-/// ... and one by one to so many where they pay.
+/// ... and one by one up to this number while the criterion falls.
 const RICHEST: usize = 6;
 /// In the metric of a noise that wanders they are grown to so many.
 const WANDERING: usize = 2;
 
-/// What the search found.
+/// Result of the search.
 pub(crate) struct Found<'a> {
     /// The richest model in play, by simulation error; its residual gives the noise.
     pub richest: Node<'a>,
@@ -42,16 +42,16 @@ pub(crate) struct Found<'a> {
     pub confirmed: Node<'a>,
     /// The sets that were grown by simulation error.
     pub grown: Grown<'a>,
-    /// Those that were grown in the weighting of the noise, where it is not white.
+    /// Sets that were grown with the noise model as weighting, if the noise is not white.
     pub prewhitened: Option<Grown<'a>>,
     /// Whether the noise wanders.
     pub wandering: bool,
-    /// Whether it does and something is confirmed: then models are compared and shown by their simulation error.
+    /// Whether the noise is not white and effects are confirmed: then models are compared and shown by their simulation error.
     pub by_simulation: bool,
 }
 
 impl<'a> Found<'a> {
-    /// All sets that were grown, in either weighting.
+    /// All sets that were grown, with either weighting.
     pub fn sets(&self) -> Vec<&Node<'a>> {
         let grown = std::iter::once(&self.grown).chain(&self.prewhitened);
         grown.flat_map(|grown| &grown.sizes).flatten().collect()
@@ -67,16 +67,16 @@ pub(crate) fn find<'a>(
     let breadth = Breadth {
         beam: BEAM,
         refits: REFITS,
-        // What may be added does not bound what is tried: only the richest model shows what is noise.
+        // The permitted number of effects does not limit the trials: only the largest model shows the noise.
         most: most.max(RICHEST),
     };
     let pays = |before: &Node, after: &[Node]| {
         let best = after.first();
         best.is_some_and(|best| best.gain_over(before) > BIC_MARGIN)
     };
-    // While the colour is not known, a coloured noise would pay for one effect after the other: what counts is what remains of
-    // the gain where each model has the colour of its own residual. Any set of a size may show it: the one with the least
-    // simulation error may be rough from sample to sample.
+    // While the noise model is not known, coloured noise would justify one effect after the other. Therefore the gain is computed with a
+    // noise model of each model's own residual. Any set of a size may show the gain: the set with the least simulation error may be rough
+    // from sample to sample.
     let pays_in_colour = |before: &Node, after: &[Node]| {
         let least = || {
             let all = after.par_iter().map(bic_in_colour);
@@ -138,7 +138,7 @@ pub(crate) fn find<'a>(
             &noise,
             breadth,
             pays,
-            // It was exhausted in this colour, which is that of its own residual, and its pairs were looked at there.
+            // The search with this noise model (that of the set's own residual) has converged, including its pairs.
             |node| {
                 if grown.exhausted_by(node) {
                     Ok(Rest::Noise)

@@ -78,7 +78,7 @@ fn within_bounds<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> 
     Ok(node)
 }
 
-/// What sets are grown from, and which are accepted.
+/// Start sets of the search, and the accepted ones.
 #[derive(Clone, Copy)]
 struct Floating<'n, 'a> {
     base: &'n Node<'a>,

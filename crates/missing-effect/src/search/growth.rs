@@ -19,7 +19,7 @@ use crate::{
 /// Sets are one where what they explain differs by less than this part of it.
 const SAME_TAKEN: f64 = 0.15;
 
-/// How wide to search.
+/// Breadth of the search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Breadth {
     /// Sets that are grown from one size to the next.
@@ -89,7 +89,7 @@ fn squares(values: impl Iterator<Item = f64>) -> f64 {
 pub(crate) struct Grown<'a> {
     /// The best sets of every size, from the base on, best first within a size.
     pub sizes: Vec<Vec<Node<'a>>>,
-    /// All single effects that were refitted, and those that were not promising enough for it.
+    /// All single effects that were refitted, and those whose predicted reduction was too small.
     refitted: Vec<Node<'a>>,
     unpromising: Vec<Proposal<'a>>,
     /// The set that was exhausted, where the growth ended so.
@@ -120,7 +120,7 @@ impl<'a> Grown<'a> {
         self.sizes[size].sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     }
 
-    /// What [`singles`](crate::fit::proposal::singles) gives for the base in the metric in which it was grown.
+    /// Result of [`singles`](crate::fit::proposal::singles) for the base, with the weighting of the search.
     pub fn singles(&self, noise: &Noise) -> Vec<Node<'a>> {
         let mut nodes = self.refitted.clone();
         nodes.extend(realise_all(self.unpromising.clone(), noise, ROUGH));
@@ -242,7 +242,7 @@ pub(crate) fn extensions<'a>(
     width: usize,
     noise: &Noise,
 ) -> Result<Vec<Proposal<'a>>, Error> {
-    // What follows time alone bends to whatever is missing: it is added last.
+    // Functions of time fit any missing effect: they are added last.
     let timeless = |node: &&Node| node.added.len() < PAIR || !by_clock(node);
     let parents: Vec<Node<'a>> = parents.iter().filter(timeless).cloned().collect();
     let parents: Vec<Parent> = distinct(base, &parents, width)?

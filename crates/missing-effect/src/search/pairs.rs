@@ -23,7 +23,7 @@ use crate::fit::{
 
 /// Points at which a candidate is linearised, at most.
 const POINTS: usize = 3;
-/// Of sets of so many samples times columns, the inner products are not taken.
+/// For sets with more samples times columns than this, the inner products are not computed.
 const LARGEST: usize = 40_000_000;
 /// Ridge of the normal equations, against columns that imitate each other.
 const RIDGE: f64 = 1e-9;
@@ -36,7 +36,7 @@ struct Linearised<'a> {
     setup: Setup<'a>,
     /// Whitened: the effect's columns, then what the effect changes in the residual.
     columns: Vec<Vec<f64>>,
-    /// How far each of the effect's parameters may move, down and up.
+    /// Range of each parameter of the effect, down and up.
     room: Vec<(f64, f64)>,
 }
 
@@ -49,7 +49,7 @@ pub(crate) fn joint_pairs<'a>(
     count: usize,
     taken: impl Fn(&[Placed]) -> bool,
 ) -> Vec<Proposal<'a>> {
-    // Outputs count against each other as beside the base.
+    // Outputs have the weights of the base.
     let metric = (noise, &base.fit.weights[..], base.fit.prior_weight());
     let Some((own, residual)) = whitened(&base.setup, &base.fit.x, metric, |_| true) else {
         return Vec::new();
@@ -242,7 +242,7 @@ fn joined<'a>(
     promise: f64,
 ) -> Option<Proposal<'a>> {
     let mut structure = first.setup.structure.with(second.placed).ok()?;
-    // What was picked from the residual for the one is a start of the other's too.
+    // A start that was selected from the residual for one effect is a start for the other one too.
     let picked = &second.setup.structure.scales;
     if structure.scales.period == 0.0 {
         structure.scales.period = picked.period;

@@ -1,4 +1,4 @@
-//! What each single effect of the catalogue does to the believed model, and what the data would show of it.
+//! Results of adding each single effect of the catalogue to the believed model, and minimum detectable sizes.
 
 use ct_signals::ArModel;
 use greybox::Noise;

@@ -1,4 +1,4 @@
-//! What a noise shows of itself, and what is more than that.
+//! Expected residual of a noise model, and significant excess over it.
 //!
 //! A bin fails where its mean square is clearly above what the noise would show there. A coloured noise has fewer
 //! independent samples than samples, and more at some frequencies than at others; with its autocovariance `r(h)` and
@@ -20,14 +20,14 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// A bin fails where its mean square exceeds that of the noise by this factor ...
 const FACTOR: f64 = 3.0;
-/// ... a band by this one, since a noise's spectrum is known less well than its size ...
+/// ... a band by this one, because the spectrum of the noise is less well known than its variance ...
 pub(super) const FACTOR_OF_A_BAND: f64 = 6.0;
-/// ... and where chance would do it less often than this: one in ten thousand over some fifty bins.
+/// ... and if chance would cause it less often than this: one in ten thousand over about fifty bins.
 const CHANCE: f64 = 2e-6;
 
-/// What a noise shows in a record of `n` samples.
+/// Expected statistics of a noise in a record of `n` samples.
 pub(super) struct Expected {
-    /// Its mean square.
+    /// Mean square.
     square: f64,
     /// Samples for one that is independent.
     spacing: f64,

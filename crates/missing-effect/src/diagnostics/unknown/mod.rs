@@ -26,12 +26,12 @@ use crate::{Error, PlaceLikelihood, Share, Unknown, Window, fit::node::Node};
 const BAND: f64 = 1.96;
 /// A path is shown where its log-likelihood exceeds that of none that moves by this.
 const MOVES: f64 = 5.0;
-/// Places whose log-likelihood lies within this of the best are not told apart by it.
+/// Places with log-likelihoods within this distance of the best are not distinguished.
 pub(crate) const SAME_PLACE: f64 = 10.0;
 /// A variable is named where it predicts clearly more than this share of the missing term on unseen data: what depends on it
 /// alone is predicted nearly in full, and a record that holds few values of the command ties each of them to a time ...
 const NAMED: f64 = 0.8;
-/// ... by so many standard errors.
+/// ... by this number of standard errors.
 const CLEARLY: f64 = 1.64;
 
 /// The name of a place, as files have it.
@@ -138,7 +138,7 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
     Ok(Some(report(node, places, shares, chosen, named)))
 }
 
-/// From the estimates to what is reported.
+/// Report of the estimates.
 fn report(
     node: &Node,
     places: Vec<PlaceLikelihood>,

@@ -5,9 +5,9 @@ use plants::{Domain, EffectInfo, Place, Variable};
 
 use crate::{Primitive, result::SHAPES};
 
-/// A simple shape explains a polyline where it leaves less than this share of what the polyline tells.
+/// A simple function explains a polyline if its residual is below this share of the polyline's information.
 const LEFT: f64 = 0.2;
-/// What a location costs in the deviance, as in a likelihood ratio of one degree of freedom at 1 %.
+/// Penalty of a location in the deviance, as in a likelihood ratio test with one degree of freedom at 1 %.
 const LOCATION: f64 = 6.6;
 
 /// A family of shapes: value of the shape at a point, for a location.
@@ -74,7 +74,7 @@ pub(super) fn nearest(
 ) -> Option<Primitive> {
     let a = DVector::from_row_slice(ordinates);
     let told = a.dot(&(information * &a));
-    // Nothing of it is beyond what the plant's own parameters imitate.
+    // The function is not significant beyond the part that the plant's parameters can explain.
     if told < LOCATION {
         return None;
     }
@@ -110,7 +110,7 @@ pub(super) fn nearest(
             let columns = columns.columns(0, used).into_owned();
             let weighted = information * &columns;
             let normal = columns.tr_mul(&weighted);
-            // What the plant's parameters imitate tells nothing.
+            // The part that the plant's parameters can explain has no weight.
             let Ok(inverse) = normal.clone().pseudo_inverse(1e-9 * normal.amax()) else {
                 continue;
             };

@@ -1,5 +1,5 @@
-//! What the missing term depends on: a polyline in each variable, fitted with the plant's parameters, and the share of the
-//! missing term that it predicts where it has not been fitted.
+//! Variable of the missing term: a polyline in each variable, fitted with the plant's parameters, and its share of explained variance on
+//! data that were not fitted.
 //!
 //! A flexible curve fits anything, and a level that drifts makes every function of time one of the level. So the share is
 //! counted on parts of the record that the curve has not seen: a function of the level holds there too, a function of
@@ -32,7 +32,7 @@ const DETERMINED: f64 = 1e-4;
 /// Before the fit an ordinate is as large as its neighbour to within the smoothed term's root mean square, and zero to within
 /// so many times that ...
 const SIZES: f64 = 3.0;
-/// ... and a parameter of the plant is known to within this part of itself.
+/// ... and a parameter of the plant is known to within this share of its value.
 const LOOSE: f64 = 0.5;
 /// Steps of the fit, and the fall of its cost that is too small for another.
 const ROUNDS: usize = 30;
@@ -44,7 +44,7 @@ pub(super) struct Shape {
     pub spot: Spot,
     pub variable: Variable,
     pub knots: Vec<f64>,
-    /// Without what the plant's own parameters imitate.
+    /// Ordinates without the part that the plant's own parameters explain.
     pub ordinates: Vec<f64>,
     /// The inverse of the ordinates' covariance; singular where the plant's parameters imitate them.
     pub information: DMatrix<f64>,
@@ -176,7 +176,7 @@ fn x_free(setup: &Setup, x: &[f64]) -> DVector<f64> {
     DVector::from_iterator(setup.free().len(), setup.free().iter().map(|&i| x[i]))
 }
 
-/// What is known of the free entries beside the records, each with its column.
+/// Priors of the free entries, each with its column.
 fn priors(setup: &Setup) -> Vec<(usize, PriorValue)> {
     let known = setup.prior_values();
     let column = |(column, &entry): (usize, &usize)| {
@@ -218,7 +218,7 @@ pub(super) fn fit(
     let mut x = start;
     let (mut j, mut residual) = rows(&x)?;
     let mut damping = 1e-2;
-    // What is known before, as a weight on the squares of the departures, in units of the residual's variance.
+    // Prior weights on the squared deviations, in units of the residual's variance.
     let known = {
         let count = setup.parameter_count();
         let mut known = DMatrix::zeros(mean.len(), mean.len());
@@ -325,8 +325,8 @@ fn unseen(
     for part in 0..PARTS {
         let (from, to) = (n * part / PARTS, n * (part + 1) / PARTS);
         let (rows, wanted) = (j.rows(from, to - from), target.rows(from, to - from));
-        // Nothing next to the part is used either: the process remembers, and a command that is held is one visit, however
-        // many samples it lasts.
+        // The neighbourhood of the part is left out too: the process has memory, and a command that is held is a single observation,
+        // however many samples it lasts.
         let margin = (to - from) / 2;
         let (first, last) = (from.saturating_sub(margin), (to + margin).min(n));
         let (hidden, unknown) = (

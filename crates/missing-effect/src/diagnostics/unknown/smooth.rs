@@ -66,7 +66,7 @@ pub(super) struct Smoothed {
     pub variance: f64,
     /// Restricted log-likelihood at its largest.
     pub log_likelihood: f64,
-    /// By how much it exceeds that of a forcing that does not change.
+    /// Excess over the likelihood of a constant forcing.
     pub gain: f64,
 }
 
@@ -133,7 +133,7 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
         x.extend(&node.fit.x[setup.plant_states_of(r)]);
         runs.push((with, x, time));
     }
-    // Noise is as large beside the path as it is beside the node, output by output.
+    // The noise is as large as for the node, output by output.
     let weights = &node.fit.weights;
     let mut best = None;
     for _ in 0..ROUNDS {

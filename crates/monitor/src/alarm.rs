@@ -17,19 +17,19 @@ pub enum Stage {
     Alarm,
     /// More rows have come since, and it was looked again.
     Update,
-    /// The last look; the model stays as it was learned.
+    /// The last evaluation; the model keeps its learned parameters.
     Final,
 }
 
-/// What the rows since the change say.
+/// Verdict on the rows since the change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// One effect of the catalogue explains them, and no other does.
+    /// One effect of the catalogue explains the rows, and no other effect does.
     Effect,
     /// Several explain them, and cannot be told apart yet.
     Undecided,
-    /// No effect of the catalogue explains them.
+    /// No effect of the catalogue explains the rows.
     Unexplained,
 }
 
@@ -42,13 +42,13 @@ pub struct Alarm {
     pub event: Stage,
     /// Time of the row after which it was raised \[s\].
     pub time: f64,
-    /// When the change began, as the best effect has it \[s\]; `None` where nothing explains it.
+    /// Start of the change, as estimated with the best effect \[s\]; `None` if no effect explains the rows.
     pub since: Option<f64>,
-    /// What the rows say.
+    /// Verdict on the rows.
     pub verdict: Verdict,
     /// The effects that cannot be told apart, best first; empty where nothing explains the rows.
     pub effects: Vec<String>,
-    /// By how much the Bayesian information criterion falls with the best of them.
+    /// Fall of the Bayesian information criterion with the best of them.
     pub evidence: Option<f64>,
     /// The next effect, whether in the group or behind it, and its evidence.
     pub next: Option<Other>,
@@ -58,11 +58,10 @@ pub struct Alarm {
     pub score: f64,
     /// See `score`.
     pub threshold: f64,
-    /// Of several outputs the one at which the offset of the reading had the largest score when the alarm was raised: the vessel whose level
-    /// it reads.
+    /// With several outputs, the one whose reading offset had the largest score at the alarm: this names the vessel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<String>,
-    /// All of it in words.
+    /// The alarm in words.
     pub sentence: String,
 }
 
@@ -71,7 +70,7 @@ pub struct Alarm {
 pub struct Other {
     /// The effect.
     pub effect: String,
-    /// By how much the criterion falls with it.
+    /// Fall of the criterion with the effect.
     pub evidence: f64,
 }
 
@@ -80,9 +79,9 @@ pub struct Other {
 pub struct Size {
     /// The parameter's name.
     pub name: String,
-    /// Its value; of a drift, what has been reached by now.
+    /// Value of the size; for a drift, the present value.
     pub value: f64,
-    /// Its unit; empty for a share.
+    /// Unit of the size; empty for a share.
     pub unit: String,
     /// The vessel, of several; of an effect at a sensor the one whose level that reads, of several outputs.
     pub vessel: Option<String>,
@@ -91,14 +90,15 @@ pub struct Size {
 /// Units of the signals, for sentences.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Units {
-    /// Of the readings.
+    /// Unit of the readings.
     pub output: String,
-    /// Of the command.
+    /// Unit of the command.
     pub input: String,
 }
 
 impl Alarm {
-    /// Nothing explains the rows so far; `output`: the name of the one at which it shows most, of several. The sentence is not there yet.
+    /// Alarm that no effect explains the rows so far; `output`: name of the output with the largest deviation, if there are several. The
+    /// sentence is added later.
     pub(crate) fn unexplained(raised: &Raised, output: Option<String>) -> Self {
         Self {
             schema: SCHEMA,
@@ -118,7 +118,7 @@ impl Alarm {
     }
 }
 
-/// What a look at the rows found.
+/// Result of an evaluation of the rows.
 pub(crate) fn alarm(
     raised: &Raised,
     suspects: &[Suspect],
@@ -188,7 +188,7 @@ fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain, axis: &Tim
     })
 }
 
-/// What the rows are consistent with, `place` in words behind the size; `None` where nothing explains them.
+/// Sentence on the effect that the rows are consistent with; `place` follows the size in words. `None` if no effect explains the rows.
 pub(crate) fn consistent(alarm: &Alarm, place: &str, axis: &TimeAxis) -> Option<String> {
     let (since, evidence, size) = (alarm.since?, alarm.evidence?, alarm.size.as_ref()?);
     let unit = if size.unit.is_empty() {

@@ -35,10 +35,10 @@ pub(crate) struct Bank {
     /// Parameters, which come first among the directions, and directions: behind them an offset of each output.
     parameters: usize,
     directions: usize,
-    /// For each window and direction.
+    /// One sum for each window and direction.
     z: Vec<f64>,
     v: Vec<f64>,
-    /// For each window and direction, an entry for each parameter.
+    /// For each window and direction, one entry for each parameter.
     c: Vec<f64>,
 }
 
@@ -117,7 +117,7 @@ impl Bank {
     /// The largest magnitude of a score.
     pub(crate) fn largest(&self, covariance: &[f64]) -> f64 {
         let cells = 0..self.z.len();
-        // Where nothing has been seen yet there is no score.
+        // Before the first row there is no score.
         cells
             .map(|cell| self.score(cell, covariance))
             .fold(0.0, f64::max)

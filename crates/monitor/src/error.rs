@@ -1,6 +1,6 @@
-//! What a monitor refuses.
+//! Errors of a monitor.
 
-/// Why there is no monitor.
+/// Reason why no monitor can be built.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -63,19 +63,19 @@ pub enum Error {
         "the state belongs to another model: {differences}; name another state file, or delete it to start again"
     )]
     OtherModel {
-        /// What differs, in the words of the model file.
+        /// The differences, in the words of the model file.
         differences: String,
     },
     /// A state whose numbers do not go together.
     #[error("the state is damaged: {what}; delete it to start again")]
     Damaged {
-        /// What does not go together.
+        /// Inconsistency.
         what: String,
     },
 }
 
-/// Why a row is not used, or one of its readings is not ([`Step::lost`](crate::Step::lost)). A row that is not used leaves the monitor as it was,
-/// but for the count of times that go back.
+/// Reason why a row or one of its readings is not used ([`Step::lost`](crate::Step::lost)). A row that is not used does not change the
+/// monitor, except for the count of times that go back.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refused {
@@ -84,7 +84,7 @@ pub enum Refused {
     NotFinite {
         /// `time`, `input` or `output`.
         column: &'static str,
-        /// Which of the inputs or outputs, counted from zero.
+        /// Index of the input or output, from zero.
         at: usize,
         /// The value.
         value: f64,
@@ -98,7 +98,7 @@ pub enum Refused {
         at: usize,
         /// The value.
         value: f64,
-        /// What has to be larger than it.
+        /// Limit of the absolute value.
         limit: f64,
     },
     /// A command that no pump of this range gets: simulated, it would bury the model for hours.
@@ -134,7 +134,7 @@ pub enum Refused {
 }
 
 impl Refused {
-    /// Which of the inputs or outputs is to be looked at, counted from zero.
+    /// Index of the input or output in question, from zero.
     #[must_use]
     pub fn at(&self) -> usize {
         match self {

@@ -44,14 +44,14 @@ pub(crate) struct Sample {
     pub inputs: Each<f64>,
     /// In the order of the outputs.
     pub outputs: Readings,
-    /// How it follows the one before.
+    /// Relation to the preceding sample.
     pub follows: Follows,
 }
 
-/// How a sample follows the one before.
+/// Relation of a sample to the preceding one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Follows {
-    /// After the usual step, or a gap that is bridged.
+    /// One step later, or after a gap that is bridged.
     On,
     /// After a long gap.
     Gap,
@@ -59,9 +59,9 @@ pub(crate) enum Follows {
     Interval,
 }
 
-/// What became of a row.
+/// Result of a row.
 pub(crate) struct Taken {
-    /// What is to be watched, where a block is complete.
+    /// The sample to be monitored, if a block is complete.
     pub sample: Option<Sample>,
     pub notice: Option<Notice>,
 }
@@ -90,7 +90,7 @@ pub(crate) struct Intake {
     /// Rows that were taken.
     pub rows: u64,
     pub last: Option<f64>,
-    /// Of the latest rows that lie before that, in order among themselves: the last one's time, and how many.
+    /// For the latest rows with earlier times, if their times increase: time of the last one, and their number.
     back: Option<(f64, usize)>,
     /// The latest steps, at most [`STEPS`].
     steps: Vec<f64>,
@@ -293,7 +293,7 @@ impl Intake {
         })
     }
 
-    /// Of the latest steps; a single long one is no usual one.
+    /// Median and longest of the latest steps; a single long step is unusual.
     fn median_and_longest(&self) -> (f64, f64) {
         let mut sorted = self.steps.clone();
         sorted.sort_by(f64::total_cmp);

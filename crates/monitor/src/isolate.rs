@@ -56,18 +56,20 @@ pub(crate) const FINE: Stopping = Stopping {
     evaluations: 40,
     cost: 1e-8,
 };
-/// What is left is more than noise where its squares lie so many standard errors above those of the noise ...
+/// The residual is more than noise if its sum of squares exceeds that of the noise by this number of standard errors ...
 const BEYOND: f64 = 4.0;
-/// ... and are more than this share of what was above the noise before: no learned model is exact, and beside a large effect its errors show.
+/// ... and if the excess is more than this share of the excess without the effect: no learned model is exact, and its errors are visible in
+/// the presence of a large effect.
 const LEFT: f64 = 0.1;
 
-/// A row that is kept, with what the learned model said of it.
+/// A stored row with the output of the learned model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Kept {
     pub sample: Sample,
     /// States of the learned model: the levels, of a plant.
     pub states: Each<f64>,
-    /// Where in it stood what the command moves: play has a memory without an end, and no run-up finds it.
+    /// State of the actuator's backlash in the input's unit: backlash has unlimited memory, so the state cannot be found by simulating a
+    /// few rows.
     pub stands: f64,
     /// Readings of the learned model.
     pub modelled: Each<f64>,
@@ -89,7 +91,7 @@ pub(crate) struct Suspect {
     pub evidence: f64,
     /// \[s\]
     pub since: f64,
-    /// Its size: name, value, unit.
+    /// Size of the effect: name, value, unit.
     pub size: (&'static str, f64, Unit),
     /// The size lies inside its plausible range.
     pub plausible: bool,
@@ -99,16 +101,16 @@ pub(crate) struct Suspect {
 /// Whitened squares from an onset on, in the noise's variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Left {
-    /// What the learned model leaves.
+    /// Sum of squares of the learned model.
     pub before: f64,
-    /// What is left with an effect.
+    /// Sum of squares with the effect.
     pub left: f64,
     /// Rows there times outputs.
     pub samples: usize,
 }
 
 impl Left {
-    /// What an effect leaves is more than noise.
+    /// Whether the residual with the effect is more than noise.
     pub(crate) fn is_more_than_noise(self) -> bool {
         let n = self.samples as f64;
         self.left > n + BEYOND * (2.0 * n).sqrt() && self.left - n > LEFT * (self.before - n)
@@ -191,7 +193,7 @@ pub(crate) fn isolate(
             .partial_cmp(&(a.plausible, a.evidence))
             .unwrap_or(std::cmp::Ordering::Equal)
     });
-    // Of two vessels, or outputs, the one that explains more.
+    // Of two vessels or outputs, the one that explains more.
     let mut best: Vec<Suspect> = Vec::with_capacity(suspects.len());
     for suspect in suspects {
         if best
@@ -225,7 +227,7 @@ fn innovations(rows: &[Kept], output: usize, residuals: &[f64], noise: &ArModel)
 struct Series {
     /// Measured or filled in; all NaN where there is none.
     readings: Vec<f64>,
-    /// The same less the learned model's.
+    /// Residuals minus those of the learned model.
     residuals: Vec<f64>,
 }
 

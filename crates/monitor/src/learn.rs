@@ -11,7 +11,7 @@ pub use self::learned::Model;
 pub(crate) use self::learned::{Learned, OutputNoise};
 use crate::{intake::Sample, lost::expect, lost::interpolated, scatter::Limit};
 
-/// A command that moves by less of itself stands still.
+/// A command with a smaller relative change is constant.
 const STILL: f64 = 1e-9;
 
 /// Fewest rows with a reading of each output, as a part of all.
@@ -23,7 +23,7 @@ const ROUNDS: usize = 2;
 const NO_NOISE: &str =
     "the residual is zero, so no threshold can be set: are the readings measured?";
 
-/// More of either was never learned: a state that says so would be computed for ever.
+/// Larger values are never learned: a state with larger values would need endless computing time.
 const MOST_SUBSTEPS: usize = 1024;
 const MOST_COEFFICIENTS: usize = 64;
 
@@ -60,7 +60,7 @@ pub(crate) fn record<'a>(
     record
 }
 
-/// Where in its band a valve that sticks stands when a record begins.
+/// State of a sticking valve within its band at the start of a record.
 pub(crate) const BEGIN: &str = "stiction_backlash.begin";
 
 /// The fit, and the levels at the first row; in words why there is none.
@@ -76,7 +76,7 @@ pub(crate) fn learn(
     let vessels = model.known.outputs(model.plant);
     let outputs = vessels.len();
     let mut filled = Vec::with_capacity(outputs);
-    // Of each output the rows without a reading.
+    // For each output the rows without a reading.
     let mut lost: Vec<Vec<usize>> = Vec::with_capacity(outputs);
     for output in 0..outputs {
         let readings: Vec<Option<f64>> = samples.iter().map(|s| s.outputs[output]).collect();
@@ -100,7 +100,7 @@ pub(crate) fn learn(
     let options = FitOptions::default();
     let said = |error: &dyn std::fmt::Display| error.to_string();
     let mut fixed = model.fixed();
-    // The simulation goes on from where the last one stood, and does not begin within the band anew.
+    // The simulation continues from the last state, and does not start again within the band.
     fixed.insert(BEGIN.into(), 0.0);
     let bare = Setup::from_records(
         model.plant,
@@ -153,7 +153,8 @@ pub(crate) fn learn(
     }
 
     let n = setup.parameter_count();
-    // What stands in for a lost reading has no noise, and says nothing of its own. The output that lost most counts for all.
+    // The replacement of a missing reading has no noise and adds no information. The output with the most missing readings determines the
+    // number of rows.
     let read = |output: usize| samples.len() - lost[output].len();
     let all_over_read = |output: usize| samples.len() as f64 / read(output) as f64;
     let most = (0..outputs).map(all_over_read).fold(1.0, f64::max);
@@ -242,7 +243,7 @@ pub(crate) fn output_noise(
             whitener.skip();
         }
     }
-    // Of several outputs each has fewer parameters to itself: the limit is a little wide.
+    // With several outputs, each has fewer parameters than assumed: the limit is slightly wide.
     let scatter = Limit::learned(&innovations, parameters)
         .ok_or("the residual is zero, so no threshold can be set: do the readings move?")?;
     Ok(OutputNoise {

@@ -1,4 +1,4 @@
-//! What stands in for lost readings where a whole record is needed.
+//! Replacement of missing readings for computations that need a complete record.
 
 use ct_signals::ArModel;
 

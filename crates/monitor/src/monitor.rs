@@ -39,7 +39,7 @@ impl Row {
         Self::with_inputs(time, &[input], readings)
     }
 
-    /// The same with any number of inputs.
+    /// A sample with any number of inputs.
     #[must_use]
     pub fn with_inputs(time: f64, inputs: &[f64], readings: &[f64]) -> Self {
         Self {
@@ -60,9 +60,9 @@ impl Row {
 pub struct Step {
     /// The learned model beside the reading of each output; `None` while learning, within a block of rows, and without a reading.
     pub innovations: Each<Option<Innovation>>,
-    /// Of each output why its reading is not used, where it is not; the inputs are.
+    /// For each output the reason why its reading is not used, if so; the inputs are used.
     pub lost: Each<Option<Refused>>,
-    /// Something about the rows or the phase, where there is something.
+    /// Notices about the rows or the phase.
     pub notices: [Option<Notice>; 2],
     /// The model does not fit any more, or more is known of that.
     pub alarm: Option<Alarm>,
@@ -70,16 +70,16 @@ pub struct Step {
     pub scatter: Vec<ScatterAlarm>,
 }
 
-/// The learned model beside a reading.
+/// Prediction error of the learned model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
     /// Measured minus model, which runs on the command alone \[output unit\].
     pub residual: f64,
-    /// What of it the noise's past does not foretell, in standard deviations.
+    /// Innovation in standard deviations: the part of the residual that its past does not predict.
     pub standardised: f64,
 }
 
-/// Something that is not an alarm.
+/// Notice that is not an alarm.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Notice {
@@ -101,9 +101,9 @@ pub enum Notice {
         /// The time now \[s\].
         to: f64,
     },
-    /// The time steps by another interval now: the noise is learned anew.
+    /// The time step has changed: the noise is learned again.
     IntervalChanged {
-        /// Since when \[s\].
+        /// Time of the change \[s\].
         time: f64,
         /// The usual step before \[s\].
         from: f64,
@@ -112,7 +112,7 @@ pub enum Notice {
     },
     /// The learning is over.
     Learned {
-        /// From so many rows.
+        /// Number of rows.
         rows: usize,
         /// The slowest time constant \[s\].
         time_constant: f64,
@@ -120,22 +120,22 @@ pub enum Notice {
         noise: Vec<f64>,
         /// Rows are watched in blocks of so many.
         every: usize,
-        /// What a score has to pass; far above 6 where the noise is so slow that these rows hardly say how large it is.
+        /// Threshold of a score; far above 6 if the noise is so slow that these rows hardly determine its variance.
         threshold: f64,
     },
-    /// After an alarm the learned model fits again.
+    /// After an alarm, the learned model fits again.
     FitsAgain {
         /// Now \[s\].
         time: f64,
-        /// When the alarm was raised \[s\].
+        /// Time of the alarm \[s\].
         since: f64,
     },
-    /// What was gathered or learned is given up, and an alarm that was being followed ends.
+    /// The collected rows or the learned model are dropped, and a present alarm ends.
     LearnsAnew {
         /// Why.
         why: &'static str,
     },
-    /// The rows so far do not determine the model; it goes on learning.
+    /// The rows so far do not determine the model; learning continues.
     NotLearned {
         /// Why.
         why: String,
@@ -237,7 +237,7 @@ impl<'a> Monitor<'a> {
         Ok(monitor)
     }
 
-    /// How times are said in sentences; a restored monitor goes on as before.
+    /// Format of times in sentences; a restored monitor keeps its format.
     #[must_use]
     pub fn axis(&self) -> &TimeAxis {
         &self.core.axis
@@ -248,7 +248,7 @@ impl<'a> Monitor<'a> {
         self.core.axis = axis;
     }
 
-    /// All of it, to be saved.
+    /// Complete state, for saving.
     #[must_use]
     pub fn state(&self) -> State {
         let (checkpoint, since) = self.core.saved();
@@ -328,13 +328,13 @@ impl<'a> Monitor<'a> {
         self.core.estimates()
     }
 
-    /// What there is to learn from; `None` where the learning is over.
+    /// Rows collected for learning; `None` if learning is finished.
     #[must_use]
     pub fn gathered(&self) -> Option<Gathered> {
         self.core.gathered()
     }
 
-    /// Where it is.
+    /// Phase and progress.
     #[must_use]
     pub fn progress(&self) -> Progress {
         let (score, threshold) = self.core.score().unwrap_or((f64::NAN, f64::NAN));

@@ -1,4 +1,4 @@
-//! One of the plants, with its effects, as it is watched.
+//! A built-in plant with its effects, for monitoring.
 
 use std::sync::Arc;
 

@@ -20,17 +20,17 @@ pub(crate) const SHARE: f64 = 0.1;
 const BLOCKS: [usize; 3] = [16, 64, 256];
 /// The limit is passed by one learned pair in so many.
 const BEYOND: usize = 10;
-/// While it has grown, its size is taken from blocks of this length ...
+/// While the noise is increased, its variance is computed from blocks of this length ...
 const SIZED: usize = 1;
-/// ... and whether it has come back from these.
+/// ... and these blocks decide whether it has returned to normal.
 const BACK: usize = 2;
-/// Of the latest eight pairs so many beyond the limit are suspicious: usually there is one.
+/// This number of the latest eight pairs beyond the limit is suspicious: usually there is one.
 const SUSPICIOUS: u32 = 3;
 
 /// The limit that was learned.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Limit {
-    /// Of the difference of two neighbours, in standard deviations of the innovations.
+    /// Limit of the difference of two neighbours, in standard deviations of the innovations.
     difference: f64,
     /// Learned pairs, and how many of them lie at it or beyond.
     pairs: usize,
@@ -40,7 +40,7 @@ pub(crate) struct Limit {
 }
 
 impl Limit {
-    /// From the learned innovations; `parameters` were fitted to them.
+    /// Limit from the learned innovations; `parameters` were fitted to them.
     pub(crate) fn learned(innovations: &[f64], parameters: usize) -> Option<Self> {
         let pairs = innovations.chunks_exact(2);
         let mut apart: Vec<f64> = pairs.map(|pair| (pair[0] - pair[1]).abs()).collect();
@@ -96,7 +96,7 @@ impl Limit {
     }
 }
 
-/// What a block has had so far.
+/// Sums of a block so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Block {
     pairs: usize,
@@ -121,24 +121,25 @@ pub(crate) struct Scatter {
     blocks: [Block; BLOCKS.len()],
     /// Whether the latest pairs were beyond the limit, a bit each.
     latest: u8,
-    /// How many times as large as learned it is.
+    /// Ratio to the learned noise.
     grown: Option<f64>,
 }
 
-/// What has become of the scatter.
+/// Change of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Moved {
-    /// It is so many times as large as it was learned.
+    /// The noise has this ratio to the learned noise.
     Grown(f64),
     Back,
 }
 
-/// How many pairs beyond the limit an alarm takes, for each length of a block.
+/// Number of pairs beyond the limit for an alarm, for each length of a block.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Most([usize; BLOCKS.len()]);
 
 impl Most {
-    /// For one of so many outputs, which share the false alarms; `samples` is the mean number between those of all kinds.
+    /// Limits for one of this number of outputs, which share the rate of false alarms; `samples` is the mean number of samples between
+    /// false alarms of all kinds.
     pub(crate) fn new(limit: &Limit, samples: f64, outputs: usize) -> Self {
         let samples = samples * outputs as f64;
         Self(BLOCKS.map(|length| {
@@ -155,17 +156,17 @@ impl Scatter {
         grown.is_finite() && grown >= 1.0 && blocks.into_iter().all(|(b, n)| b.pairs < n)
     }
 
-    /// How many times as large as learned it is; one where it has not grown.
+    /// Ratio of the noise to the learned noise; one if it has not grown.
     pub(crate) fn growth(&self) -> f64 {
         self.grown.unwrap_or(1.0)
     }
 
-    /// It may be about to be found grown: a score that passes now may be of that.
+    /// Whether an increase of the noise may soon be detected: a score above its threshold may have this cause.
     pub(crate) fn is_suspicious(&self) -> bool {
         self.grown.is_none() && self.latest.count_ones() >= SUSPICIOUS
     }
 
-    /// What was begun is given up: rows are missing, or say nothing of it.
+    /// Drops the started block: rows are missing, or are not suitable.
     pub(crate) fn begin(&mut self) {
         *self = Self {
             grown: self.grown,
@@ -217,7 +218,7 @@ impl Scatter {
 pub struct ScatterAlarm {
     /// [`SCHEMA`](crate::SCHEMA).
     pub schema: u32,
-    /// Which of them.
+    /// The event.
     pub event: ScatterEvent,
     /// Time of the row after which it was raised \[s\].
     pub time: f64,
@@ -234,13 +235,13 @@ pub struct ScatterAlarm {
     pub sentence: String,
 }
 
-/// What the scatter did.
+/// Event of the noise monitor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ScatterEvent {
-    /// It has grown.
+    /// The noise has increased.
     ScatterGrown,
-    /// It is back where it was learned.
+    /// The noise is at the learned level again.
     ScatterBack,
 }
 
@@ -305,7 +306,7 @@ mod tests {
         (0..n).map(|_| rng.sample(student)).collect()
     }
 
-    /// How often, over many learned limits and the rows behind each, the scatter grows where it does not.
+    /// Rate of false alarms of increased noise, over many learned limits and the rows after each.
     fn false_alarms(degrees: f64, samples: f64) -> usize {
         let (learned, rows) = (1000, 10_000);
         let run = |seed| {

@@ -1,8 +1,8 @@
-//! How to watch.
+//! Settings of the monitor.
 
 use crate::Error;
 
-/// How to watch. Every field has a usual value: `Settings::default()`.
+/// Settings of the monitor. Every field has a default: `Settings::default()`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Mean number of rows between false alarms of all kinds, from 1000 on; usually 1e6. Rows count as they come, also where they are

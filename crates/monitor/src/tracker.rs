@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// Forgetting never raises the variances above so many times the learned ones on average.
 const MOST: f64 = 1e4;
-/// After a jump, standard errors are so many times what they were.
+/// After a step change, standard errors are multiplied by this factor.
 const JUMP: f64 = 30.0;
 
 /// A tracker in its serialisable form: the deviations and their covariance, both in learned standard errors.
@@ -21,19 +21,19 @@ pub(crate) struct TrackerState {
     pub covariance: Vec<f64>,
 }
 
-/// Which directions are tracked, and by which sizes.
+/// Tracked directions and their scales.
 pub(crate) struct Tracker {
     rls: DynamicRls,
     weights: Weights,
-    /// The same without forgetting.
+    /// The weights without forgetting.
     together: Weights,
-    /// Lane and learned standard error of each tracked parameter.
+    /// Seed index and learned standard error of each tracked parameter.
     tracked: Vec<(usize, f64)>,
     phi: Vec<f64>,
 }
 
 impl TrackerState {
-    /// As learned: `covariance` of the tracked parameters, row by row.
+    /// Initial tracker; `covariance` of the tracked parameters, row by row.
     pub(crate) fn learned(covariance: &[f64]) -> Self {
         let n = covariance.len().isqrt();
         let error = |i: usize| covariance[i * n + i].sqrt();
@@ -92,13 +92,13 @@ impl Tracker {
     }
 
     fn take(&mut self, row: &[f64], h: f64, weights: &Weights) {
-        // A row says as much whatever its length: the estimator's information is an integral over time.
+        // The information of a row does not depend on its length: the estimator's information is an integral over time.
         let density = 1.0 / h.sqrt();
         for (phi, (lane, error)) in self.phi.iter_mut().zip(&self.tracked) {
             *phi = row[*lane] * error * density;
         }
         let residual = row.last().copied().unwrap_or(f64::NAN);
-        // What the estimator refuses leaves it as it was.
+        // A rejected sample does not change the estimator.
         let _ = self
             .rls
             .update_with(&self.phi, residual * density, h, weights);
@@ -179,7 +179,7 @@ mod tests {
             (now[0].0 - 3.0).abs() < 0.6 && (now[1].0 + 1.0).abs() < 0.6,
             "{now:?}"
         );
-        // Not told, it takes a memory, 200 rows.
+        // Without notice of the step, adaptation takes the memory, 200 rows.
         let (now, _) = run(jumped, 5060, None);
         assert!((now[0].0 - 3.0).abs() > 1.5, "{now:?}");
     }

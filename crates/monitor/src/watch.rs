@@ -30,23 +30,23 @@ pub(crate) struct Watch<'a> {
     read: Vec<usize>,
 }
 
-/// What the learned model says of a row.
+/// Output of the learned model for a row.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Said {
     /// Its states.
     pub states: Each<f64>,
-    /// Where what the command moves stands \[input unit\].
+    /// State of the actuator \[input unit\].
     pub stands: f64,
-    /// Its readings \[output unit\].
+    /// Simulated readings \[output unit\].
     pub modelled: Each<f64>,
-    /// What each reading says; `None` where that is lost.
+    /// Innovation of each reading; `None` if the reading is missing.
     pub innovations: Each<Option<Innovation>>,
     /// Seconds since the sample with a reading before; zero for the first.
     pub step: f64,
 }
 
 impl Said {
-    /// With its row, to be kept.
+    /// The same with its row, for storage.
     pub(crate) fn of(&self, sample: Sample) -> Kept {
         Kept {
             sample,
@@ -68,7 +68,7 @@ impl Said {
 }
 
 impl<'a> Watch<'a> {
-    /// From given states on; `None` where the learned numbers do not make a model.
+    /// Starts from given states; `None` if the learned numbers do not make a model.
     pub(crate) fn new(
         model: &Watched<'a>,
         learned: &Learned,
@@ -176,7 +176,7 @@ pub(crate) fn as_learned(learned: &Learned, lanes: usize) -> TrackerState {
     TrackerState::learned(&learned.covariance_of(&positions))
 }
 
-/// Lanes and learned standard errors of the parameters that are tracked, of those that have a lane.
+/// Seed indices and learned standard errors of the tracked parameters, if they have a seed index.
 pub(crate) fn tracked(learned: &Learned, lanes: usize) -> Vec<(usize, f64)> {
     let mut errors = learned.errors();
     errors.retain(|(i, _)| *i < lanes);

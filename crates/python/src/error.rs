@@ -1,4 +1,4 @@
-//! What the program refuses, as Python exceptions with its messages.
+//! Errors of the program as Python exceptions with its messages.
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

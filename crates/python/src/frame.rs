@@ -31,7 +31,7 @@ enum Times<'py> {
     Dates(Vec<String>),
 }
 
-/// A cell that the reader takes for itself, whatever stands in it.
+/// Quotes a cell so that the reader takes it literally.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }
@@ -109,7 +109,7 @@ impl Content {
         parse_inputs_csv(&self.name, &self.csv, &self.columns(columns), options)
     }
 
-    /// With the time of this frame.
+    /// The columns with the time of this frame.
     fn columns(&self, columns: &Columns) -> Columns {
         Columns {
             time: Some(self.time.clone()),

@@ -23,7 +23,7 @@ pub struct Model(pub Arc<Inner>);
 
 /// A model and, where it comes from a fit, its values.
 pub struct Inner {
-    /// What a user reads of it.
+    /// Text for the user.
     pub text: String,
     pub file: OwnModelFile,
     /// Fitted values by name, of parameters and of `x(0)`; empty where nothing was fitted.
@@ -105,7 +105,7 @@ pub fn contents(frames: &[Bound<'_, Frame>]) -> Vec<Content> {
 
 #[pymethods]
 impl Model {
-    /// From its text; `name` stands for it in messages.
+    /// Reads a model text; `name` is its name in messages.
     #[staticmethod]
     fn from_text(text: String, name: &str) -> PyResult<Self> {
         let spec = parsed(name, &text)?;
@@ -118,7 +118,7 @@ impl Model {
         })))
     }
 
-    /// From a model file of `ctid`, which names the text.
+    /// Reads a model file of `ctid`, which names the text.
     #[staticmethod]
     fn from_model_file(path: &str) -> PyResult<Self> {
         let file = AnyModelFile::read(Path::new(path)).map_err(|error| error::of(&error))?;
@@ -135,7 +135,7 @@ impl Model {
         })))
     }
 
-    /// The same with these columns, known parameters, side measurements and hold (`zero`, `first`); what is not given stays.
+    /// The model with these columns, known parameters, side measurements and hold (`zero`, `first`); other settings do not change.
     #[pyo3(signature = (*, inputs=None, outputs=None, known=None, priors=None, hold=None))]
     fn with_settings(
         &self,
@@ -250,7 +250,7 @@ impl Model {
         names.zip(self.0.file.columns.inputs.clone()).collect()
     }
 
-    /// The same of the outputs.
+    /// Names and units of the outputs.
     #[getter]
     fn outputs(&self) -> Vec<(String, String)> {
         let spec = &self.0.file.base;

@@ -57,7 +57,7 @@ pub struct Monitor {
     monitor: Mutex<monitor::Monitor<'static>>,
 }
 
-/// What is watched, as it is pickled.
+/// The monitored model in its pickled form.
 #[derive(Clone, Serialize, Deserialize)]
 struct Watched {
     /// The model, its effects in it, with its values.

@@ -11,7 +11,7 @@ use stabilized_oe::{BlockDiagonal, IoSample, StabilizedOe as Estimator, StateVar
 
 use crate::error;
 
-/// One of the crate's estimators, whose orders are known when it is compiled.
+/// An estimator of the crate with orders that are known at compile time.
 trait Oe: Send + Sync {
     fn update(&mut self, u: f64, y: f64, dt: f64) -> f64;
     fn theta(&self) -> Vec<f64>;
@@ -45,7 +45,7 @@ impl<const N: usize, const P: usize> Oe for Own<N, P> {
     }
 }
 
-/// What an estimator is made of.
+/// Arguments of an estimator.
 struct Start<'a> {
     theta: &'a [f64],
     filter: &'a [f64],
@@ -208,7 +208,7 @@ impl StabilizedOe {
         PyArray1::from_vec(py, self.0.filter())
     }
 
-    /// What the model gives now.
+    /// Present output of the model.
     #[getter]
     fn model_output(&self) -> f64 {
         self.0.model_output()

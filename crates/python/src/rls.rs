@@ -33,7 +33,7 @@ impl<const P: usize> Online for Fixed<P> {
     }
 
     fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]) {
-        // A copy of its own, which the compiler keeps in registers where it can.
+        // A local copy, which the compiler can keep in registers.
         let mut own = self.clone();
         let mut rows = theta.as_chunks_mut::<P>().0.iter_mut();
         let samples = phi.as_chunks::<P>().0.iter().zip(y).zip(epsilon);
@@ -67,7 +67,7 @@ impl<const P: usize> Online for Fixed<P> {
     }
 }
 
-/// Of many parameters.
+/// Estimator for many parameters.
 #[derive(Clone)]
 struct Many(DynamicRls, Weights);
 
@@ -303,7 +303,7 @@ impl ContinuousRls {
         PyArray2::from_vec2(py, &self.rls.covariance()).map_err(error::of_data)
     }
 
-    /// What was done with the last sample of `update`.
+    /// Outcome of the last sample of `update`.
     #[getter]
     fn outcome(&self) -> String {
         format!("{:?}", self.outcome)
@@ -333,7 +333,7 @@ impl ContinuousRls {
         self.__copy__()
     }
 
-    /// What it is made of again, its matrix to rounding.
+    /// Arguments for restoring the estimator; its matrix is exact up to rounding.
     #[allow(clippy::type_complexity)]
     fn __getnewargs_ex__<'py>(
         &self,

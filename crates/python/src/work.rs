@@ -9,12 +9,12 @@ use pyo3::prelude::*;
 
 use crate::error;
 
-/// How often Ctrl-C is looked for.
+/// Interval of the checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
-/// As much as a main thread has: the texts of models are parsed by recursion.
+/// Stack size of a main thread: the texts of models are parsed by recursion.
 const STACK: usize = 8 << 20;
 
-/// What the work says.
+/// Message of the work.
 enum Said<T> {
     Phase(&'static str),
     Done(T),

@@ -10,7 +10,7 @@ use crate::grid::Stretch;
 pub(crate) struct Bank {
     /// `e_0 .. e_{n-1}` of the monic E.
     e: Vec<f64>,
-    /// For each length: Phi row by row, then the effects of the input at both ends.
+    /// For each length: Phi row by row, then the input matrices for both ends.
     tables: Vec<f64>,
 }
 

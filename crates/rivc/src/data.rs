@@ -6,7 +6,7 @@ use crate::Error;
 
 /// Times further from an even grid than this share of a step are uneven.
 const EVEN: f64 = 1e-6;
-/// What counts in samples takes times for even that are within this share of a step of an even grid.
+/// Methods that count samples accept times within this share of a step of an even grid.
 const NEARLY_EVEN: f64 = 0.1;
 
 /// One input of a record.
@@ -14,7 +14,7 @@ const NEARLY_EVEN: f64 = 0.1;
 pub struct Input {
     /// One value for each sample, input unit.
     pub values: Vec<f64>,
-    /// What it does between samples.
+    /// Hold between samples.
     pub hold: Hold,
 }
 
@@ -32,13 +32,13 @@ pub struct Data {
     /// The reference of a loop whose controller moves the first input; nothing in open loop. In a loop the instruments come from it,
     /// whatever the controller.
     pub reference: Option<Vec<f64>>,
-    /// It is a part of the record before it in the list, behind a time in which the inputs are not known: it begins with a state of its own, and shares that record's offset and
-    /// noise.
+    /// Whether the record continues the preceding one in the list, after a time with unknown inputs: it has its own initial state, and
+    /// shares the offset and the noise of that record.
     pub continues: bool,
 }
 
 impl Data {
-    /// One input, held between samples, with even steps from time 0; open loop.
+    /// Record with one input that is held between samples, with even steps from time 0; open loop.
     pub fn even(step: f64, u: Vec<f64>, y: Vec<f64>) -> Self {
         Self {
             name: "record".into(),

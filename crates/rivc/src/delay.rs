@@ -1,4 +1,5 @@
-//! Where the delays are: a grid, made finer around the best, and neighbours that another noise may prefer.
+//! Estimation of delays: a grid that is refined around the best point, and neighbours that may fit better with another noise model. The
+//! grid is searched on the beginning of long records, if the inputs change there as much as later: it only has to find the right minimum.
 //!
 //! The grid is searched on the beginning of long records, if the inputs move there as they do later: it only has to find the right minimum.
 
@@ -21,12 +22,12 @@ const FINER: f64 = 4.0;
 const GRIDS: usize = 4;
 /// Other points of the first grid that are starts too, beside no delay: where the order is high the rough comparison may miss the best.
 const OTHERS: usize = 2;
-/// Where a better delay is looked for, in steps from the one that was found.
+/// Distances of neighbouring delays from the estimate, in steps.
 const NEIGHBOURS: [f64; 8] = [2.0, 1.5, 1.0, 0.5, -0.5, -1.0, -1.5, -2.0];
 
 /// Rows of each record on which the grid is searched.
 const ROWS: usize = 4000;
-/// They are enough where each input moves by this share of what it does in the whole record.
+/// The first rows are enough if each input varies there by this share of its variation in the whole record.
 const LIKE_ALL: f64 = 0.5;
 
 /// The beginnings of the records, where they are long and their beginnings like the rest.
@@ -60,8 +61,8 @@ impl Problem<'_> {
     ) -> Result<(Vec<Vec<f64>>, f64), Error> {
         let estimated: Vec<(usize, f64)> = self.structure.estimated_delays().collect();
         let mut delays = delays.to_vec();
-        // All samples count here, as if the inputs had stood before the record: samples that are left out for the largest delay may hold
-        // the only step.
+        // All samples are used here, with inputs assumed constant before the record: the samples that are left out for the largest delay
+        // may contain the only step.
         let largest = 0.0;
         let mut finest = 0.0_f64;
         let mut others: Vec<Vec<f64>> = Vec::new();

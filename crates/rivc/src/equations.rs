@@ -167,7 +167,7 @@ impl Equations {
             zz: without(&self.zz),
             zy: zy.remove_rows_at(places),
             sizes: self.sizes.clone().remove_rows_at(places),
-            // As long as the records, and not needed to solve.
+            // Has the length of the records, and is not needed for the solution.
             residuals: Vec::new(),
             layout: self.layout.clone(),
             ..*self
@@ -177,7 +177,7 @@ impl Equations {
     /// Mean square of the residual, not below that of rounding: of the output error where the filter is that of the model.
     pub(crate) fn mean_square(&self) -> f64 {
         let rounding = ROUNDING * ROUNDING * self.measured_squares;
-        // Not a number stays what it is.
+        // NaN stays NaN.
         match self.residual_squares < rounding {
             true => rounding / self.samples as f64,
             false => self.residual_squares / self.samples as f64,

@@ -1,5 +1,4 @@
-//! What can be wrong with a record, a structure or an estimate: each message names what it is about, the numbers that disagree and the
-//! mend, in one line.
+//! Errors of records, structures and estimates: each message names the object, the numbers that disagree and the correction, in one line.
 
 /// Everything this crate can refuse.
 #[derive(Debug, thiserror::Error)]
@@ -20,7 +19,7 @@ pub enum Error {
     /// B of a larger degree than A.
     #[error("B of input {input} has degree {m} over A of degree {n}; choose m of at most {n}")]
     Improper {
-        /// Which input, from 1.
+        /// Number of the input, from 1.
         input: usize,
         /// Degree of A.
         n: usize,
@@ -51,7 +50,7 @@ pub enum Error {
         record: String,
         /// Which signal.
         what: String,
-        /// Which sample, from 0.
+        /// Index of the sample, from 0.
         index: usize,
         /// What was found.
         value: f64,
@@ -83,7 +82,7 @@ pub enum Error {
         what: &'static str,
         /// What was given.
         value: f64,
-        /// What it may be.
+        /// Allowed range.
         range: &'static str,
     },
     /// A delay that leaves too little of a record.
@@ -159,7 +158,7 @@ pub enum Error {
     Constant {
         /// Which signal.
         what: String,
-        /// Where it stands.
+        /// Constant value of the signal.
         value: f64,
     },
     /// Steps that differ, where the method counts in samples.
@@ -175,7 +174,7 @@ pub enum Error {
         step: f64,
         /// The mean step.
         expected: f64,
-        /// What needs even steps.
+        /// Method that needs even steps.
         what: &'static str,
     },
     /// A record in a loop beside one that is not.
@@ -185,12 +184,12 @@ pub enum Error {
     MixedLoops {
         /// Name of the record.
         record: String,
-        /// What it has.
+        /// Property of this record.
         found: &'static str,
-        /// What the first one has.
+        /// Property of the first record.
         first: &'static str,
     },
-    /// No model of the input from the reference.
+    /// No model of the input as a function of the reference was found.
     #[error(
         "{record}: {samples} samples give no stable model of the input from the reference, and without it there are no instruments in a loop; give at least {needed}, and a reference that changes often"
     )]

@@ -44,12 +44,12 @@ use crate::{Data, Delay, Error, Structure};
 
 /// Starts from which the iteration is followed until so many have converged.
 const STARTS: usize = 3;
-/// Times that a delay is looked for again beside the one that was found under coloured noise.
+/// Number of repetitions of the search for neighbouring delays with the coloured noise model.
 const MOVES: usize = 4;
 /// Largest order of the noise that stands behind the standard errors of SRIVC.
 const NOISE_ORDER: usize = 8;
 
-/// What is taken for the noise.
+/// Assumed noise model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Noise {
@@ -59,7 +59,7 @@ pub enum Noise {
     Autoregressive,
 }
 
-/// What may be set.
+/// Settings of an estimation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// What is taken for the noise.
@@ -95,7 +95,7 @@ pub enum Kind {
     },
     /// `b_i` of an input.
     B {
-        /// Which input, from 0.
+        /// Index of the input, from 0.
         input: usize,
         /// The power of p.
         power: usize,
@@ -107,7 +107,7 @@ pub enum Kind {
     },
     /// Offset of a record: output unit, with an integrator output unit/time.
     Offset {
-        /// Which record, from 0; the parts of one count as one.
+        /// Index of the record, from 0; the parts of one record count as one.
         record: usize,
     },
 }
@@ -119,7 +119,7 @@ pub struct Parameter {
     pub kind: Kind,
     /// Its estimate.
     pub value: f64,
-    /// Its standard error; nothing for a delay at the end of its range.
+    /// Standard error; none for a delay at the end of its range.
     pub std_error: Option<f64>,
 }
 
@@ -151,9 +151,9 @@ pub struct Estimate {
     pub iterations: usize,
     /// Whether the estimates have converged; else they are those with the least output error on the way, and their standard errors mean little.
     pub converged: bool,
-    /// Of each record, the first sample that counts: the inputs before it are not known under the delays.
+    /// For each record, the first sample that is used: for earlier samples the delayed inputs are not known.
     pub first: Vec<usize>,
-    /// Of each record from there on, the simulated output on the measured inputs; output unit.
+    /// For each record from this sample on, the output simulated from the measured inputs; output unit.
     pub simulated: Vec<Vec<f64>>,
 }
 
@@ -173,7 +173,7 @@ impl Estimate {
     }
 }
 
-/// Estimates a plant from records of it.
+/// Estimates a plant from its records.
 ///
 /// # Errors
 /// All of [`Error`]: see there.
@@ -250,7 +250,7 @@ pub fn estimate(
     }
     let least = found.iter().map(|found| found.mean_square);
     let least = least.fold(f64::INFINITY, f64::min);
-    // Of those that fit about as well one that has converged.
+    // Among estimates with about the same fit, one that has converged.
     let near = found
         .into_iter()
         .filter(|found| found.mean_square <= least * problem.growth());
@@ -262,7 +262,7 @@ pub fn estimate(
     let mut best = best.ok_or(refused.or(last_error).unwrap_or(Error::NoStart { tried }))?;
     let order = match settings.noise {
         Noise::Autoregressive => Some(settings.noise_order),
-        // One variance needs no weights, several do.
+        // With equal variances no weights are needed.
         Noise::White if records.iter().filter(|r| !r.continues).count() > 1 => Some(0),
         Noise::White => None,
     };

@@ -44,7 +44,7 @@ pub(crate) struct Refined {
     pub(crate) at_limit: Vec<usize>,
 }
 
-/// What the equations ask for at a model.
+/// Equations at a model.
 struct Asked {
     next: Model,
     /// Whether no estimate would move by more than this share of its standard error.
@@ -52,14 +52,14 @@ struct Asked {
     at_limit: Vec<usize>,
 }
 
-/// By how much each delay may move: less where it has turned back.
+/// Largest change of each delay: smaller after the direction of its change has reversed.
 struct Reach {
     most: Vec<f64>,
     last: Vec<f64>,
 }
 
 impl Problem<'_> {
-    /// By which factor an output error may be above the least one and its model still be the better one.
+    /// Largest ratio of an output error to the least one for which the model is still preferred.
     pub(crate) fn growth(&self) -> f64 {
         1.0 + GROWTH[usize::from(self.records.iter().any(Prepared::is_in_loop))]
     }

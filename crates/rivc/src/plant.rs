@@ -1,4 +1,4 @@
-//! A plant that is known, on a record of its own: what it says from the inputs alone.
+//! Simulation of a known plant on another record from the inputs alone.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -23,7 +23,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Of one input without delay.
+    /// A plant with one input and no delay.
     pub fn new(a: Vec<f64>, b: Vec<f64>) -> Self {
         Self {
             a,
@@ -79,7 +79,7 @@ impl Plant {
             free.extend_from_slice(&row.z[row.z.len() - own..]);
         });
         let mut free = DMatrix::from_row_slice(forced.len(), own, &free);
-        // Each of size 1, so that none is lost beside another.
+        // Each column is scaled to 1, so that none is lost by rounding.
         for mut column in free.column_iter_mut() {
             let size = column.norm();
             if size > 0.0 {

@@ -34,7 +34,7 @@ use crate::{CoupledRow, Derivatives, Error, Gain};
 /// Halvings of a step that would lose the stability of the model, before it is not made at all.
 const HALVINGS: u32 = 10;
 
-/// By default the shortest lag, beside the others of the start, is kept above this times `dt`.
+/// Default lower bound of the shortest lag, in addition to the other lags of the start: this factor times `dt`.
 const SHORTEST_LAG: f64 = 0.05;
 
 /// An output of the model beyond this has left any sense.
@@ -74,12 +74,12 @@ pub struct StabilizedOe<const N: usize, const P: usize, G, D, const R: usize = 0
     gain: G,
     derivatives: D,
     model: Model<N, P>,
-    /// As the gain has it.
+    /// Estimates of the gain.
     theta: SVector<f64, P>,
     theta_bounds: Option<Bounds<P>>,
-    /// Of the step they were made for: where none are given.
+    /// Step and its default bounds, which are used if no bounds are given.
     default_bounds: (f64, Bounds<P>),
-    /// Of all steps, s.
+    /// Shortest of all steps, s.
     shortest: f64,
     /// `a_{n-1}` of the start, 1 for n = 1.
     slower: f64,
@@ -90,7 +90,7 @@ pub struct StabilizedOe<const N: usize, const P: usize, G, D, const R: usize = 0
     bounded: Bounded,
 }
 
-/// How often the estimates had to be brought back, since the start.
+/// Number of corrections of the estimates by bounds since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bounded {
@@ -193,7 +193,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         &self.rows
     }
 
-    /// By how much the estimates violate each row; unit of its `chi`.
+    /// Violation of each row by the estimates; unit of its `chi`.
     pub fn violations(&self) -> [f64; R] {
         let filter = self.gain.filter();
         self.rows.map(|row| row.violation(&self.theta, &filter))
@@ -273,7 +273,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         self.model.state[0]
     }
 
-    /// How often the estimates had to be brought back.
+    /// Number of corrections of the estimates by bounds.
     pub fn bounded(&self) -> Bounded {
         self.bounded
     }

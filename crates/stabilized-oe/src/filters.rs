@@ -24,7 +24,7 @@ use crate::{Derivatives, Error, IoSample};
 pub struct StateVariableFilters<const N: usize> {
     u: StateVariableFilter,
     y: StateVariableFilter,
-    /// Since the filter of the output was moved last.
+    /// Time since the last update of the output's filter.
     since: f64,
 }
 
@@ -38,7 +38,7 @@ impl<const N: usize> StateVariableFilters<N> {
         Self::with_input(lambda, Hold::Zero)
     }
 
-    /// The same for an input that is held between samples, or that runs on lines as the output does.
+    /// Filters for an input that is held between samples, or that is linear between samples like the output.
     ///
     /// # Errors
     /// As of [`new`](Self::new).

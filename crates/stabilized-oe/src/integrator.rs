@@ -1,4 +1,4 @@
-//! How the model's states are carried over a step: exactly, or by Euler's rule to compare with.
+//! Integration of the model's states over a step: exact, or Euler's rule for comparison.
 //!
 //! Exact: `x' = A x + b w` with the companion matrix `A` of `A^` and `w = B^ u` held or on a line,
 //! ```text
@@ -24,7 +24,7 @@ pub(crate) mod sealed {
         /// Whether a model that is stable stays so over any step. Otherwise its poles may not be faster than the step.
         const ANY_STEP: bool;
 
-        /// One step of `dt` seconds of the model with the coefficients `a = (a_1, .., a_n)` and the drive from `w0` to `w1`.
+        /// One step of `dt` seconds of the model with the coefficients `a = (a_1, .., a_n)` and an input that changes from `w0` to `w1`.
         fn advance<const N: usize>(state: &mut [f64; N], a: &[f64; N], w: (f64, f64), dt: f64);
     }
 }

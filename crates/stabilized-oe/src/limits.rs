@@ -5,7 +5,7 @@ use nalgebra::SVector;
 
 use crate::Error;
 
-/// By default `a_i`, `i < n`, is kept above this times `dt^i`.
+/// Default lower bound of `a_i`, `i < n`: this factor times `dt^i`.
 const FLOOR: f64 = 1e-3;
 
 pub(crate) fn inside<const K: usize>(

@@ -16,7 +16,7 @@ pub(crate) struct Model<const N: usize, const P: usize> {
     held: Option<Held<P>>,
 }
 
-/// What the step that is under way began with.
+/// Values at the beginning of the current step.
 #[derive(Clone, Copy, Debug)]
 struct Held<const P: usize> {
     theta: [f64; P],

@@ -1,4 +1,4 @@
-//! What two adaptive blocks and a constant gain do to one error over a step: three integrals.
+//! Effect of two adaptive blocks and a constant gain on one error over a step: three integrals.
 
 use ct_rls::Weights;
 

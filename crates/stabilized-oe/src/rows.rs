@@ -28,7 +28,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::Error;
 
-/// One linear statement about `theta = (a_1, .., b_m)` and `c = (c_1, .., c_n)`: a row of `F` and `F_c` in (4.14) of the paper.
+/// One linear constraint on `theta = (a_1, .., b_m)` and `c = (c_1, .., c_n)`: a row of `F` and `F_c` in (4.14) of the paper.
 ///
 /// `K = b_0` is such a row, and without noise `c_i = a_i`. With noise a row that couples the two draws `theta^` to where noise draws
 /// `c^`: `c_1 >= a_1/2` takes `a_1` from 10.3 (truth 10) to 1.8, where `c_1 >= 8` leaves 10.9 (`cargo test -p stabilized-oe --test all rows::`).
@@ -113,7 +113,7 @@ pub(crate) fn window(weights: Weights, dt: f64) -> f64 {
     }
 }
 
-/// What stands for no bound in the check.
+/// Value that means no bound in the check.
 const FAR: f64 = 1e90;
 
 /// Whether some `(theta, c)` obeys all rows.

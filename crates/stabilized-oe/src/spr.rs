@@ -21,13 +21,13 @@ use ct_lti::{Polynomial, Positivity, TransferFunction};
 
 use crate::{Derivatives, Error, Gain, StabilizedOe};
 
-/// What the check of bounds on `c^` found. [`Display`](core::fmt::Display) says it in a sentence, which is the warning where it fails.
+/// Result of the check of bounds on `c^`. [`Display`](core::fmt::Display) gives it in a sentence, which is the warning if the check fails.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use = "bounds outside such a set guarantee nothing: print this result, or look at hold()"]
 pub enum FilterBounds<const N: usize> {
     /// `C^/A0 - d` is strictly positive real for every `c` and every plausible plant.
     PositiveReal,
-    /// It is not for these, a corner of the two boxes.
+    /// The transfer function is not positive real for these values, a corner of the two boxes.
     NotPositiveReal {
         /// `c_1` to `c_n`
         c: [f64; N],
@@ -40,7 +40,7 @@ pub enum FilterBounds<const N: usize> {
         /// `d`
         above: f64,
     },
-    /// Not every plausible plant is stable; the corner `a_1` to `a_n` is not.
+    /// A plausible plant is unstable: the corner `a_1` to `a_n`.
     PlantUnstable {
         /// `a_1` to `a_n`
         a: [f64; N],
@@ -175,7 +175,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         )
     }
 
-    /// As [`with_filter_bounds`](Self::with_filter_bounds), with the answer of [`check_filter_bounds`](Self::check_filter_bounds) to it.
+    /// As [`with_filter_bounds`](Self::with_filter_bounds), with the result of [`check_filter_bounds`](Self::check_filter_bounds).
     ///
     /// # Errors
     /// [`Error::StartOutside`], [`Error::Plausible`].

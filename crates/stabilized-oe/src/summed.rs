@@ -143,11 +143,11 @@ impl<const N: usize, const P: usize> AdaptivePlusConstant<N, P> {
     }
 }
 
-/// What a step of data or of a row is made of.
+/// Parts of a step of data or of a row.
 struct Step {
-    /// Of either block, with the forgetting that takes place.
+    /// Weights of each block, with the actual forgetting.
     weights: [Weights; 2],
-    /// What the constant part is multiplied by.
+    /// Factor of the constant part.
     constant: f64,
     dt: f64,
 }
@@ -253,7 +253,7 @@ impl<const N: usize, const P: usize> Gain<N, P> for AdaptivePlusConstant<N, P> {
         self.blocks.set_theta(theta)
     }
 
-    /// That of the adaptive part; the constant one asks for less.
+    /// Condition of the adaptive part; that of the constant part is weaker.
     fn positive_above(&self) -> f64 {
         self.blocks.positive_above()
     }

@@ -43,8 +43,8 @@ pub(crate) fn scores(base: &Node, single: &[Node], noise: &Noise, floors: &[f64]
         .collect()
 }
 
-/// How many times larger an effect has to be to be seen in this noise than in white noise of the same size: the median
-/// over the effects that have a signature where they are absent. `None` where the noise is white.
+/// Ratio of the minimum detectable sizes in this noise and in white noise of the same variance: the median over the effects that have a
+/// signature at their absent value. `None` for white noise.
 pub(crate) fn price_of_colour(base: &Node, single: &[Node], noise: &Noise) -> Option<f64> {
     if noise.order() == 0 {
         return None;
@@ -117,7 +117,8 @@ mod tests {
 
     #[test]
     fn what_is_visible_hangs_on_the_noise_and_not_on_the_effect() {
-        // Both levels of two linear tanks; the lower sensor drifts by ten times the noise, which is in the residual where it is absent.
+        // Both levels of two linear tanks; the lower sensor drifts by ten times the noise, so the residual of a model without the drift
+        // contains it.
         let mut problem = simulated::two_levels(5);
         for (k, y) in problem.records[0].outputs[1].values.iter_mut().enumerate() {
             *y += 0.0005 * INTERVAL * k as f64;

@@ -5,7 +5,7 @@ use plants::{Domain, EffectInfo};
 use super::{list, with_error};
 use crate::{Acceptance, Diagnosis, Step, Verdict};
 
-/// What an effect is outside hydraulics; `None` within, where its name says it, and for a term of the user's own.
+/// Description of an effect outside hydraulics; `None` in hydraulics, where the name is sufficient, and for a user's own term.
 pub(super) fn in_general(effect: &str, domain: Domain) -> Option<&'static str> {
     let effect = EffectInfo::find(effect).filter(|_| domain == Domain::General)?;
     effect.general
@@ -75,7 +75,7 @@ pub(super) fn size_of(effect: &str, step: &Step) -> String {
         .parameters
         .iter()
         .filter_map(|p| Some((p, p.name.strip_prefix(&prefix)?)))
-        // Where a lag stood before the record says nothing of the effect.
+        // The initial state of a lag is not a size of the effect.
         .filter(|(_, name)| !name.starts_with("before"))
         .enumerate()
         .filter(|(k, (p, _))| *k == 0 || p.std_error.is_some())
@@ -88,7 +88,7 @@ pub(super) fn size_of(effect: &str, step: &Step) -> String {
     }
 }
 
-/// How much of the excess error the effects of a partial answer explain.
+/// Share of the excess error that the effects of a partial explanation explain.
 pub(super) fn of_acceptance(acceptance: &Acceptance) -> Option<String> {
     let share = acceptance.share?;
     let held_out = acceptance.share_test.map_or(String::new(), |share| {

@@ -5,7 +5,7 @@ use ct_signals::{Gaps, duration};
 use crate::{LONGEST_HOLD, MendedGaps};
 
 impl MendedGaps {
-    /// In a sentence; nothing where there is nothing to say.
+    /// One sentence; `None` without gaps.
     #[must_use]
     pub fn sentence(&self) -> Option<String> {
         of_gaps(self)

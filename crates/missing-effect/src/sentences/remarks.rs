@@ -1,4 +1,4 @@
-//! What there is to say beside the verdict.
+//! Remarks in addition to the verdict.
 
 use ct_signals::Channel;
 use plants::Placed;
@@ -9,7 +9,7 @@ use crate::{
     numbers::significant,
 };
 
-/// That more effects were found than may be added.
+/// Remark: more effects were found than may be added.
 pub(crate) fn of_a_stop(most: usize, needed: usize) -> String {
     format!(
         "The search was stopped at {most} {}: the data call for {needed}.",
@@ -32,7 +32,7 @@ pub(crate) fn of_a_part(last: &Node) -> String {
     )
 }
 
-/// What readings say of their converters, a sentence for each output whose readings are rounded.
+/// Remark on quantisation: one sentence for each output with rounded readings.
 pub(crate) fn of_rounding(rounded: &[RoundedOutput], outputs: &[Channel]) -> String {
     let of_output = |rounded: &RoundedOutput| {
         let output = &outputs[rounded.output];
@@ -53,7 +53,7 @@ pub(crate) fn of_rounding(rounded: &[RoundedOutput], outputs: &[Channel]) -> Str
     all.join(" ")
 }
 
-/// That the two weightings of the residual rank different effects first.
+/// Remark: the two weightings of the residual rank different effects first.
 pub(crate) fn of_rankings(rankings: &Rankings) -> Option<String> {
     let (white, prewhitened) = (rankings.white.first()?, rankings.prewhitened.first()?);
     rankings.disagree.then(|| {
@@ -77,7 +77,7 @@ pub(crate) fn of_courses(dropped: &[Placed]) -> Option<String> {
     })
 }
 
-/// That the minimum of the last model was not found twice.
+/// Remark: the minimum of the last model was not found twice.
 pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
     let step = diagnosis.steps.last()?;
     (step.starts_agree < 2 && step.starts > 0).then(|| {
@@ -108,7 +108,7 @@ pub(crate) fn of_held_out(diagnosis: &Diagnosis) -> Option<String> {
     })
 }
 
-/// What the standard errors do not hold beside a term of the user's own.
+/// Remark: the standard errors do not include the uncertainty of a user's own term.
 pub(crate) fn of_terms(problem: &Problem) -> Option<String> {
     let names: Vec<_> = problem.terms.iter().map(|term| term.name.clone()).collect();
     (!names.is_empty()).then(|| {
@@ -119,7 +119,7 @@ pub(crate) fn of_terms(problem: &Problem) -> Option<String> {
     })
 }
 
-/// What the colour of the noise costs, where it costs something.
+/// Remark: the loss of detectability by the coloured noise, if it is large.
 pub(crate) fn of_the_colour(price: f64) -> Option<String> {
     (price >= 1.2).then(|| format!(
         "The noise is coloured: an effect has to be about {} times larger to be detected than in white noise of the same variance. Effects smaller than the sizes under \"visible from\" may be present.",

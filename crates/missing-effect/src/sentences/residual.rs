@@ -1,4 +1,4 @@
-//! What the residual of a model holds that is not noise.
+//! Structure in the residual of a model that is not noise.
 
 use ct_signals::duration;
 
@@ -9,7 +9,7 @@ use crate::{
     numbers::significant,
 };
 
-/// What is left in the residual of a step, as the end of a sentence.
+/// Structure in the residual of a step, as the end of a sentence.
 pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
     // A comparison has not looked into the catalogue.
     let effect = if diagnosis.scores.is_empty() {
@@ -17,7 +17,7 @@ pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> Strin
     } else {
         "an effect outside the catalogue"
     };
-    // Of several outputs the one that shows it.
+    // With several outputs, the output with the structure.
     let shown = step.rmse_per_output.0.get(left.output);
     let shown = PerOutput(shown.cloned().into_iter().collect());
     let residual = rms(&shown, &diagnosis.output_unit);

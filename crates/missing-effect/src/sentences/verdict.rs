@@ -14,7 +14,7 @@ use crate::{
     numbers::significant,
 };
 
-/// What a comparison alone can say.
+/// Verdict of a comparison alone.
 pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<String> {
     let Some(step) = diagnosis.steps.first() else {
         return Vec::new();
@@ -55,7 +55,7 @@ fn visible(diagnosis: &Diagnosis) -> String {
     sizes.join(", ")
 }
 
-/// What there is to say, the verdict first.
+/// All sentences, the verdict first.
 pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<String> {
     let unit = &diagnosis.output_unit;
     let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) else {
@@ -137,7 +137,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
     said
 }
 
-/// From what errors fall to what: `from 0.900 to 0.300 cm`, of several outputs each with its name.
+/// Fall of the errors: `from 0.900 to 0.300 cm`, with the output's name if there are several.
 fn falls(before: &PerOutput, after: &PerOutput, unit: &str) -> String {
     let several = before.0.len() > 1;
     let pairs = before.0.iter().zip(after.values());

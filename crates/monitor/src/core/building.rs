@@ -1,4 +1,4 @@
-//! What runs is built from plain numbers and the rows that are kept.
+//! Builds the running monitor from plain numbers and the stored rows.
 
 use ct_signals::Hold;
 

@@ -1,4 +1,4 @@
-//! Gathering rows to learn from, and taking over what was learned.
+//! Collects rows for learning, and starts monitoring with the learned model.
 
 use std::collections::VecDeque;
 
@@ -17,7 +17,7 @@ use crate::{
 };
 
 impl Core<'_> {
-    /// Begins to learn anew.
+    /// Starts learning again.
     pub(super) fn begin(&mut self, every: usize) {
         self.now.phase = Phase::Learning {
             next: self.settings.learning_rows,
@@ -35,7 +35,7 @@ impl Core<'_> {
         self.set_checkpoint();
     }
 
-    /// What there is to learn from, while it learns.
+    /// Rows collected for learning, during learning.
     pub(crate) fn gathered(&self) -> Option<Gathered> {
         let Phase::Learning { next, span } = self.now.phase else {
             return None;
@@ -71,7 +71,7 @@ impl Core<'_> {
             .collect();
         let notice = match self.model.0.learn(&samples, self.hold()) {
             Err(why) => {
-                // The older half goes: what comes next may say more.
+                // The older half is dropped: later rows may contain more information.
                 self.later(2 * next, span, |kept, _| {
                     kept.drain(..KEPT / 2);
                 });
@@ -120,7 +120,7 @@ impl Core<'_> {
         }
     }
 
-    /// The learned model is run over the rows that it was learned from, and watched from now on.
+    /// Simulates the learned model over the rows that it was learned from, and starts monitoring.
     fn take_over(&mut self, learned: Learned, states: &[f64]) -> Option<Notice> {
         let (rows, time_constant) = (learned.rows() * self.now.every, learned.time_constant);
         let noise = learned

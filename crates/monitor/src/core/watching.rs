@@ -1,4 +1,4 @@
-//! Watching: what scores and scatter say of a row, and the looks after an alarm.
+//! Monitoring: evaluation of scores and noise for each row, and evaluations after an alarm.
 
 use super::{Core, Fed, Following, KEPT, Phase, STRETCH, learning::at_rest};
 use crate::{
@@ -9,9 +9,9 @@ use crate::{
     watched::Raised,
 };
 
-/// After a long gap the levels are not known for so many slowest time constants.
+/// After a long gap the levels are unknown for this number of slowest time constants.
 const SETTLING: f64 = 6.0;
-/// After an alarm it is looked again, so many slowest time constants later.
+/// After an alarm the rows are evaluated again after these numbers of slowest time constants.
 const LOOKS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 12.0];
 /// At so many of them the tracker is let go again: the derivatives are those of parameters that stay, and while the change works its way
 /// through the plant they mislead it.
@@ -20,11 +20,11 @@ const LET_GO: usize = 3;
 const FEWEST: usize = 8;
 /// The model fits again where every score has stayed below this share of the threshold ...
 const QUIET: f64 = 0.75;
-/// ... for so many slowest time constants, the longest window of the scores.
+/// ... for this number of slowest time constants, the longest window of the scores.
 const QUIET_FOR: f64 = 6.0;
 
 impl Core<'_> {
-    /// After a long gap: what was gathered is no record, and levels are not known.
+    /// After a long gap: the collected rows do not continue, and levels are not known.
     pub(super) fn resume(&mut self, sample: &Sample) -> Option<Notice> {
         let Some(learned) = &self.now.learned else {
             if self.now.kept.is_empty() {
@@ -42,7 +42,7 @@ impl Core<'_> {
             following.quiet = 0;
         }
         self.now.settling = (SETTLING * learned.rows_per_time_constant()).ceil() as usize;
-        // What is read is where it is read; the others are taken where they were.
+        // Measured levels start at their readings, the others at their last values.
         let last = self.now.kept.back();
         let mut states = last.map_or_else(
             || Each::from_slice(&learned.operating),
@@ -115,7 +115,7 @@ impl Core<'_> {
         fed
     }
 
-    /// How many times as large as learned the noise of each output is.
+    /// Ratio of the present to the learned noise for each output.
     fn growth(&self) -> Each<f64> {
         self.now.scatter.iter().map(Scatter::growth).collect()
     }
@@ -133,7 +133,7 @@ impl Core<'_> {
         if let Some(bank) = &mut self.now.bank
             && matches!(moved, Moved::Grown(_))
         {
-            // What was summed up of larger noise than was reckoned with says nothing.
+            // Sums over rows with noise above the assumed level are not valid.
             bank.begin();
         }
         let model = &self.model.0;
@@ -144,7 +144,7 @@ impl Core<'_> {
         Some(ScatterAlarm::new(moved, time, name, (noise, unit)))
     }
 
-    /// What follows from whether a score has passed, or, while an alarm is followed, has not stayed small.
+    /// Reaction to a score above its threshold or, during an alarm, to a score that has not stayed small.
     fn judge(&mut self, passed: bool, time: f64) -> (Option<Alarm>, Option<Notice>) {
         match self.now.phase {
             Phase::Watching if passed && !self.now.scatter.iter().any(Scatter::is_suspicious) => {

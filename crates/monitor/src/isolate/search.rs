@@ -52,7 +52,7 @@ impl Search<'_> {
         let mut best: Option<(Suspect, usize, Vec<f64>)> = None;
         let mut near: Option<Vec<f64>> = None;
         for (i, &length) in lengths.iter().enumerate() {
-            // From the catalogue's starts now and then, in between from where the last onset ended.
+            // Fits start from the catalogue's values at some onsets, and otherwise from the result of the preceding onset.
             let from = near.take().filter(|_| !i.is_multiple_of(AFRESH));
             let Some((suspect, x)) = self.fitted((placed, held), length, from.as_deref(), ROUGH)
             else {
@@ -155,11 +155,11 @@ impl Search<'_> {
         let own = structure.effect_parameters(placed);
         let leading = own.first()?.clone();
         let name = |parameter: &str| format!("{}.{parameter}", placed.effect.id);
-        // Its onset is that of the record.
+        // The onset of this effect is the start of the record.
         if placed.effect.id == "valve_step" {
             fixed.insert(name("time"), 0.0);
         }
-        // It followed the command until then.
+        // The actuator followed the command until the onset.
         fixed.insert(BEGIN_IN_BAND.into(), 0.0);
         if let Some(held) = own.iter().find(|parameter| Some(parameter.name) == held) {
             fixed.insert(name(held.name), held.upper);
@@ -217,7 +217,7 @@ impl Search<'_> {
     }
 }
 
-/// All combinations of the starts of an effect's first parameters.
+/// All combinations of the start values of an effect's first parameters.
 fn grid(parameters: &[plants::ParameterInfo], count: usize) -> Vec<Vec<f64>> {
     parameters
         .iter()

@@ -1,4 +1,4 @@
-//! What has been learned of a plant and of its noise.
+//! Learned parameters of a plant and of its noise.
 
 use ct_signals::{ArModel, Hold};
 use greybox::{Noise, PriorValue};
@@ -26,9 +26,9 @@ pub struct Model {
     pub start: BTreeMap<String, f64>,
     /// Names in `start` that are not fitted, but watched.
     pub fixed: Vec<String>,
-    /// What is known of parameters beside the rows, by the same names.
+    /// Priors of parameters, by the same names.
     pub priors: BTreeMap<String, PriorValue>,
-    /// What the command does between rows.
+    /// Hold of the command between rows.
     pub hold: Hold,
 }
 
@@ -66,12 +66,12 @@ impl Model {
     }
 }
 
-/// What was learned.
+/// Result of learning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Learned {
     /// The parameters, in the structure's order.
     pub theta: Vec<f64>,
-    /// Their covariance, row by row; zero for what was not fitted, or held at a bound.
+    /// Covariance of the parameters, row by row; zero for a parameter that was not fitted, or is held at a bound.
     pub covariance: Vec<f64>,
     /// The noise of each output.
     pub outputs: Vec<OutputNoise>,
@@ -81,7 +81,7 @@ pub(crate) struct Learned {
     pub interval: f64,
     /// States where it works as a rule.
     pub operating: Vec<f64>,
-    /// Of a plant: sizes by which its effects are scaled, and steps of the simulation in an interval.
+    /// For a plant: scales of its effects, and steps of the simulation per interval.
     pub scales: Option<Scales>,
     pub substeps: usize,
 }
@@ -94,7 +94,7 @@ pub(crate) struct OutputNoise {
     pub sigma: f64,
     /// Readings from which it was learned.
     pub readings: usize,
-    /// How far neighbouring innovations lie apart.
+    /// Limit of the differences between neighbouring innovations.
     pub scatter: Limit,
 }
 

@@ -40,14 +40,14 @@ const BEGIN: [&str; 11] = [
     "coupling",
     "leak_at_height",
 ];
-/// So does a parameter that has another value from then on.
+/// A step of a parameter has the same property.
 const STEP: &str = "step";
 /// Onsets that are tried, in rows behind the one that is found first.
 const AROUND: [f64; 5] = [1.0, 0.6, 0.8, 1.25, 1.6];
-/// So many starts of an effect are fitted, those that leave least.
+/// Number of starts that are fitted for an effect, those with the least sum of squares.
 const STARTS: usize = 3;
-/// So many candidates of the user's own are tried at every onset, those that explain most at the one that is found first: a file may hold
-/// hundreds, and rows do not wait.
+/// Number of the user's own candidates that are tried at every onset. The candidates with the largest improvement at the first onset are
+/// chosen: a file may contain hundreds, and computing time per row is limited.
 const OWN: usize = 16;
 
 /// An effect that explains the latest rows, as well as it can.
@@ -119,7 +119,7 @@ pub(super) fn isolate(
         let keys = (b.plausible, b.evidence).partial_cmp(&(a.plausible, a.evidence));
         keys.unwrap_or(std::cmp::Ordering::Equal)
     });
-    // Of several onsets the one that explains most.
+    // Of several onsets, the one that explains most.
     let mut best: Vec<Suspect> = Vec::with_capacity(suspects.len());
     for suspect in suspects {
         if best.iter().all(|known| known.effect != suspect.effect) {
@@ -131,7 +131,7 @@ pub(super) fn isolate(
 
 /// The rows behind an onset.
 struct Window {
-    /// When it begins \[s\].
+    /// Onset \[s\].
     since: f64,
     records: [Record; 1],
     states: Vec<f64>,
@@ -208,13 +208,13 @@ impl Search<'_, '_> {
         Some(setup.with_free(&free).with_scales(self.sigmas.clone()))
     }
 
-    /// Which state of the learned model this is; `None` of one that an effect brings.
+    /// Index of this state in the learned model; `None` for a state of an effect.
     fn learned_state(&self, state: &State) -> Option<usize> {
         let mut learned = self.spec.states.iter();
         learned.position(|own| own.about.name == state.about.name)
     }
 
-    /// Where a fit begins: the states are those of the learned model; what an effect brings is at its start.
+    /// Start of a fit: states of the learned model; parameters and states of an effect have their start values.
     fn vector(&self, setup: &ModelSetup, states: &[f64]) -> Vec<f64> {
         let mut x = setup.start().to_vec();
         let first = setup.parameter_count();
@@ -227,7 +227,7 @@ impl Search<'_, '_> {
         x
     }
 
-    /// Those of the user's own. `since`: the onset that is found first \[s\].
+    /// Candidates of the user's own. `since`: the onset that was found first \[s\].
     fn of_own(&self, windows: &[Window], since: f64) -> Vec<Suspect> {
         let first = windows
             .iter()
@@ -255,7 +255,7 @@ impl Search<'_, '_> {
     /// A candidate fitted behind an onset; `model`: the learned one with the candidate in it.
     fn suspect(&self, window: &Window, candidate: &Candidate, model: &Model) -> Option<Suspect> {
         let is_step = candidate.effect.is_some_and(|effect| effect.id == STEP);
-        // Its onset is that of the rows.
+        // The onset of this candidate is the first row.
         let begin = candidate.record_numbers.get("begin");
         let since = candidate
             .parameters
@@ -307,7 +307,7 @@ impl Search<'_, '_> {
         let leading = |(at, p): &&(usize, &ct_model::effects::EffectParameter)| {
             p.role != Role::Choice && setup.free().contains(at)
         };
-        // Of a candidate of the user's own the one that is zero without it, if there is such a one.
+        // For a candidate of the user's own, the parameter that is zero if the effect is absent, if there is one.
         let is_size = |(_, p): &&(usize, &ct_model::effects::EffectParameter)| {
             candidate.effect.is_none() && p.role == Role::Size
         };

@@ -17,7 +17,7 @@ use crate::{
 
 /// Derivatives by so many states at once.
 const LANES: usize = 4;
-/// What is nearer to one than this does not settle within the rows that are kept.
+/// An eigenvalue closer to one does not decay within the stored rows.
 const SETTLES: f64 = 1e-7;
 
 /// The fit, and the states at the first row; in words why there is none.
@@ -163,7 +163,7 @@ fn time_constant(
 ) -> Result<f64, String> {
     let n = states.len();
     if n == 0 {
-        // What has no state follows at once.
+        // A model without states responds at once.
         return Ok(interval);
     }
     let mean = |i: usize| samples.iter().map(|s| s.inputs[i]).sum::<f64>() / samples.len() as f64;
@@ -191,6 +191,6 @@ fn time_constant(
             "the fitted model does not settle under steady inputs, so that it cannot run beside the plant".into(),
         );
     }
-    // What settles within an interval has a time constant far below it.
+    // A response that decays within one interval has a time constant far below the interval.
     Ok((-interval / largest.max(f64::MIN_POSITIVE).ln()).max(1e-3 * interval))
 }

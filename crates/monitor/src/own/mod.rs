@@ -36,7 +36,7 @@ pub struct OwnModel<'a> {
     pub model: &'a Model,
     /// Parameters that are not fitted, by name.
     pub known: BTreeMap<String, f64>,
-    /// What is known of parameters beside the rows, by name.
+    /// Priors of parameters, by name.
     pub priors: BTreeMap<String, PriorValue>,
     /// What the inputs do between rows.
     pub hold: Hold,
@@ -76,7 +76,7 @@ impl<'a> OwnModel<'a> {
         fitted.map(|(i, _)| i).collect()
     }
 
-    /// All parameters, the watched ones with these values.
+    /// All parameters, with these values for the monitored ones.
     fn parameters_with(&self, theta: &[f64]) -> Vec<f64> {
         let mut all = self.model.parameters();
         for (value, parameter) in all.iter_mut().zip(&self.model.spec().parameters) {
@@ -172,7 +172,7 @@ impl<'a> Believed<'a> for OwnModel<'a> {
     fn fingerprint(&self) -> Fingerprint {
         let mut all = Fingerprint::new();
         let mut add = |key: String, value: String| drop(all.insert(key, value));
-        // As it is written: a comment or another layout is no other model.
+        // Compared in normalised form: a comment or another layout does not make another model.
         add("model".into(), self.model.spec().to_string());
         add("hold".into(), format!("{:?}", self.hold).to_lowercase());
         add(TIME_UNIT.into(), self.time_unit.to_string());

@@ -1,4 +1,4 @@
-//! Since when a model of its user's own does not fit: the onset of the one change that explains the latest rows best.
+//! Onset of a deviation for a user's own model: the onset of the single change that explains the latest rows best.
 //!
 //! A change of direction `i` (a watched parameter, or an offset of one output) by `d` that begins at row `j` adds `d s_i(k)` to the outputs
 //! from then on, `s_i` the derivative of the learned model that begins at the states of row `j`. With `s` whitened by the noise of the
@@ -26,7 +26,7 @@ const BEHIND: f64 = 1.0;
 /// An onset has at least so many rows behind it.
 const FEWEST: usize = 2;
 
-/// When the change began \[s\] of which an alarm was raised at `raised` \[s\]; `None` where the rows say nothing of any.
+/// Onset \[s\] of the change behind an alarm at `raised` \[s\]; `None` if the rows do not determine it.
 pub(super) fn onset(
     own: &OwnModel,
     learned: &Learned,
@@ -74,7 +74,7 @@ pub(super) fn onset(
     (most > 0.0).then(|| rows[rows.len() - best].sample.time)
 }
 
-/// By how much the sum of squares of these rows falls with the best change at the first of them.
+/// Fall of the sum of squares of these rows with the best change at the first of them.
 fn gain(
     own: &OwnModel,
     learned: &Learned,

@@ -11,12 +11,12 @@ use crate::{Each, intake::Sample, sensitivity::Model as Running};
 
 struct Lanes<'a, const N: usize> {
     simulations: Vec<Simulation<'a, Dual<N>>>,
-    /// Of each simulation its outputs, as they were observed.
+    /// Outputs of each simulation.
     observed: Vec<Vec<Dual<N>>>,
     /// Model's time since it began, and how many of it a second has.
     time: f64,
     per_second: f64,
-    /// It could not go on.
+    /// Whether the simulation diverged.
     failed: bool,
 }
 

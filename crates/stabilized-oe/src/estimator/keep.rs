@@ -1,4 +1,4 @@
-//! What keeps an update within its rows, its bounds and a stable filter.
+//! Corrections of an update: rows, bounds and a stable filter.
 
 use ct_constrained::Relation;
 use ct_rls::{Innovation, Outcome};

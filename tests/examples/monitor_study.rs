@@ -110,7 +110,7 @@ fn main() {
         let delay = of_it.first().map(|alarm| (alarm.time - begun) / tau);
         let since_visible = of_it.first().map(|alarm| (alarm.time - visible) / tau);
         let holds = |alarm: &&&Alarm| alarm.effects.iter().any(|e| e == placed.effect.id);
-        // The looks after the first alarm, up to the last one, before it is learned anew.
+        // The looks after the first alarm, up to the last one, before it is learned again.
         let last = of_it
             .iter()
             .position(|alarm| alarm.event == monitor::Stage::Final)

@@ -1,4 +1,5 @@
-//! How often the intervals of a fitted model of `examples/models` hold the truth: two outputs in coloured noise, a share of the readings missing.
+//! How often the intervals of a fitted model of `examples/models` contain the true value: two outputs in coloured noise, a share of the
+//! readings missing.
 
 use std::collections::BTreeMap;
 
@@ -80,8 +81,8 @@ fn record(driven: &DrivenModel, seed: u64) -> Record {
     }
 }
 
-/// Whether the intervals of 95 % of a record hold the truth, for every fitted number that has one: as `ctid compare` fits and says them. Fits
-/// begin at the values of the model's text.
+/// Whether the intervals of 95 % of a record contain the true value, for every fitted number that has one: as `ctid compare` fits and says
+/// them. Fits begin at the values of the model's text.
 #[must_use]
 pub fn of_record(driven: &DrivenModel, seed: u64) -> Vec<(String, bool)> {
     let mut believed = driven.spec.clone();

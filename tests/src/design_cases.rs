@@ -113,7 +113,7 @@ pub fn drawn(seed: u64) -> Option<Rig> {
     )
 }
 
-/// A rig's record, where its diagnosis is one group of several that holds the truth.
+/// A rig's record, where its diagnosis is one group of several that contains the true value.
 #[must_use]
 pub fn undecided(rig: Rig, seed: u64) -> Option<Undecided> {
     let truth = rig.missing().first()?.0;

@@ -134,7 +134,7 @@ pub fn rig(plant: Plant, drive: Drive, colour: f64, samples: usize, rng: &mut Ch
 /// size goes from absent to the end of its plausible range until the ratio is met. One with which the level leaves 0.1 to 3 times the
 /// level at rest is too large. Where the ratio is not met, another rig is drawn; `None` where none of twelve would do.
 ///
-/// Coarse quantisation is a converter behind the noise of the last output, as real ones are: its structural error is that of rounding, the
+/// Coarse quantisation is a converter after the noise of the last output, as real ones are: its structural error is that of rounding, the
 /// step over the square root of 12. Where several levels are measured the error is the root mean square over all of them.
 #[must_use]
 pub fn with_effect(

@@ -45,8 +45,8 @@ pub const OUTSIDE: [(&str, Outside); 6] = [
     }),
 ];
 
-/// What an effect that follows the clock describes: a sensor that slides; and a swing of its reading, slow or quick, for a flow that
-/// swings leaves the same.
+/// What an effect that follows the clock describes: a sensor that slides; and a oscillation of its reading, slow or quick, for a flow that
+/// oscillations leaves the same.
 pub const BY_CLOCK: [(&str, Outside); 3] = [
     ("periodic_disturbance", |t| (0.0, 0.1 * (0.314 * t).sin())),
     ("periodic_disturbance", |t| (0.0, 0.5 * (0.0628 * t).sin())),

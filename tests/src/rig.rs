@@ -42,7 +42,7 @@ pub struct Rig {
     pub colour: f64,
     /// Standard deviation of a random walk beside the noise at the end of the record \[cm\]; zero: there is none.
     pub walk: f64,
-    /// The step of the converter behind the sensor, which rounds the reading with its noise \[cm\]; zero: it does not round.
+    /// The step of the converter after the sensor, which rounds the reading with its noise \[cm\]; zero: it does not round.
     pub converter: f64,
     /// How the command comes about.
     pub drive: Drive,

@@ -138,7 +138,7 @@ fn an_effect_is_found_in_the_simulated_loop() {
     }
 }
 
-/// What keeps a loop from being simulated is said, with the mend, and the measured command is used.
+/// What keeps a loop from being simulated is said, with the correction, and the measured command is used.
 #[test]
 fn a_loop_that_cannot_be_simulated_is_not() {
     let good = {

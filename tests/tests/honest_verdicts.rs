@@ -18,8 +18,8 @@ fn diagnosed(rig: &Rig, seed: u64, options: &Options) -> Diagnosis {
     diagnose(&problem(rig, seed), options, &|_| {}).unwrap()
 }
 
-/// A comparison takes a failure for no noise, and shows the simulation that comes nearest to the data, not one that a
-/// noise which wanders lets drift off.
+/// A comparison takes a failure for no noise, and shows the simulation that comes nearest to the data, not one that a noise which drifts
+/// lets drift off.
 #[test]
 fn a_comparison_shows_what_a_model_lacks() {
     for (effect, size) in [
@@ -177,7 +177,7 @@ fn an_effect_that_explains_a_small_part_is_a_remark() {
     }
 }
 
-/// A large effect is named beside a small disturbance, and in a noise that wanders more slowly than the process.
+/// A large effect is named beside a small disturbance, and in a noise that drifts more slowly than the process.
 #[test]
 fn an_effect_that_explains_nearly_all_is_named() {
     let hidden = vec![("pump_saturation", 0, vec![5.0])];

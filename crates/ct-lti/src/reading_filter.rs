@@ -3,9 +3,9 @@
 //! Method: between its readings the output is taken to run on lines, as [`Hold::First`](crate::Hold::First) has it between samples in any case: where
 //! readings are missing the line is longer, and the filter's step with it, exactly. Rows without a reading are none.
 //!
-//! A line over a time that is long beside the filter's is not what the plant did: behind a gap of more than `1/lambda`, `lambda = (e_0/e_n)^(1/n)`,
-//! rows are left out until the filter has forgotten it, down to 1 % by the response of `1/(p + lambda)^n`: for n = 1 to 4 after 4.6, 6.6, 8.4
-//! and 10 times `1/lambda`.
+//! A line over a time that is long beside the filter's is not what the plant did: after a gap of more than `1/lambda`, `lambda =
+//! (e_0/e_n)^(1/n)`, rows are left out until the filter has forgotten it, down to 1 % by the response of `1/(p + lambda)^n`: for n = 1 to 4
+//! after 4.6, 6.6, 8.4 and 10 times `1/lambda`.
 //!
 //! Cost: that of [`StateVariableFilter`]; where no reading is missing its values are the same, bit for bit.
 //!

@@ -174,7 +174,7 @@ impl LinearForm {
         entries.all(|v| v.is_finite()) && offsets.all(|v| v.is_finite())
     }
 
-    /// From one input to one output, both counted from zero; all other inputs stand still.
+    /// From one input to one output, both counted from zero; all other inputs are constant.
     ///
     /// # Panics
     /// Where there is no such input or output.

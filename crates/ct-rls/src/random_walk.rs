@@ -6,8 +6,8 @@
 //! dP/dt      = eta P + Q - gamma P phi phi' P
 //! ```
 //! For the Kalman filter `eta = 0` and `c = gamma = 1/r`, with `r` the intensity of white noise on `y` (unit(y)^2 s); with `c = gamma = 1`
-//! `P` and `Q` are in units of that noise. `q` is what a parameter's variance grows by in a second: a parameter that wanders by `d` in
-//! `T` seconds has `q = d^2/T` (divided by `r` where `c = 1`). Only a diagonal `Q` is offered: parameters that drift together need others.
+//! `P` and `Q` are in units of that noise. `q` is what a parameter's variance grows by in a second: a parameter that drifts by `d` in `T`
+//! seconds has `q = d^2/T` (divided by `r` where `c = 1`). Only a diagonal `Q` is offered: parameters that drift together need others.
 //!
 //! Assumptions: `phi`, `y` and the weights are constant over the step `h`. Equations: the whole walk of the step first, as the Kalman
 //! filter predicts, then [`ExactHold`](crate::ExactHold)'s exact step:

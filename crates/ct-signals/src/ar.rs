@@ -231,8 +231,7 @@ impl ArModel {
             .fold(at_zero, |gain, k| gain / (1.0 - k * k).sqrt())
     }
 
-    /// A filter that whitens `lanes` signals at once, one row of samples at a time: a residual and
-    /// the columns of its Jacobian, say.
+    /// A filter that whitens `lanes` signals at once, one row of samples at a time: a residual and the columns of its Jacobian, say.
     pub fn whitener(&self, lanes: usize) -> Whitener {
         Whitener::new(self, lanes)
     }

@@ -16,7 +16,7 @@
 //! to first order at 0, and may have several minima: the best of a few values is the start. Of two that the samples cannot tell apart, the
 //! positive one: the process that is slower than the sampling.
 //!
-//! **Behind a system** ([`fit_behind`]): the same, where the autoregression is seen through a system that is known; the whitening is then
+//! **After a system** ([`fit_behind`]): the same, where the autoregression is seen through a system that is known; the whitening is then
 //! that of the process they make together ([`StationaryWhitener`](crate::StationaryWhitener)).
 //!
 //! **Cost**: an evaluation is one whitening, `O(n p)` and a little more for missing samples; one or two for each order, and about

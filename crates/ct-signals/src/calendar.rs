@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Record, Timestamp, Zone};
 
-/// The date and time at which the clock of a record stands at zero, and the zone in which people read it.
+/// The date and time at which the clock of a record is at zero, and the zone in which people read it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calendar {
     /// Date and time at `time` zero.
@@ -14,7 +14,7 @@ pub struct Calendar {
 }
 
 impl Calendar {
-    /// The date and time so many seconds behind the start.
+    /// The date and time so many seconds after the start.
     #[must_use]
     pub fn at(&self, seconds: f64) -> String {
         self.zone.format(self.start.after(seconds))

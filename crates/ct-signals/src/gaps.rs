@@ -140,7 +140,7 @@ fn slowest_rate(time: &[f64], interval: f64) -> Option<f64> {
     (count > 0 && count as f64 >= OF_A_RATE * all as f64).then_some(slowest)
 }
 
-/// The first row behind which rows are missing, and how many.
+/// The first row after which rows are missing, and how many.
 pub(crate) fn first_gap(time: &[f64]) -> Option<(usize, usize)> {
     let sampling = Sampling::of(time);
     let missing = steps(time).map(|step| sampling.missing(step));
@@ -159,7 +159,7 @@ impl Record {
         steps(&self.time).map(|step| sampling.missing(step)).sum()
     }
 
-    /// The time of the row behind which the first row is missing \[s\].
+    /// The time of the row after which the first row is missing \[s\].
     #[must_use]
     pub fn before_missing_row(&self) -> Option<f64> {
         let sampling = Sampling::of(&self.time);

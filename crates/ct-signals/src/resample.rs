@@ -4,7 +4,7 @@ use crate::{Channel, Error, Hold, Record};
 
 /// Most rows of a grid.
 const MOST_ROWS: f64 = 1e7;
-/// A held sample acts for so many sampling intervals at most: what the command did behind it is not known.
+/// A held sample acts for so many sampling intervals at most: what the command did after it is not known.
 const ACTS: f64 = 1.5;
 
 impl Record {

@@ -93,8 +93,8 @@ pub fn pairs(u: &[f64], e: &[f64], max_lag: usize) -> Vec<usize> {
 /// Reference: G. M. Ljung, G. E. P. Box, *On a measure of lack of fit in time series models*,
 /// Biometrika 65 (1978) 297-303.
 ///
-/// Missing samples are NaN: `n` counts the samples that are there, and `rho_k` is the sum over the pairs that are there over
-/// that of all squares. Where `x` is a whitened series, its innovations behind a gap count like any others.
+/// Missing samples are NaN: `n` counts the samples that are there, and `rho_k` is the sum over the pairs that are there over that of all
+/// squares. Where `x` is a whitened series, its innovations after a gap count like any others.
 ///
 /// # Errors
 /// [`Error::InvalidSetting`] unless `fitted < lags`, [`Error::TooFewSamples`] unless there are more

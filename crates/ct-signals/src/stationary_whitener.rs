@@ -56,7 +56,7 @@ impl<'a> StationaryWhitener<'a> {
         }
     }
 
-    /// Replaces the row of samples at one instant, one value for each lane, by its whitened row, and gives the variance of its prediction
+    /// Replaces the row of samples at one instant, one value for each signal, by its whitened row, and gives the variance of its prediction
     /// from the rows before it, in that of the innovations.
     pub fn push(&mut self, row: &mut [f64]) -> f64 {
         let (nu, c) = (self.noise.order(), self.noise.c());
@@ -120,7 +120,7 @@ impl<'a> StationaryWhitener<'a> {
         }
     }
 
-    /// `x^+ = A x^ + k e` of a lane.
+    /// `x^+ = A x^ + k e` of a signal.
     fn advance(&mut self, lane: usize, error: f64) {
         let nu = self.noise.order();
         let state = &mut self.states[lane * nu..(lane + 1) * nu];

@@ -5,8 +5,8 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 /// From this number of degrees of freedom on, the quantile is computed from the series in 1/freedom.
 const MANY: f64 = 1e4;
 
-/// Half the width, in standard errors, of the interval that holds the truth with probability `level` (0 to 1, both excluded), for a variance of so
-/// many degrees of freedom (fewer than 1 count as 1); NaN for another level.
+/// Half the width, in standard errors, of the interval that contains the true value with probability `level` (0 to 1, both excluded), for a
+/// variance of so many degrees of freedom (fewer than 1 count as 1); NaN for another level.
 ///
 /// Beyond 10 000 degrees these are the first two terms of Cornish and Fisher, the third being below 1e-12 there.
 pub fn student_half_width(level: f64, freedom: f64) -> f64 {

@@ -155,8 +155,8 @@ impl TimestampReader {
     /// Finds how the cells of a column are written.
     ///
     /// `format` is a format of `strftime`, which is then not looked for. `zone` is the zone of times that have no offset; UTC where it is
-    /// absent. `cells` are the first cells of the column or all of them: further ones than the first are looked at only where
-    /// day and month cannot be told apart without them.
+    /// absent. `cells` are the first cells of the column or all of them: further ones than the first are looked at only where day and month
+    /// cannot be distinguished without them.
     ///
     /// # Errors
     /// [`TimestampError::UnknownZone`], [`TimestampError::NoCells`], [`TimestampError::UnknownForm`], [`TimestampError::DayOrMonth`],

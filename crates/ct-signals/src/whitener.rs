@@ -68,9 +68,8 @@ impl Whitener {
         }
     }
 
-    /// Replaces the row of samples at one instant, one value for each lane, by its whitened row, in
-    /// the same unit: innovations of the process come out with variance `sigma^2`. Order 0 leaves
-    /// the row as it is, bit for bit.
+    /// Replaces the row of samples at one instant, one value for each signal, by its whitened row, in the same unit: innovations of the
+    /// process come out with variance `sigma^2`. Order 0 leaves the row as it is, bit for bit.
     pub fn push(&mut self, row: &mut [f64]) {
         debug_assert_eq!(row.len(), self.lanes, "one value for each lane");
         let p = self.scales.len();
@@ -122,8 +121,8 @@ impl Whitener {
         1.0 / (scale * scale)
     }
 
-    /// The row of the next instant is lost. The rows behind it come out whitened all the same, with variance `sigma^2` and
-    /// independent of each other: until `p` of them have come, the lost ones are estimated from their neighbours.
+    /// The row of the next instant is lost. The rows after it come out whitened all the same, with variance `sigma^2` and independent of
+    /// each other: until `p` of them have come, the lost ones are estimated from their neighbours.
     ///
     /// Lost rows before the first of a record change nothing.
     pub fn skip(&mut self) {

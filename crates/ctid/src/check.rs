@@ -13,7 +13,7 @@ use crate::own_model::{self, AnyModelFile};
 /// Reads a model and says what it holds; of a model file the model that it names, with its effects in it.
 ///
 /// # Errors
-/// One line that names the file, line and column, what is wrong and the mend.
+/// One line that names the file, line and column, what is wrong and the correction.
 pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     if path.extension().is_none_or(|kind| kind != "toml") {
         return Ok(said(&own_model::read_model(path)?, look) + &unknown(path, look));

@@ -23,7 +23,7 @@ pub enum Error {
     Text {
         /// The path as it was given.
         file: String,
-        /// Line, column, what is wrong and the mend.
+        /// Line, column, what is wrong and the correction.
         source: ct_model::TextError,
     },
     /// An error about a file as a whole.
@@ -31,7 +31,7 @@ pub enum Error {
     File {
         /// The path as it was given.
         file: String,
-        /// What is wrong and the mend.
+        /// What is wrong and the correction.
         what: String,
     },
     /// A file that was changed by somebody else between reading and writing.

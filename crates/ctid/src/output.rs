@@ -104,7 +104,7 @@ impl Found for Identification {
 /// did not write, and into a folder that is there and may be written to.
 ///
 /// # Errors
-/// One line that names the file and the mend; nothing has been written.
+/// One line that names the file and the correction; nothing has been written.
 pub fn plan(wanted: &[(Kind, &Path)], inputs: &[&Path]) -> Result<Vec<Output>, Error> {
     let mut outputs = Vec::with_capacity(wanted.len());
     for (index, &(kind, path)) in wanted.iter().enumerate() {

@@ -144,7 +144,7 @@ pub(crate) fn of_curve(
 /// Reads a file.
 ///
 /// # Errors
-/// One line that names the file, the row, the column and the mend.
+/// One line that names the file, the row, the column and the correction.
 pub fn read(path: &Path) -> Result<TermFile, Error> {
     let text = read_file(path, LARGEST as u64).map_err(|error| match error {
         ct_signals::Error::CannotOpen { source, .. } => Error::file(

@@ -20,7 +20,7 @@ use crate::problem::{Kept, Limit, Options, Problem};
 /// The believed model with the effects of the model file in it.
 #[derive(Debug, Clone)]
 pub struct Believed {
-    /// The model; the values of its parameters are fitted ones, in white noise.
+    /// The model; the values of its parameters are fitted ones, with white noise.
     pub spec: ModelSpec,
     /// Numbers of the record that each effect contains, by effect identifiers.
     pub record_numbers: BTreeMap<String, BTreeMap<String, f64>>,

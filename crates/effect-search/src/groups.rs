@@ -52,7 +52,7 @@ impl Context<'_> {
         Ok((last, groups))
     }
 
-    /// The sets in which something else stands in the place of an effect and explains the data as well, best first.
+    /// The sets in which an alternative replaces an effect and explains the data as well, best first.
     fn stand_ins(
         &self,
         last: &Node,
@@ -108,9 +108,9 @@ impl Context<'_> {
         last.is_some_and(|&i| self.candidates[i].effect.is_none())
     }
 
-    /// Whether a set explains most of what another one does of what a third leaves, and leaves what may be noise of another colour: with a
-    /// noise model of its own, what the other one gains is not beyond chance. The users of a model name its likely physics, and it is rarely
-    /// all that acts in a measured record: an effect of the catalogue that bends further wins by the rest.
+    /// Whether a set explains most of what another one does of what a third leaves, and leaves what may be noise of another spectrum: with
+    /// a noise model of its own, what the other one gains is not beyond chance. The users of a model name its likely physics, and it is
+    /// rarely all that acts in a measured record: an effect of the catalogue that bends further wins by the rest.
     fn explains_most(
         &self,
         (set, last): (&Node, &Node),

@@ -107,7 +107,7 @@ impl Context<'_> {
         Ok(Node { added, model, fit })
     }
 
-    /// A set fitted anew from where it is.
+    /// A set fitted again from where it is.
     pub fn refitted(&self, node: &Node, noise: &Noise, stopping: Stopping) -> Result<Node, Error> {
         let mut refitted = self.fitted(
             node.added.clone(),

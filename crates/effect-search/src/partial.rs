@@ -25,8 +25,8 @@ use crate::node::{Context, FINE, Node, ROUGH};
 use crate::search::{best_first, same_set};
 
 impl Context<'_> {
-    /// The set that explains the largest part of the error, fitted in white noise, and that part; `None` where no set is a part of the answer.
-    /// `sets`: fitted in whatever metric; `base`: fitted in white noise.
+    /// The set that explains the largest part of the error, fitted with white noise, and that part; `None` where no set is a part of the
+    /// answer. `sets`: fitted in whatever metric; `base`: fitted with white noise.
     pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<(Node, f64)>, Error> {
         let white = Noise::white(self.problem.records[0].outputs.len());
         let own_base = self.in_limited_noise(base)?;
@@ -127,8 +127,8 @@ impl Context<'_> {
         )?)
     }
 
-    /// Samples over independent samples of a noise whose memory is limited: by how much slow parameters, and differences of the deviance in
-    /// white noise, are less certain than under white noise of the same size.
+    /// Samples over independent samples of a noise whose memory is limited: by how much slow parameters, and differences of the deviance
+    /// with white noise, are less certain than under white noise of the same size.
     pub fn slowness(&self, noise: &Noise) -> f64 {
         let limited = noise.with_memory_at_most(self.longest_memory());
         let outputs = limited.iter().zip(&self.problem.records[0].outputs);

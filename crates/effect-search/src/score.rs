@@ -1,7 +1,7 @@
 //! Score of each candidate for a set of effects: the predicted fall of the cost in one Gauss-Newton step from its best start.
 //!
-//! An effect whose outputs have a derivative where it is absent is linearised there, for each start of its shapes; a threshold at each
-//! of its starts. One linearisation in the metric of the noise gives the cost after the step, all parameters free: the score test, and its
+//! An effect whose outputs have a derivative where it is absent is linearised there, for each start of its shapes; a threshold at each of
+//! its starts. One linearisation weighted by the noise model gives the cost after the step, all parameters free: the score test, and its
 //! extension to thresholds.
 //!
 //! **Reference**: C. R. Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50-57 (score test); S. A. Billings, M. Korenberg, S. Chen, Int. J. Systems

@@ -1,7 +1,7 @@
 //! The search of sets of effects in the metric of one noise model: all single effects, pairs by their joint scores, and a beam of sets that
 //! grow by one effect at a time.
 //!
-//! Effects act together: a pair may explain what neither of its members does. So every set of the beam is scored anew with all candidates,
+//! Effects act together: a pair may explain what neither of its members does. So every set of the beam is scored again with all candidates,
 //! and pairs are looked at before any single effect is chosen.
 
 use estimation::Noise;

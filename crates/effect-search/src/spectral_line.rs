@@ -18,7 +18,7 @@ const NEAREST: usize = 3;
 const FARTHEST: usize = 12;
 const FEWEST: f64 = 4.0;
 
-/// Cycles that a period has in the series at least: what comes back less often is no period but a wander.
+/// Cycles that a period has in the series at least: what comes back less often is no period but a drift.
 const CYCLES: usize = 3;
 
 /// The line that stands out most.

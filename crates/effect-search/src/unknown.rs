@@ -25,7 +25,7 @@ use crate::search::best_first;
 pub struct PortScore {
     /// Identifier of the function: `shape(T,u)`, `course(T)`.
     pub effect: String,
-    /// Fall of the criterion against the last model, in white noise.
+    /// Fall of the criterion against the last model, with white noise.
     pub bic_gain: f64,
     /// Fall of the mean squared error on parts of the records that the function was not fitted to; negative for a rise, `None` if it was
     /// not computed.

@@ -1,4 +1,4 @@
-//! Fits from many starts in the metric of a noise, the noise's colour, and the uncertainty of what was fitted.
+//! Fits from many starts in the metric of a noise, the noise's spectrum, and the uncertainty of what was fitted.
 
 mod prewhitened;
 
@@ -167,8 +167,8 @@ impl Fit {
         self.spread(self.freedom.iter().copied())
     }
 
-    /// Half the width of the interval that holds the truth with probability `level` (0.95, say), for every entry that
-    /// has a standard error.
+    /// Half the width of the interval that contains the true value with probability `level` (0.95, say), for every entry that has a
+    /// standard error.
     #[must_use]
     pub fn half_widths(&self, level: f64) -> Vec<Option<f64>> {
         self.std_errors()

@@ -6,7 +6,7 @@
 //! - [`Squares`]: several outputs, each with a variance of its own, by the sum of their likelihoods.
 //! - [`Prior`]: what is known of an entry beside the records, as one more row.
 //! - [`Fit`]: standard errors with their degrees of freedom, correlations, likelihood and information criterion; [`robust`]: standard
-//!   errors where the residual has another colour than the metric of the fit.
+//!   errors where the residual has another spectrum than the metric of the fit.
 //!
 //! Samples that are missing are left out of all of this exactly.
 //!

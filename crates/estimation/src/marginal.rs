@@ -1,9 +1,8 @@
-//! The noise's colour from a fit's residual, by marginal (restricted) likelihood.
+//! The noise's spectrum from a fit's residual, by marginal (restricted) likelihood.
 //!
 //! **Why**: a fit with `p` free entries takes from its residual the part that its sensitivities span. Slow noise and
-//! slow sensitivities look alike, so an autoregressive model of the residual is too fast and too small, and the
-//! standard errors that follow from it are too small: at a correlation of 0.8 and 400 samples, intervals of 95 %
-//! hold the truth in 92 %.
+//! slow sensitivities look alike, so an autoregressive model of the residual is too fast and too small, and the standard errors that follow
+//! from it are too small: at a correlation of 0.8 and 400 samples, intervals of 95 % contain the true value in 92 %.
 //!
 //! **Criterion**: with the rows `[J, r]` whitened by the model and folded to the triangle `R`, the likelihood of what
 //! `J` cannot explain,

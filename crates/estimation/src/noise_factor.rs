@@ -4,9 +4,8 @@ use ct_signals::ArModel;
 
 /// A noise model's factor `L`, of unit innovations, of the covariance `L L'` of the samples of one record that are there.
 ///
-/// With the predictors `a^(m)`, `m = min(k, q)`, of the sample `k` and `s_m` their error over the innovations',
-/// `v[k] = sum_i a^(m)_i v[k-i] + s_m e[k]`: `L = A^-1 S`, `A` a unit lower band and `S` diagonal. Rows of `lanes`
-/// values run along the time.
+/// With the predictors `a^(m)`, `m = min(k, q)`, of the sample `k` and `s_m` their error over the innovations', `v[k] = sum_i a^(m)_i
+/// v[k-i] + s_m e[k]`: `L = A^-1 S`, `A` a unit lower band and `S` diagonal. Rows of `lanes` values run along the time.
 ///
 /// Where rows are missing, the last q values are the filter's state, the missing ones by their estimates, and both
 /// transposes run the adjoint of that filter ([`ct_signals::Whitener`]) backwards. Missing rows are zero then, whatever they were.

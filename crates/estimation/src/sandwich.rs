@@ -1,4 +1,4 @@
-//! Standard errors of a fit whose residual has another colour than the metric it was fitted in.
+//! Standard errors of a fit whose residual has another spectrum than the metric it was fitted in.
 //!
 //! **Model**: the fit solves `J' M r = 0`, `M = W^-1` the inverse covariance of the noise that it took for granted
 //! (`M = I` for a fit by simulation error); the noise in truth has the covariance `sigma^2 V`. Then
@@ -15,7 +15,7 @@
 
 use crate::{Error, Fit, Noise, Residuals, Rows, Triangle, marginal, noise_factor::Factor, rows};
 
-/// The uncertainty of a fit whose residual has another colour than its metric.
+/// The uncertainty of a fit whose residual has another spectrum than its metric.
 #[derive(Debug, Clone)]
 pub struct Robust {
     /// Standard error of every entry of the vector; `None` for one that is fixed, at a bound, or not determined.
@@ -42,7 +42,7 @@ impl Robust {
     }
 }
 
-/// The uncertainty of a fit under the colour of its own residual, an autoregressive model of order zero to `order` for each output.
+/// The uncertainty of a fit under the noise model of its own residual, an autoregressive model of order zero to `order` for each output.
 ///
 /// # Errors
 /// Where the model is not finite at the fit.

@@ -77,7 +77,7 @@ impl Controller {
         )
     }
 
-    /// The same controller behind a sensor filter `zeta/(p + zeta)`, zeta in \[1/time\]; y is the filtered signal.
+    /// The same controller after a sensor filter `zeta/(p + zeta)`, zeta in \[1/time\]; y is the filtered signal.
     ///
     /// # Errors
     /// [`Error::Setting`]; [`Error::FilterWithoutLoop`] in open loop.

@@ -1,7 +1,7 @@
 //! Whether the recursive estimator converges: the condition on its filter, decided exactly.
 //!
-//! Condition (Baysse, Carrillo, Habbadi, (14)): with `P = A S + B R` of the true plant and `P^ = A^ S + B^ R` of the
-//! filter `S/P^` behind the sensitivities,
+//! Condition (Baysse, Carrillo, Habbadi, (14)): with `P = A S + B R` of the true plant and `P^ = A^ S + B^ R` of the filter `S/P^` after
+//! the sensitivities,
 //! ```text
 //! Re (P^/P)(jw) > 1/2   for all w, infinity included;   P Hurwitz.
 //! ```

@@ -1,9 +1,9 @@
 //! What the residual is made of, and what its colour does to the standard errors.
 //!
-//! Model: `v = H e`, e white of variance sigma^2, where H is an autoregression, and behind it, for noise that
-//! circulates in the loop, `F = A S/P` sampled under a hold: in the loop the residual is `A S/P w` (Baysse, Carrillo,
-//! Habbadi, (13)). No autoregression of modest order stands for F: with an integrator in S it has a zero at frequency 0,
-//! just where the sensitivities of a slow experiment live, and standard errors without it are too large.
+//! Model: `v = H e`, e white of variance sigma^2, where H is an autoregression, and after it, for noise that circulates in the loop, `F = A
+//! S/P` sampled under a hold: in the loop the residual is `A S/P w` (Baysse, Carrillo, Habbadi, (13)). No autoregression of modest order
+//! stands for F: with an integrator in S it has a zero at frequency 0, just where the sensitivities of a slow experiment live, and standard
+//! errors without it are too large.
 //!
 //! Method: the residual is whitened with both, F inverted exactly from sample to sample, `w = F^-1 v`, and an
 //! autoregression fitted to what is left; the one with the larger marginal likelihood stays, less the penalty of
@@ -18,9 +18,9 @@
 //! so that the double sum is one filter of the sensitivities, `f_k = sum_{l<k} R(k-l) s_l`, and J'VJ = sum
 //! `R(0) s s' + s f' + f s'`: no more memory for a longer record.
 //!
-//! Missing readings: the residual is NaN there, and F cannot be inverted from sample to sample. The autoregression of either path is then the one whose
-//! process, behind F or not, has the largest likelihood of the residuals that are there ([`ArModel::fit_behind`], [`ct_signals::StationaryWhitener`]), and the paths are compared by the
-//! marginal likelihood of these.
+//! Missing readings: the residual is NaN there, and F cannot be inverted from sample to sample. The autoregression of either path is then
+//! the one whose process, after F or not, has the largest likelihood of the residuals that are there ([`ArModel::fit_behind`],
+//! [`ct_signals::StationaryWhitener`]), and the paths are compared by the marginal likelihood of these.
 //!
 //! Cost: `q nu^2` products a sample, for q columns and nu states of H.
 //!
@@ -260,7 +260,7 @@ impl NoiseModel {
     }
 }
 
-/// An autoregression behind a system that it is held for.
+/// An autoregression after a system that it is held for.
 pub(crate) fn behind(
     ar: &ArModel,
     system: &StateSpace,

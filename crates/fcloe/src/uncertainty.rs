@@ -3,15 +3,16 @@
 //! Equations: see the head of `noise_model.rs`. The innovations' variance counts the fitted parameters and the
 //! noise model's coefficients as degrees of freedom that are spent.
 //!
-//! Rows whose reading is missing are 0 in both sums: the covariance is that of the readings that are there, and so is the likelihood behind the noise model.
+//! Rows whose reading is missing are 0 in both sums: the covariance is that of the readings that are there, and so is the likelihood after
+//! the noise model.
 //!
 //! Assumptions: the minimum was reached; the noise is stationary and independent of r, and, counted in samples, of one
 //! colour in all records; the model's structure is right.
 //!
-//! Figures, 4000 runs for each of eleven settings at 20 dB, n = 1 and 2, noise in the loop and on the record, white and
-//! coloured, levels known and estimated: 95 % intervals hold the truth in 94.2 to 96.0 % for every parameter, where those
-//! of a white residual hold it in 47 to 100 % (`cargo run --release -p fcloe --example coverage`). Where 30 % of the
-//! readings are missing at random, and a block of 10, of n = 2, noise in the loop, on the record, and coloured in open loop: in 93.5 to 96.2 % of 400 (`RUNS=400 cargo test
+//! Figures, 4000 runs for each of eleven settings at 20 dB, n = 1 and 2, noise in the loop and on the record, white and coloured, levels
+//! known and estimated: 95 % intervals contain the true value in 94.2 to 96.0 % for every parameter, where those of a white residual hold
+//! it in 47 to 100 % (`cargo run --release -p fcloe --example coverage`). Where 30 % of the readings are missing at random, and a block of
+//! 10, of n = 2, noise in the loop, on the record, and coloured in open loop: in 93.5 to 96.2 % of 400 (`RUNS=400 cargo test
 //! -p fcloe --test all coverage::missing -- --nocapture`).
 
 use ct_signals::student_half_width;
@@ -27,7 +28,7 @@ const MAX_ORDER: usize = 8;
 /// Uncertainty of a fit.
 #[derive(Debug, Clone, Serialize)]
 pub struct Uncertainty {
-    /// Covariance of theta, and of the estimated levels behind it (drive, then y, record by record).
+    /// Covariance of theta, and of the estimated levels after it (drive, then y, record by record).
     pub covariance: Vec<Vec<f64>>,
     /// Roots of its diagonal for theta.
     pub std_errors: Vec<f64>,
@@ -40,7 +41,7 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// Half the width of the interval that holds the truth with probability `level` (0.95, say), for each of theta.
+    /// Half the width of the interval that contains the true value with probability `level` (0.95, say), for each of theta.
     ///
     /// # Errors
     /// [`Error::Setting`] unless the level is between 0 and 1.

@@ -33,7 +33,7 @@ impl Default for FitOptions {
     }
 }
 
-/// Fits from random starts, with the noise's colour estimated.
+/// Fits from random starts, with the noise's spectrum estimated.
 ///
 /// # Errors
 /// Where no start gives a finite simulation.
@@ -92,7 +92,7 @@ fn done(setup: &Setup, fit: Result<Fit, NoFit>) -> Result<Fit, Error> {
     Ok(fit)
 }
 
-/// Estimates the noise's colour from a fit's residual and refits in that metric, until the two agree ([`estimation::coloured`]).
+/// Estimates the noise's spectrum from a fit's residual and refits in that metric, until the two agree ([`estimation::coloured`]).
 ///
 /// # Errors
 /// As [`fit_from`].
@@ -125,7 +125,7 @@ pub fn noise_of(setup: &Setup, fit: &Fit, order: usize) -> Result<Noise, Error> 
     Ok(estimation::noise_of(setup, fit, order)?)
 }
 
-/// The uncertainty of a fit under the colour of its own residual ([`estimation::robust`]).
+/// The uncertainty of a fit under the noise model of its own residual ([`estimation::robust`]).
 ///
 /// # Errors
 /// Where the simulation is not finite at the fit.

@@ -1,6 +1,6 @@
 //! Effects at the actuator with many starts: a plain simulation of each, and a regression, say which are worth linearising.
 //!
-//! The reading is linear in the pump's gain `K`, `y = K f(p) + ...`, `p` the command behind the effect. What the effect changes in a
+//! The reading is linear in the pump's gain `K`, `y = K f(p) + ...`, `p` the command after the effect. What the effect changes in a
 //! simulation with the gain `K0` is `D = K0 f(p) - K0 f(u)`, so the column of the gain at a start is `df/dK + D/K0`, with `df/dK` that of
 //! the model without the effect: a start costs one simulation in plain numbers and a regression on this one column. Of plants that are not
 //! linear this holds to first order.

@@ -41,7 +41,7 @@ pub struct ModelSetup<'a> {
 
 /// ... and an initial state within this factor.
 const STATE_REACH: f64 = 300.0;
-/// Rounds in which outputs are weighted anew by their noise.
+/// Rounds in which outputs are weighted again by their noise.
 const WEIGHTINGS: usize = 3;
 impl<'a> ModelSetup<'a> {
     /// Adds a time limit: once it has passed, or `interrupt` is set, fits take no further steps.
@@ -293,7 +293,7 @@ impl<'a> ModelSetup<'a> {
         Ok(estimation::robust(self, fit, order)?)
     }
 
-    /// The initial states that fit best with all else fixed, in white noise.
+    /// The initial states that fit best with all else fixed, with white noise.
     ///
     /// # Errors
     /// Where the simulation is not finite.

@@ -5,8 +5,8 @@
 //! dy = S_p dp + S_x dx0,     dx0 = A dp + e,     cov(y) = (S_p + S_x A) P (S_p + S_x A)' + S_x B S_x'
 //! ```
 //! `P` is the covariance of the parameters under the noise of the residual. Initial states are fitted to the first readings of the other
-//! record, in the metric of that noise, with the parameters held at `p`: with `[J_x J_p]` the whitened sensitivities of these readings,
-//! `A = -(J_x' J_x)^-1 J_x' J_p` and `B = (J_x' J_x)^-1`. Where the record has no readings they are what the model's text says: `A` is the
+//! record, weighted by that noise model, with the parameters held at `p`: with `[J_x J_p]` the whitened sensitivities of these readings, `A
+//! = -(J_x' J_x)^-1 J_x' J_p` and `B = (J_x' J_x)^-1`. Where the record has no readings they are what the model's text says: `A` is the
 //! slope of that, `B` is zero.
 //!
 //! **Assumption**: the model is the plant, and close to linear in its parameters over their errors. What a model lacks is in no band.

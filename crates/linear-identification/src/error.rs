@@ -172,7 +172,7 @@ pub enum Error {
     InRecord {
         /// Name of the record.
         record: String,
-        /// What is wrong and the mend.
+        /// What is wrong and the correction.
         what: String,
     },
     /// Rows are missing, and the fit that says for how long the input may be held failed.

@@ -27,7 +27,7 @@ const FORGOTTEN: f64 = 0.01;
 /// A record without gaps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mended {
-    /// On one clock: inputs held through every gap, readings left out behind long ones.
+    /// On one clock: inputs held through every gap, readings left out after long ones.
     pub whole: Record,
     /// Between long gaps.
     pub parts: Vec<Record>,
@@ -93,7 +93,7 @@ pub fn mend(
     Ok((all(&fitted)?, all(&others)?))
 }
 
-/// A record with inputs held for at most `limit`; behind longer gaps its whole lacks the readings of `memory` \[s\].
+/// A record with inputs held for at most `limit`; after longer gaps its whole lacks the readings of `memory` \[s\].
 fn cut(record: &Record, limit: f64, memory: f64) -> Result<Mended, Error> {
     let (parts, gaps) = record.without_gaps(limit);
     let (whole, _) = record.without_gaps(f64::INFINITY);

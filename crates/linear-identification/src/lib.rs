@@ -32,11 +32,12 @@
 //! the filters (3 over its time constant) and the memory (a fifth of the record, at least 10 time constants). The four try several
 //! bandwidths for their regressions; recursive-fcloe has the same memory, in time constants of its start.
 //!
-//! Readings of the output may be missing. The output errors (fcloe, recursive-fcloe, stabilized-oe) have no residual there, srivc and rivc no row, and the simulation runs on;
-//! iv puts what its model says in their place in its filters, stabilized-oe too; ls and ct-rls, which have no model beside them, take the output for a line between its readings
-//! and leave rows out behind gaps longer than their filters. Gaps of the input: see [`mend`].
+//! Readings of the output may be missing. The output errors (fcloe, recursive-fcloe, stabilized-oe) have no residual there, srivc and rivc
+//! no row, and the simulation runs on; iv puts what its model says in their place in its filters, stabilized-oe too; ls and ct-rls, which
+//! have no model beside them, take the output for a line between its readings and leave rows out after gaps longer than their filters. Gaps
+//! of the input: see [`mend`].
 //!
-//! How often 95 % intervals hold the truth then, of every method with all readings and without 30 % of them and a block of 10 rows:
+//! How often 95 % intervals contain the true value then, of every method with all readings and without 30 % of them and a block of 10 rows:
 //! `RECORDS=400 cargo test -p ctid --test all identify_missing -- --nocapture`.
 //!
 //! On 3000 samples every second of plants with a time constant of 20 s, and of 10 and 15 s, noise of a tenth of the output, white and coloured,

@@ -93,7 +93,7 @@ pub(crate) fn believed<'a>(
     let left = remains(&base, &own)?;
     let lacking = tempted || left.is_some();
     let floor = floors(problem, &own.noise, "the residual of the believed model");
-    // In the metric of a noise that wanders a simulation may drift off.
+    // In the metric of a noise that drifts a simulation may drift off.
     let shown = if lacking || wanders(&base, &own.noise) {
         base
     } else {

@@ -79,8 +79,7 @@ fn diagnose_whole(
     allow(&base, SEARCHED);
     let found = find(&base, options.max_effects, &tell)?;
     allow(&base, CONFIRMED);
-    // The weighting in which single effects are ranked: white where the residual wanders, since a noise model takes slow effects for
-    // noise.
+    // The weighting in which single effects are ranked: white where the residual drifts, since a noise model takes slow effects for noise.
     let white = base.setup.white_noise();
     let (metric, believed, grown) = match &found.prewhitened {
         Some(grown) if !found.by_simulation && !found.wandering => {

@@ -27,7 +27,7 @@ pub enum Stage {
 pub enum Verdict {
     /// One effect of the catalogue explains the rows, and no other effect does.
     Effect,
-    /// Several explain them, and cannot be told apart yet.
+    /// Several explain them, and cannot be distinguished yet.
     Undecided,
     /// No effect of the catalogue explains the rows.
     Unexplained,
@@ -46,11 +46,11 @@ pub struct Alarm {
     pub since: Option<f64>,
     /// Verdict on the rows.
     pub verdict: Verdict,
-    /// The effects that cannot be told apart, best first; empty where nothing explains the rows.
+    /// The effects that cannot be distinguished, best first; empty where nothing explains the rows.
     pub effects: Vec<String>,
     /// Fall of the Bayesian information criterion with the best of them.
     pub evidence: Option<f64>,
-    /// The next effect, whether in the group or behind it, and its evidence.
+    /// The next effect, whether in the group or after it, and its evidence.
     pub next: Option<Other>,
     /// The size of the best effect.
     pub size: Option<Size>,

@@ -1,8 +1,8 @@
 //! Scores: does the learned model still fit, in each direction in which it may change, over windows of several lengths?
 //!
 //! For a direction `i` (a parameter of the plant, or an offset of one output) let `s_io` be the derivative of the reading of output `o`,
-//! whitened by the noise's colour and in units of its innovations, and `e_o` the whitened residual. With `l = exp(-1/W)`, a sample adds over
-//! the outputs that have a reading
+//! whitened by the noise's spectrum and in units of its innovations, and `e_o` the whitened residual. With `l = exp(-1/W)`, a sample adds
+//! over the outputs that have a reading
 //! ```text
 //! z_i <- l z_i + sum_o s_io e_o      v_i <- l^2 v_i + sum_o s_io^2      c_i <- l c_i + sum_o s_io s_po      score_i = z_i/sqrt(v_i + c_i' P c_i)
 //! ```
@@ -32,7 +32,7 @@ pub(crate) fn windows(time_constant: f64) -> [f64; WINDOWS.len()] {
 pub(crate) struct Bank {
     lengths: Vec<f64>,
     keep: Vec<f64>,
-    /// Parameters, which come first among the directions, and directions: behind them an offset of each output.
+    /// Parameters, which come first among the directions, and directions: after them an offset of each output.
     parameters: usize,
     directions: usize,
     /// One sum for each window and direction.

@@ -28,12 +28,12 @@ pub enum Error {
         "the model has a measured disturbance, and a row of the monitor has one input: delete disturbance under [known] and its column"
     )]
     Disturbance,
-    /// A model of its user's own that follows the time itself.
+    /// A user's own model that follows the time itself.
     #[error(
         "the model uses `time`, and a monitored plant has no start time: give what follows the clock as an input"
     )]
     Time,
-    /// A model of its user's own without parameters that are fitted.
+    /// A user's own model without parameters that are fitted.
     #[error(
         "the model has no parameter that is fitted: declare one of them as `parameter`, so that it can be learned and tracked"
     )]

@@ -8,7 +8,7 @@
 //! evidence = sum_o (sum_{j >= k} e_jo^2 - cost_o/sigma_o^2) - (parameters + 1) ln n
 //! ```
 //! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs `o`.
-//! Effects within [`GROUP_MARGIN`] of the best cannot be told apart yet.
+//! Effects within [`GROUP_MARGIN`] of the best cannot be distinguished yet.
 
 mod search;
 
@@ -44,7 +44,7 @@ const ONSETS: [f64; 13] = [
 ];
 /// At every such onset the catalogue's starts are tried again.
 const AFRESH: usize = 4;
-/// An onset has at least so many rows behind it.
+/// An onset has at least so many rows after it.
 pub(crate) const FEWEST: usize = 8;
 /// A drift of the pump is even where its settling takes as long as it may.
 const EVEN: (&str, &str) = ("pump_gain_drift", "time_constant");

@@ -65,8 +65,8 @@ pub(crate) const BEGIN: &str = "stiction_backlash.begin";
 
 /// The fit, and the levels at the first row; in words why there is none.
 ///
-/// Where readings are lost, what is expected of them under the fitted model and its noise stands in for them, and the fit is repeated
-/// (after the EM algorithm, A. P. Dempster, N. M. Laird, D. B. Rubin, J. Royal Statistical Society B 39, 1977, without the covariance of what is
+/// Where readings are lost, what is expected of them under the fitted model and its noise can replace them, and the fit is repeated (after
+/// the EM algorithm, A. P. Dempster, N. M. Laird, D. B. Rubin, J. Royal Statistical Society B 39, 1977, without the covariance of what is
 /// missing: the more readings are lost, the more coloured the noise looks).
 pub(crate) fn learn(
     model: &Model,
@@ -197,7 +197,7 @@ pub(crate) fn learn(
     Ok((learned, levels))
 }
 
-/// The covariance of a fit's first `n` entries, row by row, so many times as large; zero for what was not fitted, or held at a bound.
+/// The covariance of a fit's first `n` entries, row by row, this many times as large; zero for what was not fitted, or held at a bound.
 pub(crate) fn covariance(fit: &Fit, n: usize, widened: f64) -> Result<Vec<f64>, String> {
     let errors = fit.std_errors();
     let mut covariance = vec![0.0; n * n];

@@ -1,5 +1,5 @@
-//! Watches a plant row by row: tracks its parameters, says when the model stops fitting, since when, and which effect of the
-//! catalogue it looks like. It watches one of the plants, or a model of its user's own.
+//! Watches a plant row by row: tracks its parameters, says when the model stops fitting, since when, and which effect of the catalogue it
+//! looks like. It watches one of the plants, or a user's own model.
 //!
 //! | question | answer |
 //! |---|---|
@@ -8,11 +8,11 @@
 //! | What are the parameters now? | [`Monitor::estimates`] |
 //! | What if it is stopped? | [`Monitor::state`] is saved, [`Monitor::restore`] goes on as if nothing had happened |
 //!
-//! It learns first: the believed model is fitted to the first rows (a thousand and twenty time constants at least), with the
-//! colour of the noise at each output. From then on the learned model runs beside the plant on the measured command, and never
-//! learns: so a feedback that hides a change in the reading shows it in the command, and a slow change does not pass for
-//! normal. After an alarm it stays the learned one, until it fits again. Memory is constant, and a row of up to eight inputs, outputs and states
-//! each allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
+//! It learns first: the believed model is fitted to the first rows (a thousand and twenty time constants at least), with the spectrum of
+//! the noise at each output. From then on the learned model runs beside the plant on the measured command, and never learns: so a feedback
+//! that hides a change in the reading shows it in the command, and a slow change does not pass for normal. After an alarm it stays the
+//! learned one, until it fits again. Memory is constant, and a row of up to eight inputs, outputs and states each allocates nothing, but
+//! for one in 2048 (a checkpoint) and the looks after an alarm.
 //!
 //! **Several outputs.** Readings are given in the order of [`plants::Known::measured`], or of the outputs of the text. Each output has a noise of its own, independent of the
 //! others, and may lack readings for itself. One model runs beside all of them: scores, tracker and isolation take each innovation in units

@@ -32,7 +32,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// A row of time \[s\], the only input \[its unit\] and readings \[their units\]; outputs without one have lost it, and readings behind
+    /// A row of time \[s\], the only input \[its unit\] and readings \[their units\]; outputs without one have lost it, and readings after
     /// the last output are not looked at.
     #[must_use]
     pub fn new(time: f64, input: f64, readings: &[f64]) -> Self {
@@ -87,14 +87,14 @@ pub enum Notice {
     Gap {
         /// Time of the row before \[s\].
         from: f64,
-        /// Time of the row behind it \[s\].
+        /// Time of the row after it \[s\].
         to: f64,
         /// How many.
         missing: u64,
         /// The command is taken to have been held; else what is not known of the levels is waited for.
         bridged: bool,
     },
-    /// The clock was set back, as 100 rows in a row say: they are followed from here on, as behind a long gap.
+    /// The clock was set back, as 100 rows in a row say: they are followed from here on, as after a long gap.
     ClockSetBack {
         /// The latest time before \[s\].
         from: f64,
@@ -162,14 +162,14 @@ impl State {
         &self.units
     }
 
-    /// Seconds in one unit of the time of a model of its user's own, as the state has it.
+    /// Seconds in one unit of the time of a user's own model, as the state has it.
     #[must_use]
     pub fn time_unit(&self) -> Option<f64> {
         self.model.get(TIME_UNIT)?.parse().ok()
     }
 }
 
-/// A monitor; `'a` is how long a model of its user's own lives.
+/// A monitor; `'a` is how long a user's own model lives.
 pub struct Monitor<'a> {
     model: Watched<'a>,
     intake: Intake,
@@ -181,11 +181,11 @@ pub struct Monitor<'a> {
 impl<'a> Monitor<'a> {
     /// A monitor that has seen nothing yet, of a [`Model`](crate::Model) of a plant or an [`OwnModel`](crate::OwnModel).
     ///
-    /// `units` are those of a plant's rows; a model of its user's own has units itself.
+    /// `units` are those of a plant's rows; a user's own model has units itself.
     ///
     /// # Errors
-    /// [`Error::Setting`]; of a plant [`Error::TwoPumps`], [`Error::Disturbance`], [`Error::ByClock`] for an effect in the model that follows
-    /// the time since a record began, [`Error::Structure`]; of a model of its user's own [`Error::Time`], [`Error::NoParameters`].
+    /// [`Error::Setting`]; of a plant [`Error::TwoPumps`], [`Error::Disturbance`], [`Error::ByClock`] for an effect in the model that
+    /// follows the time since a record began, [`Error::Structure`]; of a user's own model [`Error::Time`], [`Error::NoParameters`].
     pub fn new(
         model: impl Into<Watched<'a>>,
         settings: Settings,

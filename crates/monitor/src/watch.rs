@@ -23,7 +23,7 @@ pub(crate) struct Watch<'a> {
     /// Seconds since the last sample with a reading.
     since: f64,
     lanes: usize,
-    /// A row for each output: a derivative for each lane, one for an offset of each output, the residual. Those of the outputs that have a
+    /// A row for each output: a derivative for each seed, one for an offset of each output, the residual. Those of the outputs that have a
     /// reading come first, in order.
     rows: Vec<f64>,
     /// Outputs that have a reading.

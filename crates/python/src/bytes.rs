@@ -30,6 +30,6 @@ pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> PyResult<T> {
     Ok(value)
 }
 
-/// A value behind the version that has written it.
+/// A value after the version that has written it.
 #[derive(Deserialize)]
 struct Versioned<T>(String, T);

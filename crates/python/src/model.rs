@@ -1,4 +1,4 @@
-//! A model of the user's own.
+//! A user's own model.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -151,7 +151,7 @@ pub enum Error {
         /// Largest m.
         most: usize,
     },
-    /// A signal that stands still.
+    /// A signal that is constant.
     #[error(
         "{what} is constant at {value} in all records, so that nothing can be identified from it; record at least a step up and a step down"
     )]

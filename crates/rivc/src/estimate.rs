@@ -15,9 +15,10 @@
 //! autoregressions over the readings that are there, exactly ([`ArModel::fit`], [`ct_signals::Whitener`]). The limit is that of maximum likelihood from these readings. Where an input is not known for a while,
 //! the parts of the record are [`Data`] that continue: they share offset and noise, and begin with states of their own.
 //!
-//! Assumptions: the plant is stable, but for an integrator; the noise owes nothing to the inputs, in a loop nothing to the reference; in a loop the input is what its hold says, as of a
-//! controller that is sampled: behind a continuous one it is not, and the estimates are biased by what u does between the samples
-//! (closed-loop output error has no need of u). The starts find the right minimum; with noise of more power than the output they may not.
+//! Assumptions: the plant is stable, but for an integrator; the noise owes nothing to the inputs, in a loop nothing to the reference; in a
+//! loop the input is what its hold says, as of a controller that is sampled: after a continuous one it is not, and the estimates are biased
+//! by what u does between the samples (closed-loop output error has no need of u). The starts find the right minimum; with noise of more
+//! power than the output they may not.
 //!
 //! Convergence: no proof for finite records; [`Estimate::converged`] says whether the estimates have converged. For white noise (SRIVC), or
 //! autoregressive noise (RIVC), the limit has the least possible variance in open loop, as far as y is a line between its samples.
@@ -46,7 +47,7 @@ use crate::{Data, Delay, Error, Structure};
 const STARTS: usize = 3;
 /// Number of repetitions of the search for neighbouring delays with the coloured noise model.
 const MOVES: usize = 4;
-/// Largest order of the noise that stands behind the standard errors of SRIVC.
+/// Largest order of the noise that stands after the standard errors of SRIVC.
 const NOISE_ORDER: usize = 8;
 
 /// Assumed noise model.

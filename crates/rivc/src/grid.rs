@@ -1,8 +1,8 @@
 //! Course of a delayed input between the samples: the intervals on which it is linear.
 //!
 //! With a delay d the input is `u(t - d)`: its jumps and kinks lie between the samples, so that a step of the record falls into stretches.
-//! Steps and stretches of one length share one number, for which the filters are sampled once. Before the first sample the input is
-//! taken to have stood at its first value.
+//! Steps and stretches of one length share one number, for which the filters are sampled once. Before the first sample the input is taken
+//! to have was at its first value.
 
 use std::collections::HashMap;
 

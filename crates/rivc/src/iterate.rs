@@ -191,7 +191,7 @@ impl Problem<'_> {
             let asked = match asked {
                 Ok(asked) if iterations < most => asked,
                 Ok(_) => break,
-                // The first equations say what is wrong; later ones only that it went astray.
+                // The first equations say what is wrong; later ones only that it diverged.
                 Err(error) if iterations == 0 => return Err(error),
                 Err(_) => break,
             };

@@ -323,7 +323,7 @@ impl Data {
     }
 }
 
-/// Refuses a signal that stands still in all records.
+/// Refuses a signal that is constant in all records.
 fn moves(
     records: &[Data],
     of: impl Fn(&Data) -> Vec<f64>,

@@ -1,4 +1,4 @@
-//! What can be wrong with a setting or a run: each message carries the numbers that disagree and the mend.
+//! What can be wrong with a setting or a run: each message carries the numbers that disagree and the correction.
 
 /// Everything this crate can refuse, and why a run has stopped.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -40,7 +40,7 @@ pub enum Error {
         /// Weight of the filter's block.
         filter: f64,
     },
-    /// A row that says nothing of any parameter.
+    /// A row that contains no information about any parameter.
     #[error(
         "all coefficients of the row with chi = {chi} are 0, in theta and in c; give one that is not, or weight 0 to switch a row off"
     )]

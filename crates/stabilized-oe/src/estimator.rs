@@ -146,8 +146,8 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
 impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: usize>
     StabilizedOe<N, P, G, D, R>
 {
-    /// Rows `F theta + F_c c` that act after each sample that is used, equalities first, in the place of those before; (4.14) to (4.18)
-    /// of the paper. Bounds come after them. Cost per row that acts: that of the gain's step.
+    /// Rows `F theta + F_c c` that act after each sample that is used, equalities first, instead of those before; (4.14) to (4.18) of the
+    /// paper. Bounds come after them. Cost per row that acts: that of the gain's step.
     ///
     /// # Errors
     /// [`ct_constrained::Error::NoCommonPoint`] for rows that contradict each other; those of weight 0 do not count.
@@ -209,7 +209,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         }
     }
 
-    /// S_theta: bounds on `theta^`, in the place of the default ones. `A^` is kept Hurwitz besides.
+    /// S_theta: bounds on `theta^`, instead of the default ones. `A^` is kept Hurwitz besides.
     ///
     /// # Errors
     /// [`Error::StartOutside`].

@@ -14,8 +14,8 @@
 //! | A balance, a ratio or a bound that couples `theta` and `c^` | [`StabilizedOe::with_rows`] |
 //! | How does Euler's rule compare? | `BlockDiagonal::<N, P, Euler>` |
 //!
-//! The equations stand at the head of `estimator.rs`. With `default-features = false` an allocator is not needed either; the filters and
-//! the check of bounds, which come from `ct-lti`, are then left out.
+//! The equations are at the head of `estimator.rs`. With `default-features = false` an allocator is not needed either; the filters and the
+//! check of bounds, which come from `ct-lti`, are then left out.
 //!
 //! # Which gain
 //! | gain | without noise | with noise |
@@ -61,9 +61,9 @@
 //! | the same, a penalty of 1e3 | 0.07 (0.03 to 0.11) |
 //! | `[0.9, 3] x [0.7, 2]`, projected | 0.03 (0.02 to 0.09) |
 //!
-//! Without bounds the figure rests on what keeps `A^` alive; the estimates are lost either way. The wide set helps, but ensures
-//! nothing: at its corner (0.5, 3) `C^/A0` is not positive real. The last one is, for all plants within 10 % of the true one.
-//! [`check_filter_bounds`] tells them apart.
+//! Without bounds the figure rests on what keeps `A^` alive; the estimates are lost either way. The wide set helps, but ensures nothing: at
+//! its corner (0.5, 3) `C^/A0` is not positive real. The last one is, for all plants within 10 % of the true one. [`check_filter_bounds`]
+//! distinguishes them.
 //!
 //! The paper's own set, `-20 <= c_1 <= 20` for n = 1, is no such set; `c_1 >= 0` is for the constant gain, `c_1 > a_1/2` for least squares.
 //! Bounds do not replace a sensible memory: `1/eta` of 5 to 10 dominant time constants at least.

@@ -31,7 +31,7 @@ const ALPHA: f64 = 11.0;
 struct Tracking {
     /// Bandwidth of the filters \[rad/s\]: some times that of the tank.
     lambda: f64,
-    /// What is remembered \[s\]: some time constants, and short beside the wandering of the level.
+    /// What is remembered \[s\]: some time constants, and short beside the drifting of the level.
     memory: f64,
     /// First guess of the time constant \[s\]; how little is known of it, too.
     tau: f64,

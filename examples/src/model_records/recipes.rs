@@ -13,7 +13,7 @@ pub(super) struct Column {
     pub(super) head: &'static str,
     /// How many of its units are one of the model's.
     pub(super) per_unit: f64,
-    /// Digits behind the point.
+    /// Digits after the point.
     pub(super) digits: usize,
 }
 

@@ -69,8 +69,8 @@ struct Arguments {
     /// Only records whose name holds this, as `nothing 83` or `closed, coloured 4`.
     #[arg(long, default_value = "")]
     only: String,
-    /// Of the records on which the effect is not in the group, also says whether an exhaustive refit that knows the noise's
-    /// colour names it.
+    /// Of the records on which the effect is not in the group, also says whether an exhaustive refit that knows the noise's spectrum names
+    /// it.
     #[arg(long)]
     mark: bool,
     /// Writes every record's outcome.

@@ -1,5 +1,5 @@
-//! The mark for a diagnosis: a refit of the true structure and of every single effect by the Bayesian information criterion,
-//! the noise's colour known.
+//! The mark for a diagnosis: a refit of the true structure and of every single effect by the Bayesian information criterion, the noise's
+//! spectrum known.
 
 use ct_signals::ArModel;
 use ctid_tests::Rig;
@@ -30,7 +30,7 @@ impl Mark {
     }
 }
 
-/// The noise's colour, of size one.
+/// The noise's spectrum, of size one.
 fn colour(rig: &Rig) -> Option<Noise> {
     let of_one = if rig.colour > 0.0 {
         ArModel::from_coefficients(&[rig.colour], 1.0).ok()?

@@ -70,7 +70,7 @@ struct Column {
     /// Its name in a terminal, and how wide it is there.
     short: &'static str,
     width: usize,
-    /// Its name on a page, and what stands behind its figures there.
+    /// Its name on a page, and what stands after its figures there.
     long: &'static str,
     unit: &'static str,
     figure: fn(&Count) -> String,

@@ -26,7 +26,7 @@ impl Path {
         structure.scales = setup.scales_at(&x).ok()?;
         let parameters = structure.effect_parameters(placed);
         let leading = parameters.first()?;
-        // Sine and cosine of a swing are one size, in a direction of their own.
+        // Sine and cosine of an oscillation are one size, in a direction of their own.
         let sized = |p: &ParameterInfo| p.unit == leading.unit && p.absent == leading.absent;
         let several = parameters.iter().filter(|p| sized(p)).count() > 1;
         let ends = parameters.iter().map(|p| {

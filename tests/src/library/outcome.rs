@@ -20,7 +20,7 @@ use super::{
 /// The truth has to lower the criterion by this against what lacks (a part of) it, under the noise that made the record.
 const DETECTABLE: f64 = 14.0;
 
-/// Models whose criterion differs by less cannot be told apart.
+/// Models whose criterion differs by less cannot be distinguished.
 const SAME: f64 = 6.0;
 
 /// What comes from outside may be imitated: it counts where it is better than what was found by this.

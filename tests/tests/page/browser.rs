@@ -148,7 +148,7 @@ impl Browser {
         }
     }
 
-    /// Where an element is, once it stands still and nothing covers it.
+    /// Where an element is, once it is constant and nothing covers it.
     fn place(&mut self, selector: &str) -> (f64, f64) {
         let look = format!(
             "(() => {{ const e = document.querySelector({selector}); if (!e || e.disabled) return null;

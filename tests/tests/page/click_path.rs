@@ -237,7 +237,7 @@ fn the_bundled_record_with_the_mouse() {
     browser.assert_quiet(&address);
 }
 
-/// A record that leaves two lags open: the page proposes what tells them apart.
+/// A record that leaves two lags open: the page proposes what distinguishes them.
 #[test]
 #[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn two_undecided_effects_show_their_experiment() {
@@ -278,7 +278,7 @@ fn two_undecided_effects_show_their_experiment() {
         .filter_map(Value::as_f64)
         .collect();
     assert!(values.len() >= 300 && values.iter().all(|u| (1.5..=8.5).contains(u)));
-    // Of two that cannot be told apart one is in the model.
+    // Of two that cannot be distinguished one is in the model.
     browser.click("#add-found-0");
     wait_for_models(&mut browser, 2);
     let first = browser.text("#effects code");

@@ -281,7 +281,7 @@ fn two_tabs_do_not_meet_and_the_oldest_of_many_goes() {
     assert_eq!(first.post("/api/record?name=tour.csv", &tour()).status, 200);
     assert_eq!(first.state()["records"].as_array().unwrap().len(), 1);
     assert_eq!(second.state()["records"], json!([]));
-    // The tab that is loaded again finds its work; one that is not known begins anew.
+    // The tab that is loaded again finds its work; one that is not known starts again.
     let body = json!({ "session": first.session }).to_string();
     assert_eq!(
         first.post("/api/session", body.as_bytes()).json()["session"],

@@ -273,7 +273,7 @@ fn a_row_counts_by_the_memory_and_the_length_of_its_own_step() {
     let start = Weights::least_squares(0.0).unwrap();
     let rls = ContinuousRls::new(SVector::zeros(), SMatrix::identity(), start).unwrap();
     let mut constrained = ConstrainedRls::new(rls, [row]).unwrap();
-    // the data say nothing of the row's parameter
+    // the data contain no information about the row's parameter
     let sample = Sample::new([0.0, 1.0], 0.0);
     let mut information: f64 = 1.0;
     for (eta, dt) in [(0.5, 1.0), (2.0, 1.0), (2.0, 0.1), (2.0, 0.1), (0.1, 0.1)] {

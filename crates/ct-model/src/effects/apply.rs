@@ -248,7 +248,7 @@ impl Mended {
         }
     }
 
-    /// Puts one variable in the place of another, in everything that was there before the last effect.
+    /// Replaces one variable by another in all expressions that were there before the last effect.
     fn replace(&mut self, old: Variable, new: Variable, before: Counts) {
         let of =
             |variable: Variable| Expression::Variable(if variable == old { new } else { variable });

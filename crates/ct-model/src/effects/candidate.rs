@@ -188,7 +188,7 @@ impl Candidate {
         for parameter in &mut fragment.parameters {
             parameter.about.name = named(&parameter.about.name);
         }
-        // Constants of the effect stand behind its parameters.
+        // Constants of the effect follow its parameters.
         for (own, parameter) in self.parameters.iter_mut().zip(&fragment.parameters) {
             own.name.clone_from(&parameter.about.name);
         }

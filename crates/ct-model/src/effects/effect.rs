@@ -14,7 +14,7 @@ pub enum Place {
     Output,
     /// In the equation of a state `x`: added to its right-hand side, or, made of `rate`, in its place.
     Balance,
-    /// A parameter or a named flow `p`, in the place of which the effect stands.
+    /// A parameter or a named flow `p`, which the effect replaces.
     Parameter,
     /// A parameter or a named flow `p` that depends on a state or an input `x`.
     ParameterAndSignal,

@@ -90,7 +90,7 @@ pub(super) fn instance(
             }
         }
     }
-    // The right-hand side is a flow of its own, behind those of the effect.
+    // The right-hand side is a flow of its own, after those of the effect.
     let rate = Variable::Flow(counts.flows + small.flows.len());
     let of = |variable: Variable| match variable {
         Variable::Parameter(i) => own[i].clone(),

@@ -68,7 +68,7 @@ pub struct OwnError {
 /// again, under another name: two RC pairs are more than one ([`Candidate::repeats`]).
 ///
 /// # Errors
-/// The place in the model file and in the expression, what is wrong and the mend.
+/// The place in the model file and in the expression, what is wrong and the correction.
 pub fn own_candidates(
     spec: &ModelSpec,
     all: &BTreeMap<String, OwnCandidate>,
@@ -103,7 +103,7 @@ pub fn own_candidates(
 /// Reads a candidate of the model file in the scope of a model.
 ///
 /// # Errors
-/// The place in the model file and in the expression, what is wrong and the mend.
+/// The place in the model file and in the expression, what is wrong and the correction.
 pub fn own_candidate(
     spec: &ModelSpec,
     name: &str,

@@ -48,7 +48,7 @@ impl ModelSpec {
     /// Reads a model from its text, a flat subset of Modelica (the crate's head says which).
     ///
     /// # Errors
-    /// One line with the place in the text, what is wrong and the mend.
+    /// One line with the place in the text, what is wrong and the correction.
     pub fn parse(text: &str) -> Result<Self, TextError> {
         resolve::resolve(text, parser::parse(text)?)
     }

@@ -84,7 +84,7 @@ impl ModelSpec {
         self.flows.iter().map(of).collect()
     }
 
-    /// Sorts the flows anew, after equations have changed; the flows of a circle where there is one.
+    /// Sorts the flows again, after equations have changed; the flows of a circle where there is one.
     pub(crate) fn sort_flows(&mut self) -> Result<(), Vec<usize>> {
         self.order = sorted(&self.needs())?;
         Ok(())

@@ -51,7 +51,7 @@ fn unknown_word(unit: &str) -> Option<&str> {
     }
     let is_letter = |c: char| c.is_alphabetic() || "%°‰_".contains(c);
     let words = unit.split(|c: char| !is_letter(c) && !c.is_ascii_digit());
-    // A power stands behind its unit: `m2`.
+    // A power follows its unit: `m2`.
     let words = words.map(|word| {
         let word = word.trim_start_matches(|c: char| c.is_ascii_digit());
         (word, word.trim_end_matches(|c: char| c.is_ascii_digit()))

@@ -369,7 +369,7 @@ fn an_effect_keeps_the_numbers_of_the_record_that_it_was_written_in() {
         find(all.clone(), "drift(y)").record_numbers["duration"],
         250.0
     );
-    // Half the kept duration behind the kept begin it has moved by half of its change, whatever this record visits.
+    // Half the kept duration after the kept begin it has moved by half of its change, whatever this record visits.
     let reading = |candidate: &Candidate| {
         let mut mended = apply(&spec, &[candidate]).unwrap();
         let change = mended

@@ -213,7 +213,7 @@ fn drive(k: usize) -> f64 {
     0.9 * (0.11 * k as f64).sin() + if k % 40 < 20 { 0.4 } else { 0.0 }
 }
 
-/// The arm from turning point to turning point, between which it swings about one side's equilibrium.
+/// The arm from turning point to turning point, between which it oscillations about one side's equilibrium.
 fn arm_reference(inputs: &[f64], step: f64) -> Vec<[f64; 2]> {
     let (f, k, j) = (0.5, 0.8, 0.7);
     let omega = f64::sqrt(k / j);
@@ -270,7 +270,7 @@ fn an_arm_that_friction_holds() {
     case.check_derivatives(1e-5);
 }
 
-/// What slides along a guard of any kind: at rest from the start, along an input that moves, along a curve, behind a delay, on two at once.
+/// What slides along a guard of any kind: at rest from the start, along an input that moves, along a curve, after a delay, on two at once.
 #[test]
 fn states_that_slide() {
     let frame = |more: &str, equations: &str, outputs: &str| {

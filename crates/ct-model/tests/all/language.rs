@@ -197,8 +197,8 @@ fn linear_models_are_told_from_their_text() {
     assert_ne!(spec.linearity(), Linearity::Linear);
 }
 
-/// Each parameter reads the one before twice: what is computed anew at each reading takes twice as long with each line, and a test of 200 lines
-/// would not end.
+/// Each parameter reads the one before twice: what is computed again at each reading takes twice as long with each line, and a test of 200
+/// lines would not end.
 #[test]
 fn a_long_chain_of_parameters_is_compiled_in_one_pass() {
     let chain: String = (1..=200)

@@ -59,8 +59,8 @@ impl ArModel {
         Ok(best.map_or_else(|| ArModel::white(0.0), |(_, model)| model))
     }
 
-    /// The autoregression behind a system that is known, of which samples may be missing (NaN): at the maximum of the exact likelihood of those that are there, its
-    /// order by the criterion of [`ArModel::fit`].
+    /// The autoregression after a system that is known, of which samples may be missing (NaN): at the maximum of the exact likelihood of
+    /// those that are there, its order by the criterion of [`ArModel::fit`].
     ///
     /// `process` makes the process of both, from an autoregression whose innovations have variance 1 and the segment's number.
     ///

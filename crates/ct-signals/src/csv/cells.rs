@@ -90,7 +90,7 @@ pub(crate) enum CellFault {
     Empty,
     /// A number that is not finite.
     NotFinite,
-    /// A word that says nothing of a missing sample.
+    /// A word that contains no information about a missing sample.
     Word,
     /// Commas that are no decimal mark.
     Thousands,

@@ -39,7 +39,7 @@ pub struct ReadOptions {
     pub hold: Hold,
     /// Rows before this are left out: a date, or a number in the unit of the time column.
     pub from: Option<String>,
-    /// Rows behind this are left out, as [`ReadOptions::from`].
+    /// Rows after this are left out, as [`ReadOptions::from`].
     pub to: Option<String>,
     /// Refuses missing samples and missing rows.
     pub strict: bool,
@@ -82,8 +82,8 @@ pub fn read_csv(path: &Path, columns: &Columns, options: &ReadOptions) -> Result
     read(path, columns, options, Purpose::Fit)
 }
 
-/// Reads a record on whose inputs a model is simulated: an output whose column is not there has no sample, and two rows are enough.
-/// Outputs that are there may stand still.
+/// Reads a record on whose inputs a model is simulated: an output whose column is not there has no sample, and two rows are enough. Outputs
+/// that are present may be constant.
 ///
 /// # Errors
 /// As [`read_csv`], but for what is wrong with outputs alone.

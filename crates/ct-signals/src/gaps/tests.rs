@@ -79,7 +79,7 @@ fn a_missing_input_is_held_or_ends_a_part() {
         (106.0, Some(&160.0))
     );
     assert_eq!((parts[1].time[0], parts[1].len()), (180.0, 20));
-    // An input that runs in lines is not known behind its last sample.
+    // An input that runs in lines is not known after its last sample.
     record.inputs[0].hold = Hold::First;
     let (parts, _) = record.without_gaps(4.0);
     assert_eq!(parts[0].time.last(), Some(&158.0));
@@ -130,7 +130,7 @@ fn a_logger_with_several_rates_loses_nothing() {
         record
     };
     assert!(!with_time(time.clone()).has_gaps());
-    // Behind it a minute is missing.
+    // After it a minute is missing.
     let last = time[time.len() - 1];
     time.extend((0..20).map(|k| last + 60.0 + 0.1 * k as f64));
     let gappy = with_time(time);

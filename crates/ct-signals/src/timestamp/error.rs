@@ -25,7 +25,7 @@ pub enum TimestampError {
         /// The cell.
         text: String,
     },
-    /// Day and month cannot be told apart.
+    /// Day and month cannot be distinguished.
     #[error(
         "\"{text}\" has two meanings, and no date of the column says which number is the day; set time_format = \"{day_first}\" or \"{month_first}\""
     )]

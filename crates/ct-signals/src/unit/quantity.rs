@@ -108,9 +108,9 @@ impl Unit {
 
     /// How values in this unit become values in another; `None` where the two measure different things.
     ///
-    /// `degC`, `K` and `degF` alone are scales of temperature and have an offset; a difference of temperatures in a column of its own cannot be
-    /// told from them. In a compound such as `W/degC` they are differences. An angle is no ratio, and `rad/s` is not `1/s`; turns may be left
-    /// out, so that `rpm` is `1/min`.
+    /// `degC`, `K` and `degF` alone are scales of temperature and have an offset; a difference of temperatures in a column of its own
+    /// cannot be distinguished from them. In a compound such as `W/degC` they are differences. An angle is no ratio, and `rad/s` is not
+    /// `1/s`; turns may be left out, so that `rpm` is `1/min`.
     #[must_use]
     pub fn conversion_to(&self, other: &Self) -> Option<Conversion> {
         let angles = self.angle == other.angle

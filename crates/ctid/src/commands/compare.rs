@@ -31,13 +31,13 @@ pub(super) struct Compare {
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
     /// In a loop whose [controller] is known: simulate it from its reference, as is done for a plant, or run on the measured command, as is
-    /// done for a model of one's own
+    /// done for a user's own model
     #[arg(long = "loop", value_enum, value_name = "WAY")]
     way: Option<LoopWay>,
     /// Limit on the time of the search; Ctrl-C ends it earlier with the best result so far
     #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
     effort: EffortLevel,
-    /// Seed of the random starts of a model of one's own: another one must not give another result
+    /// Seed of the random starts of a user's own model: another one must not give another result
     #[arg(long, default_value_t = FitOptions::default().seed, value_name = "N", hide = true)]
     seed: u64,
     #[command(flatten)]
@@ -176,7 +176,7 @@ impl Compare {
         }
     }
 
-    /// A model of the user's own.
+    /// A user's own model.
     fn run_own(
         &self,
         model: &OwnModelFile,
@@ -234,7 +234,7 @@ impl Diagnose {
             look,
         )
     }
-    /// A model of the user's own.
+    /// A user's own model.
     fn run_own(
         &self,
         model: &OwnModelFile,

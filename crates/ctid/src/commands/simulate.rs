@@ -44,7 +44,7 @@ pub(super) struct Simulate {
         requires = "fit"
     )]
     fit_from: Option<String>,
-    /// Leave out rows of the records of --fit behind this
+    /// Leave out rows of the records of --fit after this
     #[arg(
         long,
         value_name = "TIME",

@@ -70,7 +70,7 @@ pub(crate) fn seed(text: &str) -> Result<u64, String> {
         .map_err(|_| format!("a whole number from 0 to {} is needed", u64::MAX))
 }
 
-/// An input of a model of one's own, and its range where one is given.
+/// An input of a user's own model, and its range where one is given.
 #[derive(Debug, Clone)]
 struct AppliedRange {
     name: String,
@@ -231,7 +231,7 @@ impl Arguments {
         output::plan(&wanted, inputs)
     }
 
-    /// The limits for a model of one's own.
+    /// The limits for a user's own model.
     fn own_limits(&self, model: &OwnModelFile) -> Result<OwnLimits, Error> {
         let mut limits = OwnLimits {
             duration: self.duration,
@@ -268,7 +268,7 @@ impl Arguments {
         Ok(limits)
     }
 
-    /// For a model of the user's own.
+    /// For a user's own model.
     fn run_own(
         &self,
         model: &OwnModelFile,

@@ -39,8 +39,8 @@ pub fn add(path: &Path, effect: &str, place: Option<&str>) -> Result<String, Err
     })
 }
 
-/// Adds to a plant a term of the user's own, its shape read from a CSV file; to a model of the user's own an effect, with what a result in
-/// JSON found of it. Returns what was done, in one line.
+/// Adds to a plant a term of the user's own, its shape read from a CSV file; to a user's own model an effect, with what a result in JSON
+/// found of it. Returns what was done, in one line.
 ///
 /// # Errors
 /// Where the name is taken or the shape cannot act on this plant, or the result is not one of this model and effect; the file is then as it
@@ -117,7 +117,7 @@ pub(crate) fn change(
     ))
 }
 
-/// Puts a whole text in the place of `from`, or where no file is.
+/// Replaces the text `from` by a new one, or creates the file.
 ///
 /// # Errors
 /// [`Error::Changed`] where another text stands there.
@@ -233,7 +233,7 @@ pub(crate) fn with_column(
     {
         _ if column.is_empty() => drop(table.remove(signal)),
         Some(said) => {
-            // A comment behind it stays.
+            // A comment after it stays.
             let decor = said.decor().clone();
             *said = column.into();
             *said.decor_mut() = decor;

@@ -1,4 +1,4 @@
-//! `ctid add` and `ctid remove` of effects at the ports of a model of its user's own.
+//! `ctid add` and `ctid remove` of effects at the ports of a user's own model.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -52,7 +52,7 @@ impl Findings {
     /// Reads a result.
     ///
     /// # Errors
-    /// Where the file is none of a diagnosis or a comparison of a model of its user's own.
+    /// Where the file is none of a diagnosis or a comparison of a user's own model.
     pub fn read(path: &Path) -> Result<Self, Error> {
         Self::of_text(&read_text(path)?).map_err(|what| Error::file(path, what))
     }
@@ -60,7 +60,7 @@ impl Findings {
     /// Reads the findings from a JSON text.
     ///
     /// # Errors
-    /// What is wrong and the mend.
+    /// What is wrong and the correction.
     pub fn of_text(text: &str) -> Result<Self, String> {
         serde_json::from_str(text).map_err(|error| {
             format!(
@@ -91,7 +91,7 @@ impl Findings {
     /// Values to keep for an effect: start values of its parameters, and the numbers of its records.
     ///
     /// # Errors
-    /// Where the result says nothing of it.
+    /// Where the result contains no information about it.
     pub fn kept(&self, candidate: &Candidate) -> Result<Kept, String> {
         let id = &candidate.id;
         let Some(numbers) = self.record_numbers.get(id) else {
@@ -137,7 +137,7 @@ impl From<&Diagnosis> for Findings {
     }
 }
 
-/// Whether a text is the model file of a model of its user's own.
+/// Whether a text is the model file of a user's own model.
 pub(super) fn is_own(text: &str) -> bool {
     let table = text.parse::<toml::Table>();
     table.is_ok_and(|table| table.contains_key("model"))
@@ -245,7 +245,7 @@ fn keep(
     })
 }
 
-/// Sets a key; a comment behind it stays.
+/// Sets a key; a comment after it stays.
 fn set(table: &mut dyn toml_edit::TableLike, key: &str, mut item: Item) {
     let before = table.get(key).and_then(Item::as_value);
     if let (Some(before), Some(new)) = (before, item.as_value_mut()) {

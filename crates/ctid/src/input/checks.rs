@@ -216,7 +216,7 @@ pub(super) fn check_input<'a>(
     Ok(())
 }
 
-/// A unit behind a number.
+/// A unit after a number.
 fn after_space(unit: &str) -> String {
     match unit {
         "" => String::new(),

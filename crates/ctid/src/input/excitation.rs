@@ -5,7 +5,7 @@
 //! - a record whose command never moves, beside one whose command does;
 //! - a command that makes a single step in all fitted records together;
 //! - an output that does not answer: its range is that of its own noise, and neither a lag of the prewhitened command nor the command
-//!   behind a first-order lag of any length is correlated with it.
+//!   after a first-order lag of any length is correlated with it.
 
 use std::fmt;
 
@@ -43,7 +43,7 @@ pub enum ExcitationWarning {
         /// Unit of the command.
         unit: String,
     },
-    /// An output of a record shows no trace of its command.
+    /// An output of a record shows no influence of its command.
     NoAnswer {
         /// The record.
         record: String,
@@ -211,7 +211,7 @@ fn uncorrelated(input: &[f64], output: &[f64]) -> bool {
     prewhitened_input_test(input, output, lags).is_ok_and(|(_, p)| p > CHANCE)
 }
 
-/// The input, as it is and behind first-order lags of one sample to a third of the record, is not correlated with the output.
+/// The input, as it is and after first-order lags of one sample to a third of the record, is not correlated with the output.
 fn uncorrelated_behind_lags(input: &[f64], output: &[f64]) -> bool {
     let samples = output.iter().filter(|y| !y.is_nan()).count();
     let bound = STANDARD_ERRORS / (samples as f64).sqrt();

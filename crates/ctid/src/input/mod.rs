@@ -51,7 +51,7 @@ pub struct ReadArguments {
     /// Leave out rows before this: a date such as "2026-01-31 14:25", or a number in the unit of the time column
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     from: Option<String>,
-    /// Leave out rows behind this
+    /// Leave out rows after this
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     to: Option<String>,
     /// Refuse missing samples and missing rows
@@ -114,7 +114,7 @@ impl Files {
     /// Reads and checks everything.
     ///
     /// # Errors
-    /// One line that names the file, the place and the mend.
+    /// One line that names the file, the place and the correction.
     pub fn read(&self) -> Result<Input, Error> {
         self.read_with(self.read_model()?)
     }

@@ -114,7 +114,7 @@ impl ModelFile {
 /// Reads a model file.
 ///
 /// # Errors
-/// One line that names the file, the line, what is wrong and the mend.
+/// One line that names the file, the line, what is wrong and the correction.
 pub fn read(path: &Path) -> Result<ModelFile, Error> {
     of_text(path, &read_text(path)?)
 }

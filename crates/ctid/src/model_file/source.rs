@@ -178,7 +178,7 @@ impl Source<'_> {
     }
 }
 
-/// A line as it was meant, where its value begins as a number and has a unit behind it or a decimal comma.
+/// A line as it was meant, where its value begins as a number and has a unit after it or a decimal comma.
 fn number_with_more(line: &str) -> Option<String> {
     let (key, value) = line.split_once('=')?;
     let word = value.split_whitespace().next()?;

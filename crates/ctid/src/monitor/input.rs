@@ -122,7 +122,7 @@ impl<'a> Session<'a> {
         };
         let mut rows = match Rows::begin(INPUT, self.line, text, &self.columns) {
             Ok((rows, false)) => rows,
-            // The rows behind it are in units that are not those of the model.
+            // The rows after it are in units that are not those of the model.
             Err(error) if error.of_units() => return Err(error.into()),
             _ => return Ok(false),
         };

@@ -17,7 +17,7 @@ pub(super) enum Cut<'a> {
 pub(super) struct Lines {
     part: Vec<u8>,
     too_long: bool,
-    /// The byte before was a carriage return: a line feed behind it ends nothing more.
+    /// The byte before was a carriage return: a line feed after it ends nothing more.
     returned: bool,
 }
 

@@ -242,7 +242,7 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// The words for one of the plants, or for a model of its user's own.
+    /// The words for one of the plants, or for a user's own model.
     fn words<'w>(&self, of_plant: &'w str, of_own: &'w str) -> &'w str {
         match self.model {
             Believed::Plant(_) => of_plant,

@@ -101,7 +101,7 @@ impl RawCandidate {
 /// The candidates in plain data, each of which fits the model.
 ///
 /// # Errors
-/// One line that names the file, the line, the place in the expression, what is wrong and the mend.
+/// One line that names the file, the line, the place in the expression, what is wrong and the correction.
 pub(super) fn read(
     spec: &ModelSpec,
     raw: &RawCandidates,

@@ -1,4 +1,4 @@
-//! A model of its user's own fitted to records, and how far it is off.
+//! A user's own model fitted to records, and how far it is off.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -150,7 +150,7 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
             coefficients: Vec::new(),
         });
     let noise_floors = noise_floors.collect();
-    // The fit is one by simulation error: its residual has the noise's colour.
+    // The fit is one by simulation error: its residual has the noise's spectrum.
     let errors = setup
         .robust(fit, options.noise_order)
         .map_or_else(|_| fit.std_errors(), |robust| robust.std_errors);

@@ -1,4 +1,4 @@
-//! `[controller.u]`: what moved an input of a model of its user's own in a loop.
+//! `[controller.u]`: what moved an input of a user's own model in a loop.
 //!
 //! `ctid identify` works with it by the methods that have to do with a loop. Simulations of the model run on the measured inputs: what that
 //! means for a fit is said.
@@ -37,7 +37,7 @@ pub(crate) struct OwnController {
 /// Reads and checks the controllers.
 ///
 /// # Errors
-/// One line that names the file, the line, what is wrong and the mend.
+/// One line that names the file, the line, what is wrong and the correction.
 pub(super) fn read(
     spec: &ModelSpec,
     raw: &RawControllers,

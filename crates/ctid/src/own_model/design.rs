@@ -1,4 +1,4 @@
-//! `ctid design` of a model of its user's own: the next experiment, at one of its inputs or at several.
+//! `ctid design` of a user's own model: the next experiment, at one of its inputs or at several.
 
 use ct_signals::{Heading, duration};
 use effect_search::design::{

@@ -1,4 +1,4 @@
-//! `effects = [...]` of a model file with a model of its user's own, and what `[effect."lag(u)"]` keeps of an effect.
+//! `effects = [...]` of a model file with a user's own model, and what `[effect."lag(u)"]` keeps of an effect.
 
 use std::collections::BTreeMap;
 
@@ -54,7 +54,7 @@ pub(crate) fn plain(id: &str) -> String {
 /// Reads and checks the effects of a model file.
 ///
 /// # Errors
-/// One line that names the file, the line, what is wrong and the mend.
+/// One line that names the file, the line, what is wrong and the correction.
 pub(super) fn read(
     spec: &ModelSpec,
     own: &BTreeMap<String, OwnCandidate>,

@@ -1,4 +1,4 @@
-//! A model of its user's own with its fitted values as text, and the curves of its fit.
+//! A user's own model with its fitted values as text, and the curves of its fit.
 
 use std::path::PathBuf;
 
@@ -123,7 +123,7 @@ fn names_of(records: &[Record]) -> Vec<String> {
 /// The model with the values of its text and of `[known]` or, where there are records, those of a fit to them.
 ///
 /// # Errors
-/// One line that names the file, the place and the mend.
+/// One line that names the file, the place and the correction.
 pub(crate) fn export(
     file: &OwnModelFile,
     records: Option<(Records, &[PathBuf])>,

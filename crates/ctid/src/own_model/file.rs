@@ -1,4 +1,4 @@
-//! The model file of a model of its user's own, and the records that go with it.
+//! The model file of a user's own model, and the records that go with it.
 
 mod parse;
 
@@ -99,7 +99,7 @@ impl AnyModelFile {
     /// Reads the model file once: it may be a pipe.
     ///
     /// # Errors
-    /// As [`model_file::read`]; one line that names the file, the line, what is wrong and the mend.
+    /// As [`model_file::read`]; one line that names the file, the line, what is wrong and the correction.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = model_file::read_text(path)?;
         let table = text.parse::<toml::Table>().ok();
@@ -151,7 +151,7 @@ impl OwnModelFile {
     /// records.
     ///
     /// # Errors
-    /// Where it cannot act in the model, or the diagnosis says nothing of it.
+    /// Where it cannot act in the model, or the diagnosis contains no information about it.
     pub fn with_effect(&self, effect: &str, found: &Diagnosis) -> Result<Self, Error> {
         let all = effects::every_candidate(&self.base, &self.candidates)?;
         let candidate = effects::find(&self.base, &all, effect).map_err(Error::UnknownEffect)?;
@@ -180,7 +180,7 @@ impl OwnModelFile {
     /// Reads the records of a problem.
     ///
     /// # Errors
-    /// One line that names the file, the place and the mend.
+    /// One line that names the file, the place and the correction.
     pub fn records(&self, files: &Files) -> Result<Records, Error> {
         let options = ct_signals::ReadOptions {
             hold: self.hold,
@@ -232,7 +232,7 @@ impl OwnModelFile {
         })
     }
 
-    /// An error of the columns with the mend for this model, whose signals have names of their own under `[columns]`.
+    /// An error of the columns with the correction for this model, whose signals have names of their own under `[columns]`.
     pub fn named(&self, error: ct_signals::Error) -> Error {
         let ct_signals::Error::Column { file, row, fault } = &error else {
             return error.into();
@@ -350,7 +350,7 @@ pub(crate) fn conversion(
 /// Reads the text of a model.
 ///
 /// # Errors
-/// One line that names the file, line and column, what is wrong and the mend.
+/// One line that names the file, line and column, what is wrong and the correction.
 pub(crate) fn read_model(path: &Path) -> Result<ModelSpec, Error> {
     let text = model_file::read_text(path)?;
     ModelSpec::parse_to_simulate(&text).map_err(|source| Error::Text {

@@ -1,4 +1,4 @@
-//! A model of its user's own fitted to records: what comparisons, simulations and exports begin with.
+//! A user's own model fitted to records: what comparisons, simulations and exports begin with.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -192,7 +192,7 @@ impl FittedModel {
     /// more where these do not tell. `level`: the probability with which the band holds, within 0 and 1.
     ///
     /// # Errors
-    /// Where an input is not whole, or the simulation does not go on, with the place and the mend.
+    /// Where an input is not whole, or the simulation does not go on, with the place and the correction.
     pub fn simulate(&self, reading: Reading, first: usize, level: f64) -> Result<Simulated, Error> {
         let name = std::path::PathBuf::from(&reading.record.name);
         let columns = Columns {

@@ -1,4 +1,4 @@
-//! The linear model that `ctid identify` finds, beside the transfer function of a model of its user's own.
+//! The linear model that `ctid identify` finds, beside the transfer function of a user's own model.
 
 use std::path::Path;
 
@@ -38,7 +38,7 @@ pub(crate) struct OwnTransferFunction {
     pub b: Vec<f64>,
     /// Coefficients of the output's polynomial, by powers of s.
     pub a: Vec<f64>,
-    /// Inputs that are taken to stand still.
+    /// Inputs that are assumed constant.
     pub others: Vec<String>,
 }
 
@@ -160,7 +160,8 @@ impl<'f> OneByOne<'f> {
         controller.map(in_seconds).transpose()
     }
 
-    /// Puts a record of the two into the units of the model. A reference that no controller names says nothing of this loop, and is left out.
+    /// Puts a record of the two into the units of the model. A reference that no controller names contains no information about this loop,
+    /// and is left out.
     ///
     /// # Errors
     /// Where a unit is of another dimension.

@@ -1,4 +1,4 @@
-//! The report of a comparison or a diagnosis of a model of its user's own: the document of the plants, filled from the model's signals.
+//! The report of a comparison or a diagnosis of a user's own model: the document of the plants, filled from the model's signals.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! A model of its user's own on new inputs.
+//! A user's own model on new inputs.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::simulate::{
 /// Simulates the model on the inputs of a record, after a fit to others where there are any.
 ///
 /// # Errors
-/// One line that names the file, the place and the mend.
+/// One line that names the file, the place and the correction.
 pub(crate) fn simulate(
     file: &OwnModelFile,
     mut records: Option<Records>,
@@ -68,8 +68,8 @@ pub(crate) fn simulate(
     Ok((found, summaries))
 }
 
-/// A model with its effects in it on the inputs of a record, of which the initial states are fitted to so many first readings. `path` is what
-/// is blamed.
+/// A model with its effects in it on the inputs of a record, of which the initial states are fitted to so many first readings. `path` is
+/// what is named in the error.
 ///
 /// # Errors
 /// Where the simulation does not go on.

@@ -95,7 +95,7 @@ fn sites(spec: &ModelSpec, port: Port) -> Vec<Site> {
     }
 }
 
-/// A unit as it is shown: nothing behind a number without dimension.
+/// A unit as it is shown: nothing after a number without dimension.
 pub(crate) fn shown_unit(unit: &str) -> &str {
     if unit == "1" { "" } else { unit }
 }

@@ -51,7 +51,7 @@ pub fn html(diagnosis: &Diagnosis) -> String {
     html_with(diagnosis, None)
 }
 
-/// The same of a model of its user's own, with what nothing explains there.
+/// The same of a user's own model, with what nothing explains there.
 pub(crate) fn html_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> String {
     let title = format!("ctid: {}", escape(&diagnosis.plant));
     let data = data::json_with(diagnosis, term);

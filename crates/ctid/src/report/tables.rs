@@ -53,7 +53,7 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
     format!("<dl class=\"facts\">\n{items}</dl>\n")
 }
 
-/// The effects that were added, each with all that cannot be told apart from it.
+/// The effects that were added, each with all that cannot be distinguished from it.
 pub(super) fn groups(diagnosis: &Diagnosis) -> String {
     let items: String = diagnosis
         .groups
@@ -201,7 +201,7 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
     } else {
         unit(&diagnosis.output_unit)
     };
-    // A model of its user's own is scored without a signature of each effect.
+    // A user's own model is scored without a signature of each effect.
     let visible = diagnosis.scores.iter().any(|s| s.visibility.is_finite());
     let of_signature = |cell: String| if visible { cell } else { String::new() };
     let rows: String = diagnosis

@@ -1,9 +1,9 @@
-//! The connections: so many at once, and none that stands still keeps another out.
+//! The connections: so many at once, and none that is constant keeps another out.
 //!
-//! On a new connection nobody has shown yet that he knows the secret. Such connections have places of their own, so that other users
-//! of the machine, who can connect too, take none of the owner's; they end with their first answer, a refusal. Where all places are
-//! taken the next connection is let in and the one that has stood still for the longest time is closed: of those that do not know the
-//! secret the oldest, whatever it sends.
+//! On a new connection nobody has shown yet that he knows the secret. Such connections have places of their own, so that other users of the
+//! machine, who can connect too, take none of the owner's; they end with their first answer, a refusal. Where all places are taken the next
+//! connection is let in and the one that has was constant for the longest time is closed: of those that do not know the secret the oldest,
+//! whatever it sends.
 
 use std::convert::Infallible;
 use std::io::{self, IoSlice};
@@ -83,7 +83,7 @@ impl Client {
 struct Clients(Mutex<Vec<(Arc<Client>, AbortHandle)>>);
 
 impl Clients {
-    /// Closes those that have stood still for the longest time, until there are at most so many that know the secret, or do not.
+    /// Closes those that have was constant for the longest time, until there are at most so many that know the secret, or do not.
     fn keep(&self, knowing: bool, most: usize) {
         let mut all = lock(&self.0);
         loop {

@@ -104,7 +104,7 @@ async fn model(
 #[serde(rename_all = "lowercase")]
 enum Wanted {
     Model,
-    /// The text of a model of its user's own.
+    /// The text of a user's own model.
     Text,
     Report,
     Experiment,

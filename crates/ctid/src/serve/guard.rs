@@ -103,7 +103,7 @@ impl Guard {
         &self.secret
     }
 
-    /// Whether the request may be answered; its address is then the one behind the secret.
+    /// Whether the request may be answered; its address is then the one after the secret.
     ///
     /// # Errors
     /// Why it is refused.

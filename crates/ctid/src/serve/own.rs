@@ -1,5 +1,5 @@
-//! A model of its user's own on the page: its text and its model file are kept for the tab, checked as they are typed, and fitted to the
-//! records of the tab by the function of `ctid compare`.
+//! A user's own model on the page: its text and its model file are kept for the tab, checked as they are typed, and fitted to the records
+//! of the tab by the function of `ctid compare`.
 //!
 //! Nothing of it reaches the file system: the `model` that a model file names is the text that the page holds, whatever name stands there.
 
@@ -93,7 +93,7 @@ pub(super) struct Fit {
 #[derive(Debug, serde::Deserialize)]
 #[serde(tag = "do", rename_all = "lowercase")]
 pub(super) enum Change {
-    /// A model of one's own in place of a plant.
+    /// A user's own model in place of a plant.
     Begin,
     /// Return to the built-in plants.
     End,
@@ -135,7 +135,7 @@ impl Own {
     /// Text and file together.
     ///
     /// # Errors
-    /// One line that names the place and the mend.
+    /// One line that names the place and the correction.
     pub(super) fn model(&self) -> Result<OwnModelFile, Error> {
         OwnModelFile::parse_with(Path::new(FILE), &self.file, self.named_text())
     }
@@ -164,7 +164,7 @@ impl Own {
         self.text.len() + self.file.len() + fit.map_or(0, of_fit) + shown + design
     }
 
-    /// The text in the place of the file that a model file names.
+    /// The text instead of the file that a model file names.
     fn named_text(&self) -> impl Fn(&Path) -> Result<ModelSpec, Error> {
         |named: &Path| {
             self.spec().map_err(|source| Error::Text {

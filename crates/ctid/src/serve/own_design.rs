@@ -1,4 +1,4 @@
-//! The next experiment of a model of its user's own, as the page asks for it and shows it.
+//! The next experiment of a user's own model, as the page asks for it and shows it.
 
 use ct_signals::Hold;
 use effect_search::design::{Design, Limits};

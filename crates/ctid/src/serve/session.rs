@@ -52,7 +52,7 @@ pub(super) enum Kind {
     Chain,
     Diagnose,
     Design,
-    /// The fit of a model of its user's own.
+    /// The fit of a user's own model.
     Own,
 }
 
@@ -78,7 +78,7 @@ pub(super) struct Session {
     /// Path of the model file, if there is one; else the text exists in memory only.
     pub file: Option<PathBuf>,
     pub text: String,
-    /// A model of its user's own, where one is looked at in place of a plant.
+    /// A user's own model, where one is looked at in place of a plant.
     pub own: Option<Own>,
     /// Serialises the fits of a user's own model, including stopped ones.
     pub own_fits: Arc<Mutex<()>>,
@@ -378,7 +378,7 @@ impl Session {
     pub(super) fn stop(&mut self) {
         if let Some(job) = self.job.take() {
             job.stop.store(true, Ordering::Relaxed);
-            // A search of a model of its user's own knows this flag alone.
+            // A search of a user's own model knows this flag alone.
             job.interrupt.store(true, Ordering::Relaxed);
             self.version += 1;
         }

@@ -28,10 +28,10 @@ pub(crate) struct ReadInputs {
     pub time: TimeColumn,
 }
 
-/// Reads the inputs; those outputs that the file has come with them. `named`: what a column that is not there is blamed on.
+/// Reads the inputs; those outputs that the file has come with them. `named`: what a column that is not there is named in the error on.
 ///
 /// # Errors
-/// One line that names the file, the place and the mend: where a column is not there, a sample of an input is missing, or rows are.
+/// One line that names the file, the place and the correction: where a column is not there, a sample of an input is missing, or rows are.
 pub(crate) fn read_inputs(
     path: &Path,
     columns: &Columns,
@@ -46,7 +46,7 @@ impl ReadInputs {
     /// Inputs that were read, which have to be whole; `path` names them in messages.
     ///
     /// # Errors
-    /// Where a sample of an input is missing, or rows are, with the place and the mend.
+    /// Where a sample of an input is missing, or rows are, with the place and the correction.
     pub fn of(path: &Path, reading: Reading, columns: &Columns) -> Result<Self, Error> {
         let (mut record, summary) = (reading.record, reading.summary);
         record.name = escaped(&record.name).into_owned();

@@ -2,7 +2,7 @@
 //!
 //! | what | where |
 //! |---|---|
-//! | a model of the user's own | `own_model/simulate.rs` |
+//! | a user's own model | `own_model/simulate.rs` |
 //! | one of the plants | `plant.rs` |
 //! | the inputs, read and checked | `inputs.rs` |
 //! | what a person reads | `text.rs` |

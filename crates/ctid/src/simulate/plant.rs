@@ -26,7 +26,7 @@ const STOPPING: Stopping = Stopping {
 /// Fits a plant with its effects to records, and simulates it on the inputs of another.
 ///
 /// # Errors
-/// One line that names the file, the place and the mend.
+/// One line that names the file, the place and the correction.
 pub(crate) fn simulate(
     model: ModelFile,
     files: &Files,
@@ -62,8 +62,8 @@ pub(crate) fn simulate(
 }
 
 /// A plant on the inputs of a record, after a fit to the records of a problem. `names`: the columns of its outputs, where they are named;
-/// `path` is what is blamed for the record, whose initial levels are fitted to the `first` readings of each output. `level`: the probability with
-/// which the band holds, within 0 and 1.
+/// `path` is what is named in errors about the record, whose initial levels are fitted to the `first` readings of each output. `level`: the
+/// probability with which the band holds, within 0 and 1.
 ///
 /// # Errors
 /// Where the records do not allow a fit, or the simulation does not go on.

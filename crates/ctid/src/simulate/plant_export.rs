@@ -63,7 +63,7 @@ fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> 
 /// Fits a plant with its effects to records.
 ///
 /// # Errors
-/// One line that names the file, the place and the mend.
+/// One line that names the file, the place and the correction.
 pub(crate) fn export(
     model: ModelFile,
     files: &Files,

@@ -302,7 +302,7 @@ fn drift_with_the_operating_point_leaves_the_band() {
     assert!(low + 3.0 * low_error < high - 3.0 * high_error);
 }
 
-/// A tank by Torricelli's law, `20 y' = 8 u - 2 sqrt(y)`, or what it is near `y = 16`; the input wanders, with steps on it.
+/// A tank by Torricelli's law, `20 y' = 8 u - 2 sqrt(y)`, or what it is near `y = 16`; the input drifts, with steps on it.
 fn wandering(linear: bool, seed: u64) -> Record {
     let (rows, fine) = (12_000, 5);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

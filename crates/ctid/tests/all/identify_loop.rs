@@ -176,7 +176,7 @@ fn cut(record: &Record, rows: usize) -> Record {
     cut
 }
 
-/// The drive stands still for the first rows of each of these, and the loop moves.
+/// The drive is constant for the first rows of each of these, and the loop moves.
 #[test]
 fn a_slow_transient_is_no_rest() {
     let order = Order { n: 1, m: 0 };
@@ -307,7 +307,7 @@ fn no_condition_is_told_of_estimates_that_are_not_the_record_s() {
     assert!(found.in_loop.unwrap().convergence.is_none());
 }
 
-/// No verdict on the estimates of a recursion that went astray: here it rests by order where nothing is at rest.
+/// No verdict on the estimates of a recursion that diverged: here it rests by order where nothing is at rest.
 #[test]
 fn no_condition_is_told_of_estimates_that_are_wrong() {
     let order = Order { n: 1, m: 0 };

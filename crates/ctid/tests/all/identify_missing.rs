@@ -41,7 +41,7 @@ fn without_some(mut record: Record, seed: u64) -> Record {
 
 /// How sure the estimates of a_1, a_2 and b_0 are, over many records.
 struct Sure {
-    /// Shares of the 95 % intervals that hold the truth.
+    /// Shares of the 95 % intervals that contain the true value.
     covered: Vec<f64>,
     /// Standard errors over the spread of the estimates.
     told: Vec<f64>,
@@ -132,7 +132,7 @@ fn output_error_is_as_sure_as_it_says() {
     holds(Method::Iv);
 }
 
-/// Recursions are no worse for missing readings than with all of them: the share that their intervals hold the truth in is theirs.
+/// Recursions are no worse for missing readings than with all of them: the share that their intervals contain the true value in is theirs.
 #[test]
 fn recursions_are_no_worse_for_missing_readings() {
     let n = records() as f64;

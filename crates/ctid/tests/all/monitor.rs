@@ -164,7 +164,7 @@ fn the_ways_to_write_rows_are_those_of_the_csv_reader() {
     assert_eq!(events(&lone.out).len(), events(&plain.out).len());
 }
 
-/// A logger that begins anew with its columns in another order swaps nothing.
+/// A logger that starts again with its columns in another order swaps nothing.
 #[test]
 fn a_header_that_comes_again_in_another_order_is_followed() {
     let rows = rows(1400, 1100);

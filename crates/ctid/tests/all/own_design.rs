@@ -1,4 +1,4 @@
-//! `ctid design` of a model of one's own: at one input or at several, written as a record that the model can be simulated on.
+//! `ctid design` of a user's own model: at one input or at several, written as a record that the model can be simulated on.
 
 use std::fmt::Write;
 

@@ -1,4 +1,4 @@
-//! Effects at the ports of a model of its user's own: added, kept, seen in every command, removed; and what is refused.
+//! Effects at the ports of a user's own model: added, kept, seen in every command, removed; and what is refused.
 
 mod refused;
 

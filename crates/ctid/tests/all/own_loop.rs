@@ -1,4 +1,4 @@
-//! `[controller.u]` of a model of one's own: `identify` works with it, and what runs on the measured input says so.
+//! `[controller.u]` of a user's own model: `identify` works with it, and what runs on the measured input says so.
 
 use std::fmt::Write;
 

@@ -1,4 +1,4 @@
-//! `ctid simulate`, `ctid export` and `ctid identify` with models of the user's own, from the program's outside.
+//! `ctid simulate`, `ctid export` and `ctid identify` with users' own models, from the program's outside.
 
 mod export;
 mod linear;
@@ -265,7 +265,7 @@ fn what_cannot_be_simulated_is_refused_in_one_line() {
         "simulate m.toml in.csv --out y.csv --initial 0",
         &["whole number above zero"],
     );
-    // A model that runs away.
+    // A model that diverges.
     place.write(
         "block.mo",
         BLOCK.replace("= g*u - loss", "= g*u - loss + T*T"),

@@ -137,7 +137,7 @@ fn block(equation: &str) -> String {
         .replace("g*u - k*(T - Ta)", equation)
 }
 
-/// The block behind a sensor with a time constant of 25 s.
+/// The block after a sensor with a time constant of 25 s.
 fn lagging() -> String {
     block("g*u - k*(T - Ta)")
         .replace(

@@ -5,7 +5,7 @@ use ct_signals::ArModel;
 use super::{Fit, fit_from};
 use crate::{Error, Noise, Residuals, Stopping, marginal, residuals, rows};
 
-/// Estimates the noise's colour from a fit's residual and refits in that metric, until the two agree.
+/// Estimates the noise's spectrum from a fit's residual and refits in that metric, until the two agree.
 ///
 /// # Errors
 /// As [`fit_from`].

@@ -186,7 +186,7 @@ fn a_start_far_from_a_prior_ends_where_a_near_one_does() {
     assert!((near.x[2] - curves.priors[1].value).abs() < 1e-3);
 }
 
-/// Intervals of 95 % hold the truth in 95 % of the draws of noise and priors, in both metrics, and priors make them shorter.
+/// Intervals of 95 % contain the true value in 95 % of the draws of noise and priors, in both metrics, and priors make them shorter.
 #[test]
 fn intervals_hold_the_truth() {
     const RUNS: u64 = 400;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::controller::positive;
 use crate::{Error, OperatingPoint};
 
-/// The polynomial in the filter `S/P^` behind the sensitivities.
+/// The polynomial in the filter `S/P^` after the sensitivities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {

@@ -15,9 +15,10 @@
 //! 741-764, for open loop; M. Gilson, H. Garnier, P. C. Young, P. Van den Hof, in Identification of Continuous-time Models from Sampled Data, Springer
 //! 2008, ch. 5, for the loop). In a loop of a continuous controller there remains the error of what u does between samples.
 //!
-//! Readings of y may be missing; their rows do not count. In least squares y runs on lines between its readings, and rows behind long gaps are left out
-//! ([`ct_lti::ReadingFilter`]). With instruments what the model of the loop says stands for a missing reading in the filters of y: the instruments owe nothing to what the others
-//! hold beside it, so that the estimates are consistent, and for the filter `E = A^` the residual of a row has no part of what stands in other rows at all.
+//! Readings of y may be missing; their rows do not count. In least squares y runs on lines between its readings, and rows after long gaps
+//! are left out ([`ct_lti::ReadingFilter`]). With instruments what the model of the loop says stands for a missing reading in the filters
+//! of y: the instruments owe nothing to what the others hold beside it, so that the estimates are consistent, and for the filter `E = A^`
+//! the residual of a row has no part of what stands in other rows at all.
 //!
 //! Several records are taken together.
 

@@ -1,6 +1,5 @@
-//! Intervals of 95 % hold the truth in 95 % of simulated runs, whether the noise circulates in the loop or not, which
-//! the fit is not told. The whole of it, 4000 runs each, is the example
-//! `coverage`.
+//! Intervals of 95 % contain the true value in 95 % of simulated runs, whether the noise circulates in the loop or not, which the fit is
+//! not told. The whole of it, 4000 runs each, is the example `coverage`.
 
 #[path = "support/rig.rs"]
 mod rig;
@@ -65,8 +64,8 @@ fn estimated_levels_and_open_loop() {
     check(&Rig::open_loop());
 }
 
-/// 30 % of the readings are missing, and a block of 10 rows: the noise behind the loop is found from those that are there. Fewer runs than above: each takes
-/// some 50 filters of the residual. `RUNS=400` takes as many.
+/// 30 % of the readings are missing, and a block of 10 rows: the noise after the loop is found from those that are there. Fewer runs than
+/// above: each takes some 50 filters of the residual. `RUNS=400` takes as many.
 #[test]
 fn missing_readings() {
     let asked = std::env::var("RUNS")

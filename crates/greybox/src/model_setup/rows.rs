@@ -34,7 +34,7 @@ impl<'a> ModelSetup<'a> {
     }
 
     /// Simulates all records with derivatives by some entries, at most `L` of them at once, and shows the outputs row by row with the
-    /// entries of the lanes.
+    /// entries of the signals.
     fn each_instant<const L: usize>(
         &self,
         x: &[f64],

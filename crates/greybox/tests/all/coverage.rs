@@ -1,5 +1,5 @@
-//! Intervals of 95 % hold the truth in 95 % of simulated records, for every parameter and initial level, whatever the
-//! noise's colour, which the fit is not told.
+//! Intervals of 95 % contain the true value in 95 % of simulated records, for every parameter and initial level, whatever the noise's
+//! spectrum, which the fit is not told.
 
 use crate::support::Rig;
 use ct_signals::{ArModel, Record};
@@ -143,7 +143,7 @@ fn simulation_error_under_coloured_noise() {
     }
 }
 
-/// Readings that are missing are left out of the likelihood, whatever the noise's colour: 30 % of them at random, and in blocks.
+/// Readings that are missing are left out of the likelihood, whatever the noise's spectrum: 30 % of them at random, and in blocks.
 #[test]
 fn missing_readings() {
     let at_random = |k: usize| (k * 7919 + 13) % 101 < 30;

@@ -32,7 +32,7 @@ impl Disturbed {
         all.chain(self.rig.levels.iter().copied()).collect()
     }
 
-    /// Under random steps of the command, and a disturbance in l/min that steps, or wanders with a straight course between samples.
+    /// Under random steps of the command, and a disturbance in l/min that steps, or drifts with a straight course between samples.
     fn record(&self, seed: u64) -> Record {
         let rig = &self.rig;
         let (n, h) = (rig.samples, rig.interval);

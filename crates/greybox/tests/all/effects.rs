@@ -111,7 +111,7 @@ impl Case {
         parameters
     }
 
-    /// Steps under a slow wander, so that the command turns at many heights.
+    /// Steps under a slow drift, so that the command turns at many heights.
     fn command(rng: &mut ChaCha8Rng) -> Vec<f64> {
         let steps = excitation::steps(SAMPLES, 10..=40, 3.5, 6.5, rng).unwrap();
         let drive = excitation::steps(SAMPLES, 5..=20, 3.5, 6.5, rng).unwrap();

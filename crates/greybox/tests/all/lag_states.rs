@@ -96,7 +96,7 @@ fn the_lag_that_is_there_fits_better_than_the_other() {
     }
 }
 
-/// The state behind the lag is then that of a pump at rest, which no command of the record is.
+/// The state after the lag is then that of a pump at rest, which no command of the record is.
 #[test]
 fn a_pump_that_starts_with_the_record_is_a_lag() {
     for rig in [Rig::single_tank(), Rig::cascaded_tanks()] {

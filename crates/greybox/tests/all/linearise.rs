@@ -149,7 +149,7 @@ fn with_effects(rig: &Rig, setup: &Setup, records: usize) -> Vec<f64> {
     x
 }
 
-/// More columns than lanes of one simulator: several run side by side.
+/// More columns than one simulator has derivatives: several simulators are used.
 #[test]
 fn more_columns_than_lanes() {
     let rig = Rig::cascaded_tanks();

@@ -186,7 +186,7 @@ fn each_output_has_its_own_noise() {
     assert_relative_eq!(fit.deviance, other.deviance, max_relative = 1e-6);
 }
 
-/// Intervals of 95 % hold the truth so often, whatever the metric of the fit; `RECORDS=800` takes so many records.
+/// Intervals of 95 % contain the true value so often, whatever the metric of the fit; `RECORDS=800` takes so many records.
 #[test]
 fn intervals_hold_the_truth() {
     let count = std::env::var("RECORDS");

@@ -1,5 +1,5 @@
-//! The band of a simulation on other inputs: its exact slopes against differences of whole predictions, initial states fitted anew, and how
-//! often it covers the output without noise.
+//! The band of a simulation on other inputs: its exact slopes against differences of whole predictions, initial states fitted again, and
+//! how often it covers the output without noise.
 
 mod bands;
 

@@ -6,8 +6,8 @@ use serde::Serialize;
 use super::Task;
 use crate::{Error, Method, residual::limits};
 
-/// A loop rests in the first rows if there are so many in which the drive stands still, and neither output nor command would go
-/// further than this share of its range at their present pace, in the time that the record itself takes to forget.
+/// A loop rests in the first rows if there are so many in which the drive is constant, and neither output nor command would go further than
+/// this share of its range at their present pace, in the time that the record itself takes to forget.
 const ROWS_AT_REST: usize = 6;
 const MOVES: f64 = 0.03;
 /// A difference below this number of standard errors is noise.
@@ -25,7 +25,7 @@ pub enum LevelChoice {
     Auto,
     /// Estimated with the parameters, by fcloe alone
     Estimated,
-    /// Means of the first rows, in which the reference stands still
+    /// Means of the first rows, in which the reference is constant
     Rest,
     /// Means of the record
     Mean,
@@ -56,8 +56,8 @@ impl Task<'_> {
         })
     }
 
-    /// Whether output and command stand still too while the drive does. Under an integrator the output stands where the reference
-    /// is. Where nothing says that, the rows have to be enough for a slow transient to be seen.
+    /// Whether output and command are constant too while the drive does. Under an integrator the output stands where the reference is.
+    /// Where nothing says that, the rows have to be enough for a slow transient to be seen.
     fn rests(&self, record: &LoopRecord, still: usize) -> bool {
         if still < ROWS_AT_REST || still >= record.len() {
             return false;

@@ -346,7 +346,7 @@ fn missed(mismatch: &Mismatch) -> Option<String> {
     })
 }
 
-/// The command stands at its limits, where the loop is not linear.
+/// The command is at its limits, where the loop is not linear.
 fn limited(record: &Record, (low, high): (f64, f64)) -> Option<String> {
     let values = &record.inputs[0].values;
     let at = values.iter().filter(|u| **u <= low || **u >= high).count();

@@ -4,7 +4,7 @@
 //! ```text
 //! z_b = R_b (theta_b - theta^) - e^{-eta L} R_{b-1} (theta_{b-1} - theta^) = integral of phi (y - phi' theta^) e^{..} dt
 //! ```
-//! exactly for least squares. Stretches of a time constant or more are nearly independent whatever the colour of the noise, so that
+//! exactly for least squares. Stretches of a time constant or more are nearly independent whatever the spectrum of the noise, so that
 //! ```text
 //! cov theta^ = P S P,   S = sum_b e^{-2 eta (t - t_b)} z_b z_b'
 //! ```

@@ -7,7 +7,7 @@
 //! ```
 //! The way of the level is cut into equal stretches, and the estimates of each are averaged.
 //!
-//! That they stand still says something only where the level has moved: where the memory is a small part of the record, and what it
+//! That they are constant says something only where the level has moved: where the memory is a small part of the record, and what it
 //! remembers covers a good part of the output's range. A shorter record cannot tell.
 
 use serde::Serialize;
@@ -21,8 +21,8 @@ const STRETCHES: usize = 8;
 /// The estimates depend on the level if their values at both ends of the level's range differ by this number of standard errors.
 const APART: f64 = 3.0;
 
-/// The longest memory, of the record's length, and the least way of the remembered level, of the output's range, with which estimates
-/// that stand still say something. The default memory of a record that is long enough is a fifth of it.
+/// The longest memory, of the record's length, and the least way of the remembered level, of the output's range, with which estimates that
+/// are constant say something. The default memory of a record that is long enough is a fifth of it.
 const LONGEST_MEMORY: f64 = 0.21;
 const LEAST_WAY: f64 = 0.2;
 

@@ -25,7 +25,8 @@ pub(super) struct Point {
 pub(super) struct Path {
     pub order: Order,
     pub points: Vec<Point>,
-    /// Bounds on the parameters have acted in the second half: the scatter of the estimates says nothing of their errors then.
+    /// Bounds on the parameters have acted in the second half: the scatter of the estimates contains no information about their errors
+    /// then.
     pub held: bool,
     pub warnings: Vec<String>,
 }

@@ -9,7 +9,7 @@ const MOST_LAGS: usize = 25;
 /// Significance level: a correlation of a signal with the error below this p-value is reported.
 const UNLIKELY: f64 = 0.01;
 
-/// The parts of a record, one behind the other.
+/// The parts of a record, one after the other.
 #[derive(Default)]
 pub(super) struct Joined {
     pub shown: Shown,

@@ -7,7 +7,8 @@
 //! In a loop the command answers to the noise, and a model that takes this answer for the plant simulates better on the measured command
 //! than the plant does: there no method is called worse for its error, and that is said.
 //!
-//! Missing readings have no error. Of a record that is cut at gaps of its input this error is that over the rows behind which the plant has forgotten them.
+//! Missing readings have no error. Of a record that is cut at gaps of its input this error is that over the rows after which the plant has
+//! forgotten them.
 //!
 //! Orders are chosen by
 //! - BIC: `N log sigma^2 + k log N`, `sigma` of the innovations of an autoregressive model of the simulation error, `k` its coefficients,

@@ -58,7 +58,7 @@ pub struct Outcome {
     pub fit_percent: f64,
     /// Simulation error on the records that were not fitted, over all of them.
     pub test_rmse: Option<f64>,
-    /// %; nothing where the outputs stand still.
+    /// %; nothing where the outputs are constant.
     pub test_fit_percent: Option<f64>,
     /// Whether all parameters differ significantly from zero, as far as standard errors are known, and no time constant is shorter than a step.
     pub determined: bool,

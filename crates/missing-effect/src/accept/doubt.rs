@@ -59,7 +59,7 @@ pub(crate) fn doubt<'a>(
     if jumped.is_some() {
         confirmed = found.base.clone();
     }
-    // Noise that wanders bends to gains and saturations too, as their inputs are slow.
+    // Noise that drifts bends to gains and saturations too, as their inputs are slow.
     let beyond_small_walk = |node: &Node| {
         Ok::<_, Error>(
             node.added.is_empty() || beyond_random_walk(node, base, Walk::SMALL_FROM_ZERO)?,
@@ -68,7 +68,7 @@ pub(crate) fn doubt<'a>(
     if !beyond_small_walk(&confirmed)? {
         confirmed = found.base.clone();
     }
-    // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
+    // Drifts, oscillations and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
     // explain as much, and where the other effects of the set are called for without them: what only corrects an imitation is not. Where
     // white noise is left this is not asked, since an imitation hardly ever leaves white noise.
     if by_clock(&confirmed) {

@@ -1,4 +1,4 @@
-//! Ambiguity: effects that fit as well in the place of an accepted one.
+//! Ambiguity: effects that fit as well in place of an accepted one.
 
 use greybox::Noise;
 use plants::Placed;
@@ -11,10 +11,10 @@ use crate::{
     search::exchange::{NEAR, exchanges},
 };
 
-/// The mean square that a stand-in of an effect that follows time alone may leave, over what that leaves.
+/// The mean square that an alternative of an effect that follows time alone may leave, over what that leaves.
 pub(crate) const NEARLY: f64 = 1.05;
 
-/// An effect, what cannot be told apart from it, and where it may act.
+/// An effect, what cannot be distinguished from it, and where it may act.
 pub(crate) struct Group {
     /// Identifiers: the effect itself, then what fits as well in its place, best first.
     pub members: Vec<String>,
@@ -24,7 +24,7 @@ pub(crate) struct Group {
 
 /// For every added effect: the effect, and all effects that fit as well in its place.
 ///
-/// `searched`: sets that the search has fitted, among them stand-ins that a new start may miss; `in_loop`: the records come from a loop
+/// `searched`: sets that the search has fitted, among them alternatives that a new start may miss; `in_loop`: the records come from a loop
 /// that is not simulated.
 pub(crate) fn groups<'a>(
     last: &Node<'a>,
@@ -49,7 +49,7 @@ pub(crate) fn groups<'a>(
                 .collect();
             // In the white metric a coloured residual counts each sample for less than one.
             let behind = |node: &Node| (node.fit.bic() - last.fit.bic()) / per_sample;
-            // A size at its edge speaks against a stand-in, but where the final model has it too.
+            // A size at its edge speaks against an alternative, but where the final model has it too.
             let possible = |node: &Node| {
                 let narrow = in_loop && node.narrow_stiction().is_some();
                 let at_the_edge = |placed: &Placed| {
@@ -103,8 +103,8 @@ pub(crate) fn groups<'a>(
                 if !possible(&node) {
                     continue;
                 }
-                // An effect at an instant or with a course that the fit has chosen follows any disturbance: what hangs on the
-                // plant's own signals and explains nearly as much cannot be told from it.
+                // An effect at an instant or with a course that the fit has chosen follows any disturbance: what hangs on the plant's own
+                // signals and explains nearly as much cannot be distinguished from it.
                 let nearly = own.effect.by_clock
                     && node.added.iter().all(|placed| !placed.effect.by_clock)
                     && node.fit.cost < NEARLY * last.fit.cost;
@@ -120,7 +120,7 @@ pub(crate) fn groups<'a>(
         .collect()
 }
 
-/// Effect of a set in the place of another set's effect at this position, if the sets differ only there.
+/// Effect of a set in place of another set's effect at this position, if the sets differ only there.
 fn stand_in(set: &Node, last: &Node, position: usize) -> Option<Placed> {
     let kept = last.added.iter().enumerate();
     let mut kept = kept.filter(|(k, _)| *k != position);

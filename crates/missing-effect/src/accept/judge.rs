@@ -82,9 +82,9 @@ pub(crate) struct Judged<'a> {
 impl<'a> Judge<'_, 'a> {
     /// The accepted set, or the accepted part of it.
     ///
-    /// Beside something that is not noise, an effect that one of the clock stands in for is no answer: it is some course of time, and
-    /// whatever is left may have made it. That speaks against this effect alone. The others stay where they are called for
-    /// without it, and are the answer where they explain enough without it: what was there to mend an imitation is neither.
+    /// Beside something that is not noise, an effect that one of the clock can replace is no answer: it is some course of time, and
+    /// whatever is left may have made it. That speaks against this effect alone. The others stay where they are called for without it, and
+    /// are the answer where they explain enough without it: what was there to mend an imitation is neither.
     pub fn judge(&self, mut set: Node<'a>) -> Result<Judged<'a>, Error> {
         let mut judged = self.as_it_is(&set, None)?;
         loop {
@@ -195,7 +195,7 @@ impl<'a> Judge<'_, 'a> {
         self.ending(nodes, last, fit)
     }
 
-    /// `in_noise`: the last model's fit in the metric of the noise.
+    /// `in_noise`: the last model's fit weighted by the noise model.
     fn ending(
         &self,
         mut nodes: Vec<Node<'a>>,
@@ -305,7 +305,7 @@ mod tests {
         simulated,
     };
 
-    /// A pump that saturates beside a swing of the reading that has no name; what stays of the saturation and a drift of the sensor.
+    /// A pump that saturates beside a oscillation of the reading that has no name; what stays of the saturation and a drift of the sensor.
     fn judged(swing: f64) -> (bool, Vec<&'static str>, Vec<&'static str>) {
         let read = |t: f64, level: f64| level + swing * (t / 150.0).sin();
         let problem = simulated::tank(|u| u.min(4.2), read, 0.0, 1);

@@ -6,7 +6,7 @@
 //!   effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::accept::judge::WHOLE) of it,
 //!   alone and beyond what a random walk explains;
 //! - of several effects: they are called for where each model has a noise model of its own, of limited memory;
-//! - it foretells the next sample as well as the model without it does, each beside a noise model of its own;
+//! - it predicts the next sample as well as the model without it does, each beside a noise model of its own;
 //! - what is fitted to one half of the record predicts the other (two-fold cross-validation);
 //! - sizes are inside their bounds, and states are physical;
 //! - a single jump of the reading does not explain more.

@@ -10,7 +10,7 @@
 //! are stated in the standard deviation of the noise itself.
 //!
 //! **Parameters**: a walk that is taken for the plant's response bends the parameters, so each model is fitted again beside the walk, in
-//! one step from its linearisation. Without that step some effect seems to go beyond the walk in one record of thirty whose noise wanders.
+//! one step from its linearisation. Without that step some effect seems to go beyond the walk in one record of thirty whose noise drifts.
 //!
 //! **Cost**: `O(N p^2)` for a value of `q`.
 //!
@@ -40,7 +40,7 @@ const STRICTER: f64 = 3.0;
 /// the size of the noise.
 const BENDING: f64 = 0.35;
 
-/// The random walks that may stand in the place of effects.
+/// The random walks that may replace effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Walk {
     /// The first value is unknown (diffuse start); otherwise it is zero, so that a constant offset is no random walk.
@@ -111,7 +111,7 @@ impl Whitened {
     }
 
     /// Minus twice the logarithm of the likelihood under white noise and a random walk, at its best over the parameters (one step of
-    /// Gauss-Newton in the metric of this noise, within [`BENDING`]) and over `q`.
+    /// Gauss-Newton weighted by this noise model, within [`BENDING`]) and over `q`.
     fn deviance(&self, walk: Walk) -> f64 {
         let rows = |values: &Vec<f64>| values.len() / self.columns;
         let longest = self.series.iter().map(rows).max().unwrap_or(1);
@@ -332,7 +332,7 @@ mod tests {
 
     #[test]
     fn a_small_walk_is_small_beside_the_noise_itself() {
-        // A line beside noise with a long memory is told from a walk as large as the noise better than from one of any size.
+        // A line beside noise with a long memory is distinguished from a walk as large as the noise better than from one of any size.
         let noise = Noise::of(vec![ArModel::from_coefficients(&[0.8], 0.6).unwrap()]);
         let falls = (0..40).map(|seed| {
             let series = series(0.8, 0.0, 5.0, seed);

@@ -1,4 +1,4 @@
-//! The shape that a valve which sticks leaves in a loop: the output stands still while the command moves on, then jumps.
+//! The shape that a valve which sticks leaves in a loop: the output is constant while the command moves on, then jumps.
 //!
 //! An integrating controller drives the command across the band of the valve, which follows in one slip: a triangle of the command
 //! beside a rectangle of the output. The instants of the slips hang on the noise, so that no simulation from the command meets all of them
@@ -13,7 +13,7 @@ use statrs::statistics::{Data, OrderStatistics};
 
 /// A jump is a change of the output by more than this part of its range (95 %) within so many samples.
 const JUMP: (f64, usize) = (0.4, 4);
-/// Between two jumps the output stands still where it varies (80 %) by less than this part of its range ...
+/// Between two jumps the output is constant where it varies (80 %) by less than this part of its range ...
 const STILL: f64 = 0.35;
 /// ... while the command moves over more than this share of its own range, and relatively more than the output by this factor.
 const MOVED: (f64, f64) = (0.25, 1.2);

@@ -1,8 +1,8 @@
 //! Records from a closed loop: the loop simulated from its reference where its controller is known, and what is said where
 //! it cannot be.
 //!
-//! The noise comes back through the command. A model that runs on the measured command is then wrong in a way that
-//! depends on the colour of the noise (`greybox`, `feedback.rs`); one whose loop runs on the reference is not.
+//! The noise comes back through the command. A model that runs on the measured command is then wrong in a way that depends on the spectrum
+//! of the noise (`greybox`, `feedback.rs`); one whose loop runs on the reference is not.
 
 use greybox::{Replay, Setup, coloured, fit_from};
 use plants::Variable;

@@ -10,11 +10,11 @@
 //! (1995) 225-250).
 //!
 //! **Sign**: a controller counteracts, so the first response that is significant has the sign that moves the output back. Where a row's
-//! input acted before its output was read (the rain of the day before), the output foretells the input with the other sign, and
-//! without any controller. Where the record has a set point the sign is not asked for: the gain of a model that runs on the command
-//! of a loop may have the wrong one.
+//! input acted before its output was read (the rain of the day before), the output predicts the input with the other sign, and without any
+//! controller. Where the record has a set point the sign is not asked for: the gain of a model that runs on the command of a loop may have
+//! the wrong one.
 //!
-//! **Assumptions**: a controller acts at every sample. An input that stands still at most samples is none's, and one
+//! **Assumptions**: a controller acts at every sample. An input that is constant at most samples is none's, and one
 //! that its own past predicts exactly says nothing. Changes beyond five robust standard deviations are clipped: steps of a set
 //! point would drown the response to noise.
 //!

@@ -1,7 +1,7 @@
 //! Records in which rows or samples of an input are missing: how long an input may be held is a matter of the plant, so a first fit says it.
 //!
 //! Through a gap that is short beside the fastest time constant of the plant the input is held; at a longer one the record is cut, and the
-//! simulation begins anew behind it with states of its own ([`ct_signals::Gaps`]). The parts keep their time stamps and so their clock: a
+//! simulation starts again after it with states of its own ([`ct_signals::Gaps`]). The parts keep their time stamps and so their clock: a
 //! drift runs through them. What is reported is joined again to the records that were given.
 
 use ct_signals::{Gaps, Record};

@@ -95,7 +95,7 @@ impl Search<'_, '_> {
             let known = &before.known[1 - truth];
             second_sensor::in_experiment(&simulated[truth], node, other, known, self.metric)
         };
-        // Records that were recorded anew have decided nothing yet: what is ahead is what a parameter costs.
+        // Records that were recorded again have decided nothing yet: what is ahead is what a parameter costs.
         let [a, b] = self.nodes.each_ref().map(|node| node.fit.price);
         let fewer = b - a;
         let fresh = |if_true: [f64; 2]| -> Power { power(if_true, [fewer, -fewer]) };

@@ -77,7 +77,7 @@ impl Search<'_, '_> {
         [self.ahead(), -self.ahead()]
     }
 
-    /// Whether a part has to be left out for want of time, or because the user gave up.
+    /// Whether a part has to be left out because of the time limit, or because the user gave up.
     pub fn leaves_out(&self, part: &str) -> bool {
         self.nodes[0].setup.leaves_out(part)
     }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::limits::Bounds;
 use crate::{Effort, Parameter, result::domain_of};
 
-/// One of the two effects that are to be told apart.
+/// One of the two effects that are to be distinguished.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alternative {
     /// The effect.

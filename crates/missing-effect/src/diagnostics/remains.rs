@@ -9,8 +9,8 @@
 //! - **a period**: a line of the spectrum that stands out of its neighbours (`spectral_line.rs`).
 //! - **an instant**: windows of 1, 2, 4, ... samples of `w`, whose sums over the root of their length are standard normal.
 //! - **the level**: `w` against functions of what the model read a sample before. A term that is missing from a balance leaves a
-//!   residual that wanders with the level, and is no noise however slow it is. As `w` is white and independent of the past, its
-//!   regression on any past is chi-square, whatever the colour of the regressors.
+//!   residual that drifts with the level, and is no noise however slow it is. As `w` is white and independent of the past, its   regression
+//! on any past is chi-square, whatever the colour of the regressors.
 //! - **slowness**: the integral of the noise's autocorrelation over positive lags is longer than the slowest time constant
 //!   of the process. Such a noise can stand for anything that the process lacks, so it is no answer.
 //!
@@ -42,7 +42,7 @@ pub(crate) enum Remains {
     Instant(f64, f64),
     /// The level.
     Level,
-    /// A wander: its correlation time and the process's slowest time constant \[s\].
+    /// A drift: its correlation time and the process's slowest time constant \[s\].
     Slow(f64, f64),
 }
 
@@ -55,9 +55,8 @@ pub(crate) struct Left {
 }
 
 impl Left {
-    /// The size of the noise above which there is something to explain. A wander is a noise too, in whose metric effects
-    /// are confirmed as in any other; what else remains is in the noise model by mistake, but hardly in what it cannot
-    /// predict. By output.
+    /// The size of the noise above which there is something to explain. A drift is a noise too, in whose metric effects are confirmed as in
+    /// any other; what else remains is in the noise model by mistake, but hardly in what it cannot predict. By output.
     pub(crate) fn above(&self, noise: &Noise) -> Vec<f64> {
         let size = |noise: &ArModel| match self.what {
             Remains::Slow(..) => noise.stationary_std(),

@@ -100,7 +100,7 @@ fn without_sawtooth(model: &[f64], residual: &[f64], turns: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Sum of squares of what a noise's past does not foretell, from where it has a whole past.
+/// Sum of squares of what a noise's past does not predicts, from where it has a whole past.
 fn innovations(series: &[f64], noise: &ArModel) -> f64 {
     if series.iter().any(|value| value.is_nan()) {
         let whitened = noise.whiten(series);

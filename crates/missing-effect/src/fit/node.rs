@@ -93,7 +93,7 @@ pub(crate) fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
         .collect()
 }
 
-/// Fits a node's structure anew to the end, from where it is and from the given further starts.
+/// Fits a node's structure again to the end, from where it is and from the given further starts.
 pub(crate) fn refine<'a>(
     node: &Node<'a>,
     noise: &Noise,

@@ -1,4 +1,4 @@
-//! The noise floor: the colour of the residual of the richest model in play.
+//! The noise floor: the noise model of the residual of the richest model in play.
 
 use ct_signals::ArModel;
 use greybox::{Noise, Setup, noise_of, prewhitened};
@@ -89,7 +89,7 @@ pub(crate) fn slowness(noise: &Noise, samples: &[usize]) -> f64 {
 /// Independent samples that a parameter should have for a fit in the noise's metric.
 const SAMPLES_PER_PARAMETER: f64 = 10.0;
 
-/// Whether the residual of the richest model wanders so slowly that hardly any independent samples are left.
+/// Whether the residual of the richest model drifts so slowly that hardly any independent samples are left.
 ///
 /// A fit in the metric of such a "noise" looks at fast changes alone and lets the simulation drift off; more often than
 /// not it is structure that the catalogue does not hold. Then effects are still confirmed in that metric, which is the

@@ -1,4 +1,4 @@
-//! The period of a swing: the strongest line of what a model does not explain, and which of many periods show most in it.
+//! The period of an oscillation: the strongest line of what a model does not explain, and which of many periods show most in it.
 
 use std::f64::consts::TAU;
 
@@ -44,7 +44,7 @@ pub(crate) fn keep_shown_periods(
         return;
     };
     let shown = most_shown(periods, setup.records, noise.whiten(&residuals));
-    // The strongest line stands out of its neighbours, and may yet be lower than what wanders; its choice is paid for.
+    // The strongest line stands out of its neighbours, and may yet be lower than what drifts; its choice is paid for.
     let strongest = setup.structure.scales.period;
     starts.retain(|start| {
         let of = |period: f64| period == start[at];

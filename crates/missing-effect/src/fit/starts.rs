@@ -12,8 +12,8 @@ const LEAVES: [&str; 2] = ["overflow", "leak_at_height"];
 
 /// A child's starts: the vector of a node, with the new effect's parameters on the grid of its starts.
 ///
-/// Parameters that the plant alone does not tell apart lie in one order or the other by chance. An effect in a vessel tells
-/// them apart, and from the wrong order no fit comes to the right one.
+/// Parameters that the plant alone does not tell apart lie in one order or the other by chance. An effect in a vessel distinguishes them,
+/// and from the wrong order no fit comes to the right one.
 pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     let mut begun = vec![transfer(from, child)];
     let less = with_less_throughput(&begun[0], child, placed);

@@ -35,9 +35,9 @@ pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>,
 
 /// Exchanges effects for others while that makes another one superfluous, or the whole better.
 ///
-/// Of sets that take the same out of a residual the search follows one, and a stand-in that is nearly right calls for a
-/// further effect that mends it: on the emulated rig of a closed loop a raised outlet stood for the pump's dead zone, and a bent
-/// pump for the difference. With the dead zone in its place the bend is not needed.
+/// Of sets that take the same out of a residual the search follows one, and an alternative that is nearly right calls for a further effect
+/// that mends it: on the emulated rig of a closed loop a raised outlet stood for the pump's dead zone, and a bent pump for the difference.
+/// With the dead zone in its place the bend is not needed.
 pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     // Every round ends with fewer effects, or with a lower criterion of as many.
     while node.added.len() > 1 {

@@ -1,4 +1,4 @@
-//! Sets in which one effect stands in the place of another.
+//! Swap steps: sets in which one effect replaces another.
 
 use greybox::Noise;
 use plants::{Placed, Unit};
@@ -64,7 +64,7 @@ pub(crate) fn exchanges<'a>(
     Ok(best_first(nodes))
 }
 
-/// A start of a stand-in whose size is of the same kind as that of the effect it stands for: the same size.
+/// A start of an alternative whose size is of the same kind as that of the effect that it replaces: the same size.
 ///
 /// What a lag of the pump is to the sensor's, a time constant that the data determine: from a grid of starts, with two more in
 /// the tanks to get out of its way, a fit creeps towards it.
@@ -91,7 +91,7 @@ fn carried(node: &Node, own: Placed, stand_in: &Node) -> Option<Vec<f64>> {
     Some(x)
 }
 
-/// First fits of what may stand in the place of an effect; `lacking` is the node without it.
+/// First fits of the candidates that may replace an effect; `lacking` is the node without it.
 fn begin_exchanges<'a>(
     lacking: &Node<'a>,
     node: &Node<'a>,

@@ -26,7 +26,7 @@ const REFITS: usize = 12;
 const SIDE_BY_SIDE: usize = 3;
 /// ... and one by one up to this number while the criterion falls.
 const RICHEST: usize = 6;
-/// In the metric of a noise that wanders they are grown to so many.
+/// In the metric of a noise that drifts they are grown to so many.
 const WANDERING: usize = 2;
 
 /// Result of the search.
@@ -37,14 +37,14 @@ pub(crate) struct Found<'a> {
     pub noise: Noise,
     /// The memory of the residual's own noise model was longer, so that it may hold slow physics.
     pub limited: bool,
-    /// The base, and what is confirmed, in the metric of the noise.
+    /// The base, and what is confirmed, weighted by the noise model.
     pub base: Node<'a>,
     pub confirmed: Node<'a>,
     /// The sets that were grown by simulation error.
     pub grown: Grown<'a>,
     /// Sets that were grown with the noise model as weighting, if the noise is not white.
     pub prewhitened: Option<Grown<'a>>,
-    /// Whether the noise wanders.
+    /// Whether the noise drifts.
     pub wandering: bool,
     /// Whether the noise is not white and effects are confirmed: then models are compared and shown by their simulation error.
     pub by_simulation: bool,
@@ -110,7 +110,7 @@ pub(crate) fn find<'a>(
     let noise = whole.with_memory_at_most(longest_memory(&base.setup));
     let limited = noise != whole;
 
-    // Confirm in the metric of the noise.
+    // Confirm weighted by the noise model.
     tell("confirming", 0, 3);
     let (base, confirmed) = rayon::join(
         || refine(base, &noise, &[]),
@@ -121,10 +121,9 @@ pub(crate) fn find<'a>(
     let by_simulation = wandering && !confirmed.added.is_empty();
     let mut prewhitened = None;
     if noise.order() > 0 && !base.setup.leaves_out("the prewhitened search") {
-        // The noise's colour is known now: the search is repeated in its metric. Where the residual wanders this is no less
-        // called for: to the simulation error a slow noise looks like many effects, and the true one may not be among the
-        // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken; and of many
-        // effects it tells little.
+        // The noise's spectrum is known now: the search is repeated in its metric. Where the residual drifts this is no less called for: to
+        // the simulation error a slow noise looks like many effects, and the true one may not be among the sets that were grown there. But
+        // then such a metric may let the simulation drift off, which is not taken; and of many effects it tells little.
         let breadth = Breadth {
             most: if by_simulation {
                 WANDERING

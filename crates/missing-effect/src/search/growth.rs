@@ -92,14 +92,14 @@ pub(crate) struct Grown<'a> {
     /// All single effects that were refitted, and those whose predicted reduction was too small.
     refitted: Vec<Node<'a>>,
     unpromising: Vec<Proposal<'a>>,
-    /// The set that was exhausted, where the growth ended so.
+    /// The set at which the search converged, if it ended so.
     exhausted: Option<Vec<Placed>>,
     /// The last size was worth it.
     paid: bool,
 }
 
 impl<'a> Grown<'a> {
-    /// Whether the growth ended because this set was exhausted.
+    /// Whether the growth ended because the search converged at this set.
     pub fn exhausted_by(&self, node: &Node) -> bool {
         let same = |set: &Vec<Placed>| key(set) == key(&node.added);
         self.exhausted.as_ref().is_some_and(same)

@@ -104,7 +104,7 @@ impl Core<'_> {
                     fed.scatter.extend(self.scatter(output, e, time));
                 }
             }
-            // A score of the smaller noise says nothing of the larger.
+            // A score of the smaller noise contains no information about the larger.
             let passed = passed && fed.scatter.is_empty();
             (fed.alarm, fed.notice) = self.judge(passed, time);
         }

@@ -1,4 +1,4 @@
-//! Isolation at the ports of a model of its user's own: which effect of the catalogue, or which candidate of the user's own, began, and when,
+//! Isolation at the ports of a user's own model: which effect of the catalogue, or which candidate of the user's own, began, and when,
 //! explains the latest rows.
 //!
 //! An effect that begins at row `j` is fitted to the rows from `j` on, in the metric of the learned noise: every parameter of the model as it
@@ -42,7 +42,7 @@ const BEGIN: [&str; 11] = [
 ];
 /// A step of a parameter has the same property.
 const STEP: &str = "step";
-/// Onsets that are tried, in rows behind the one that is found first.
+/// Onsets that are tried, in rows after the one that is found first.
 const AROUND: [f64; 5] = [1.0, 0.6, 0.8, 1.25, 1.6];
 /// Number of starts that are fitted for an effect, those with the least sum of squares.
 const STARTS: usize = 3;
@@ -129,7 +129,7 @@ pub(super) fn isolate(
     best
 }
 
-/// The rows behind an onset.
+/// The rows after an onset.
 struct Window {
     /// Onset \[s\].
     since: f64,
@@ -252,7 +252,7 @@ impl Search<'_, '_> {
         found.chain(others).collect()
     }
 
-    /// A candidate fitted behind an onset; `model`: the learned one with the candidate in it.
+    /// A candidate fitted after an onset; `model`: the learned one with the candidate in it.
     fn suspect(&self, window: &Window, candidate: &Candidate, model: &Model) -> Option<Suspect> {
         let is_step = candidate.effect.is_some_and(|effect| effect.id == STEP);
         // The onset of this candidate is the first row.

@@ -1,4 +1,4 @@
-//! A model of its user's own as it is watched.
+//! A user's own model as it is watched.
 //!
 //! The parameters that are watched are those that the text declares as `parameter`, in its order; constants and `final parameter`s stay as
 //! they are. Those that the model file knows are not fitted, and watched all the same: they may change.
@@ -29,7 +29,7 @@ use crate::{
     watched::{Believed, Raised},
 };
 
-/// A model of its user's own, and what is known of it.
+/// A user's own model, and what is known of it.
 #[derive(Debug, Clone)]
 pub struct OwnModel<'a> {
     /// The model.

@@ -8,7 +8,7 @@
 //! ```
 //! is by how much the sum of squares falls with the best of them: the generalised likelihood ratio of a change of unknown onset, which is
 //! where it is largest (A. S. Willsky, H. L. Jones, IEEE Trans. Automatic Control 21 (1976) 108-112). It is linear in the change, whose
-//! beginning a large one shows right; what it does later it does not. So rows count until [`BEHIND`] time constants behind the alarm.
+//! beginning a large one shows right; what it does later it does not. So rows count until [`BEHIND`] time constants after the alarm.
 //!
 //! **Cost**: some 25 simulations with derivatives of at most the rows that are kept, for each look at an alarm.
 
@@ -21,12 +21,12 @@ use crate::{Each, isolate::Kept, learn::Learned};
 const ONSETS: [f64; 14] = [
     0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0,
 ];
-/// Rows count until so many slowest time constants behind the alarm.
+/// Rows count until so many slowest time constants after the alarm.
 const BEHIND: f64 = 1.0;
-/// An onset has at least so many rows behind it.
+/// An onset has at least so many rows after it.
 const FEWEST: usize = 2;
 
-/// Onset \[s\] of the change behind an alarm at `raised` \[s\]; `None` if the rows do not determine it.
+/// Onset \[s\] of the change after an alarm at `raised` \[s\]; `None` if the rows do not determine it.
 pub(super) fn onset(
     own: &OwnModel,
     learned: &Learned,

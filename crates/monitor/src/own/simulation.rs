@@ -1,4 +1,4 @@
-//! A model of its user's own on the rows as they come, with exact derivatives of its outputs by the watched parameters.
+//! A user's own model on the rows as they come, with exact derivatives of its outputs by the watched parameters.
 //!
 //! Simulations of `N` derivatives run side by side until every watched parameter has one. **Cost** of a row: that many simulations of the
 //! model from row to row; nothing is allocated, but for the past of what is delayed.

@@ -104,7 +104,7 @@ fn a_leak_is_seen_named_and_dated() {
     assert!(first.score > first.threshold);
     assert!(last.evidence.unwrap() > first.evidence.unwrap());
     assert!(last.sentence.contains(" since t = ") && last.sentence.contains(" against "));
-    // The group is what cannot be told apart: a member is within six of the best.
+    // The group is what cannot be distinguished: a member is within six of the best.
     if last.effects.len() > 1 {
         assert_eq!(last.verdict, Verdict::Undecided);
         let next = last.next.as_ref().unwrap();
@@ -283,7 +283,7 @@ fn the_estimates_follow_and_their_band_holds() {
     let mut monitor = new(model());
     let rows = tank.run();
     let changed = rows.iter().position(|row| row.time >= 4000.0).unwrap();
-    // Before it is learned anew: the alarm has let the tracker go.
+    // Before it is learned again: the alarm has let the tracker go.
     all(&mut monitor, &rows[..changed + 500]);
     let estimates = monitor.estimates();
     assert_eq!(estimates[1].name, "alpha");
@@ -293,7 +293,7 @@ fn the_estimates_follow_and_their_band_holds() {
     assert!((estimates[0].value - 10.0).abs() < 0.1, "{estimates:?}");
 }
 
-/// Nothing can be learned while the command stands still; it waits, and does not fill the memory.
+/// Nothing can be learned while the command is constant; it waits, and does not fill the memory.
 #[test]
 fn a_command_that_stands_still_teaches_nothing() {
     let mut rows = Tank {

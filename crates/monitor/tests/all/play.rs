@@ -1,4 +1,4 @@
-//! A pump behind a valve with play: where it stands hangs on commands that may lie further back than any rows that are kept.
+//! A pump after a valve with play: where it stands hangs on commands that may lie further back than any rows that are kept.
 
 use ct_signals::{excitation, noise};
 use monitor::{Model, Monitor, Row, Settings, Units};

@@ -189,7 +189,7 @@ fn of_a_linear_plant_it_adds_to_the_response() {
             let error = difference(&both, &sum);
             println!("{error:8.1e} {which} {drive:?}");
             assert!(error < 1e-13, "{which} {drive:?}: {error:e}");
-            // At rest the level stands at its gain.
+            // At rest the level is at its gain.
             let long = response(&case, &vec![[none, Command::held(2.0)]; 3000]);
             let gain = case.theta.last().unwrap();
             assert!((long[2999] - 2.0 * gain).abs() < 1e-9 * gain.abs());
@@ -214,7 +214,7 @@ fn none_leaves_the_output_as_it_is() {
                 with.theta[at.len()] = 0.0;
                 let error = difference(&with.run(&input, 1), &without.run(&input, 1));
                 assert!(error < 1e-13, "{which} {}: {error:e}", label(&set, plant));
-                // A record whose second input nobody knows of ignores it.
+                // A record whose second input is not known of ignores it.
                 let mut other = without.clone();
                 other.second = otherwise;
                 assert_eq!(other.run(&input, 1), without.run(&input, 1));
@@ -243,7 +243,7 @@ fn effects_that_are_absent_leave_it_bit_for_bit() {
 
 #[test]
 fn the_command_alone_is_late() {
-    // A dead time and a lag of the pump leave the disturbance as it is: under a command that stands still they do nothing.
+    // A dead time and a lag of the pump leave the disturbance as it is: under a command that is constant they do nothing.
     for (case, which) in cases() {
         let plant = case.structure.plant;
         for id in ["transport_delay", "pump_lag"] {

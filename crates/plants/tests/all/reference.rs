@@ -77,7 +77,7 @@ fn pairs_and_triples_agree_with_their_equations() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// Two lags in series behind `K u`, `u` from `u0` with a slope, after a time `t`.
+/// Two lags in series after `K u`, `u` from `u0` with a slope, after a time `t`.
 fn two_lags(x: [f64; 2], [t1, t2]: [f64; 2], q0: f64, slope: f64, t: f64) -> [f64; 2] {
     let c1 = x[0] - q0 + slope * t1;
     let q = q0 + slope * t;

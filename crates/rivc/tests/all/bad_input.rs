@@ -1,4 +1,4 @@
-//! What cannot be is refused in one line that names the numbers and the mend.
+//! What cannot be is refused in one line that names the numbers and the correction.
 
 use ct_signals::excitation;
 use rivc::{Data, Delay, Noise, Plant, Settings, Structure, estimate};

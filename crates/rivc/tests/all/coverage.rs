@@ -1,4 +1,4 @@
-//! Intervals hold the truth as often as they say. `RECORDS=400` runs more records than a test needs.
+//! Intervals contain the true value as often as they say. `RECORDS=400` runs more records than a test needs.
 
 use crate::support::{add, data, even, held, respond, rng};
 use ct_signals::{ArModel, excitation, noise};
@@ -75,7 +75,7 @@ fn check(
             100.0 * spread / truth,
         );
         assert!((covered - 0.95).abs() <= band, "{name} {kind:?}: {covered}");
-        // The share says nothing of errors that are too large; half the records' standard deviation is off by 1/sqrt(2 n).
+        // The share contains no information about errors that are too large; half the records' standard deviation is off by 1/sqrt(2 n).
         let band = 4.0 / (2.0 * n).sqrt();
         assert!(
             (told / spread - 1.0).abs() <= band,

@@ -119,7 +119,7 @@ struct Checked {
     at_work: Cell<u64>,
     /// Left out: a step that is shortened to keep the model stable is not one of the equations.
     shortened: Cell<u64>,
-    /// Cases that end early: shortened steps have raised `V` a millionfold, and the estimates run away from there.
+    /// Cases that end early: shortened steps have raised `V` a millionfold, and the estimates diverge from there.
     ran_away: Cell<u64>,
 }
 

@@ -25,7 +25,7 @@ fn an_hour_that_occurs_twice_goes_forward() {
         "2026-10-25 03:00",
     ];
     assert_eq!(hour(&cells), [-1.0, 0.0, 0.5, 1.0, 1.5, 2.0]);
-    // One sample an hour: the time stands still if the earlier is taken twice.
+    // One sample an hour: the time is constant if the earlier is taken twice.
     assert_eq!(
         hour(&["2026-10-25 02:00", "2026-10-25 02:00", "2026-10-25 03:00"]),
         [0.0, 1.0, 2.0]

@@ -56,7 +56,7 @@ impl OwnModelFile {
     /// Reads the text of a model file, and the model that it names, which is looked for beside the file.
     ///
     /// # Errors
-    /// One line that names the file, the line, what is wrong and the mend.
+    /// One line that names the file, the line, what is wrong and the correction.
     pub(super) fn parse(path: &Path, text: &str) -> Result<Self, Error> {
         Self::parse_with(path, text, |named| {
             read_model(&path.parent().unwrap_or(Path::new("")).join(named))
@@ -66,7 +66,7 @@ impl OwnModelFile {
     /// Parses a model file; `read` provides the model text for the name in the file.
     ///
     /// # Errors
-    /// One line that names the file, the line, what is wrong and the mend.
+    /// One line that names the file, the line, what is wrong and the correction.
     pub fn parse_with(
         path: &Path,
         text: &str,

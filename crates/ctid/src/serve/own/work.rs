@@ -38,7 +38,7 @@ impl Work {
         Self::of(session, own)
     }
 
-    /// The model that was diagnosed with what was found beside a group: two of the group are to be told apart there.
+    /// The model that was diagnosed with what was found beside a group: two of the group are to be distinguished there.
     ///
     /// # Errors
     /// Where nothing was diagnosed, or the records are others since.

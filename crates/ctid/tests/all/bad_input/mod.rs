@@ -1,5 +1,5 @@
-//! Bad input, one mistake at a time, through the program: exit code 2, one line that names the place
-//! and the mend, and not a byte on disk changed.
+//! Bad input, one mistake at a time, through the program: exit code 2, one line that names the place and the correction, and not a byte on
+//! disk changed.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

@@ -94,7 +94,7 @@ fn what_cannot_be_is_refused() {
             &format!("open.csv --model loop.toml --method {method}"),
             &["open.csv", "no reference r"],
         );
-        // one that stands still
+        // one that is constant
         let still = text
             .lines()
             .map(|line| match line.rsplit_once(',').unwrap() {

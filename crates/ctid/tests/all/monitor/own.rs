@@ -1,4 +1,4 @@
-//! A model of the user's own beside a stream.
+//! A user's own model beside a stream.
 
 use serde_json::Value;
 

@@ -213,7 +213,7 @@ impl Rig {
 /// What the fits of many runs say of their intervals.
 #[derive(Debug)]
 pub struct Coverage {
-    /// In how many runs the 95 % interval of each parameter holds the truth.
+    /// In how many runs the 95 % interval of each parameter contains the true value.
     pub hits: Vec<usize>,
     /// The same of intervals for a white residual.
     pub white: Vec<usize>,

@@ -49,7 +49,7 @@ fn what_is_added_to_the_command_is_simulated_with_the_loop() {
     let rig = Rig::linear_tank();
     let (record, _) = record(&rig, &pi(), 0.0, 0.0, 5);
     let mut by_hand = record.clone();
-    // The plant ran on the command with the hand's part, which is played to it anew.
+    // The plant ran on the command with the hand's part, which is played to it again.
     for (k, u) in by_hand.inputs[0].values.iter_mut().enumerate() {
         *u += if (100..140).contains(&k) { 0.2 } else { 0.0 };
     }
@@ -68,7 +68,7 @@ fn what_is_added_to_the_command_is_simulated_with_the_loop() {
     }
 }
 
-/// What one way of fitting says over many records: bias over spread, and how often its interval holds the truth.
+/// What one way of fitting says over many records: bias over spread, and how often its interval contains the true value.
 fn over_records(rig: &Rig, rho: f64, simulate: bool, metric: bool) -> Vec<(f64, f64)> {
     const RECORDS: u64 = 200;
     let estimates: Vec<Vec<(f64, bool)>> = (0..RECORDS)

@@ -6,7 +6,7 @@ use ct_signals::noise;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Time and a level that swings.
+/// Time and a level that oscillations.
 fn rig(n: u32) -> (Vec<f64>, Vec<f64>) {
     let time: Vec<f64> = (0..n).map(f64::from).collect();
     let model = time.iter().map(|t| 10.0 + 5.0 * (t / 40.0).sin()).collect();
@@ -114,7 +114,7 @@ fn a_band_that_the_noise_does_not_fill_fails() {
     let quick = located(&process, &[(&time, &model, &swing(3.0))]);
     let said = quick.sentences.join("; ");
     assert!(said.contains("most at periods of 2 to 4 s"), "{said}");
-    // Where the noise itself is large a swing of that size is nothing.
+    // Where the noise itself is large a oscillation of that size is nothing.
     assert_eq!(
         failing(&located(&process, &[(&time, &model, &swing(300.0))])),
         0

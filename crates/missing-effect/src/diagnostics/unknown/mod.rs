@@ -51,7 +51,7 @@ fn place_name(structure: &Structure, spot: Spot) -> String {
 pub(crate) const PART: &str = "the shape of the unexplained error";
 
 /// The missing term beside a fitted node; `None` where nothing moves, and where the time limit of its setup passes: what was looked at by
-/// then says nothing of the other places and variables.
+/// then contains no information about the other places and variables.
 pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
     let structure = &node.setup.structure;
     let mut spots = vec![Spot {

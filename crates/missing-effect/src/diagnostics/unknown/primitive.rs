@@ -82,7 +82,7 @@ pub(super) fn nearest(
     let mut best: Option<(f64, f64, &Family, f64)> = None;
     for family in &FAMILIES {
         let in_time = variable == Variable::Time;
-        // A root or a parabola in time, and a swing in anything else, is no physics of a tank.
+        // A root or a parabola in time, and an oscillation in anything else, is no physics of a tank.
         if match family.name {
             "swing" => !in_time,
             "square root" | "parabola" => in_time,

@@ -5,10 +5,10 @@
 //! slow. The parameters stay at their fit; `w(t_0)` and the initial states are free.
 //!
 //! **Estimate** This is the extended Kalman filter with the Rauch-Tung-Striebel smoother, written for the whole record at
-//! once: the smoothed states of a linear system with Gaussian noise are the solution of one least squares problem, and
-//! the filter is a way to solve it. Here it is solved by Cholesky, linearised anew about each solution. So dead
-//! times, lags and hystereses keep their memory, for which a filter of the levels alone has no state, and the derivatives are
-//! those of the simulation. `lambda = sigma^2/q` maximises the restricted likelihood, `sigma` in closed form.
+//! once: the smoothed states of a linear system with Gaussian noise are the solution of one least squares problem, and the filter is a way
+//! to solve it. Here it is solved by Cholesky, linearised again about each solution. So dead times, lags and hystereses keep their memory,
+//! for which a filter of the levels alone has no state, and the derivatives are those of the simulation. `lambda = sigma^2/q` maximises the
+//! restricted likelihood, `sigma` in closed form.
 //!
 //! **Cost** `O(N M)` for the sensitivities and `O(N M^2)` for the normal matrix, `M` instants.
 //!

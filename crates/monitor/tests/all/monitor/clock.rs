@@ -42,7 +42,7 @@ fn gaps_are_said_and_bridged_or_waited_out() {
     assert!(matches!(monitor.progress(), Progress::Watching { .. }));
 }
 
-/// A row whose time lies far ahead, or a clock that begins anew, makes the monitor deaf for a hundred rows and no longer.
+/// A row whose time lies far ahead, or a clock that starts again, makes the monitor deaf for a hundred rows and no longer.
 #[test]
 fn a_clock_that_goes_back_is_followed() {
     let rows = Tank {

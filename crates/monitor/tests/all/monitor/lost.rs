@@ -5,7 +5,7 @@ use monitor::{Alarm, Monitor, Notice, Progress, Row, Settings, State, Step};
 use super::{Tank, first_and_last, model};
 use crate::support::{alarms, all, new, notices};
 
-/// The rows without the readings in which the command steps, and so many behind each.
+/// The rows without the readings in which the command steps, and so many after each.
 fn without_steps(rows: &[Row], behind: usize) -> Vec<Row> {
     let mut lost = rows.to_vec();
     for k in 1..rows.len() {

@@ -138,7 +138,7 @@ pub(crate) fn alarms(steps: &[Step]) -> Vec<&monitor::Alarm> {
     steps.iter().filter_map(|s| s.alarm.as_ref()).collect()
 }
 
-/// How many of the estimates hold the truth in their 95 % band.
+/// How many of the estimates contain the true value in their 95 % band.
 pub(super) fn held(monitor: &Monitor, truth: &[f64]) -> usize {
     let estimates = monitor.estimates();
     let fitted: Vec<_> = estimates

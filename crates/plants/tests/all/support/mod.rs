@@ -16,7 +16,7 @@ pub struct Case {
     pub structure: Structure,
     /// The plant's own parameters, then each effect's.
     pub theta: Vec<f64>,
-    /// Of each vessel, then what stood behind each lag.
+    /// Of each vessel, then what stood after each lag.
     pub levels: Vec<f64>,
     pub at_rest: f64,
     /// What the second input is while the first one is this.

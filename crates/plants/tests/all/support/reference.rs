@@ -135,7 +135,7 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
         x[at] = e.command(pump, e.rests(pump));
     }
     x[SENSOR] = x[e.measured];
-    // What stood behind a lag decays for a sample before the record begins.
+    // The initial state of a lag decays for a sample before the record begins.
     let lags = [
         (PUMPS[0], e.pumps[0].lag),
         (PUMPS[1], e.pumps[1].lag),

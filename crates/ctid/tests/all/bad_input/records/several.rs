@@ -107,7 +107,7 @@ fn a_clock_that_runs_backwards_between_files() {
         ],
     );
     place.succeeds("compare early.csv late.csv --model m.toml");
-    // A model of the user's own.
+    // A user's own model.
     place.write(
         "block.mo",
         "model Block\n  parameter Real k(min=0) = 0.1;\n  input Real u;\n  output Real y = x;\n  Real x(start=1);\nequation\n  der(x) = u - k*x;\nend Block;\n",

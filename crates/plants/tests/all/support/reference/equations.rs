@@ -37,7 +37,7 @@ impl Default for Pump {
     }
 }
 
-/// Places of the states behind the levels: the pumps', the sensor's, a side tank's.
+/// Places of the states after the levels: the pumps', the sensor's, a side tank's.
 pub(super) const PUMPS: [usize; 2] = [3, 6];
 
 pub(super) const SENSOR: usize = 4;
@@ -249,7 +249,7 @@ impl Equations {
         at_rest + begin * 0.5 * width * (1.0 + jump)
     }
 
-    /// The commands that act behind what sticks.
+    /// The commands that act after what sticks.
     pub(super) fn moved(&self, pump: usize, input: &[(Command, f64)]) -> Vec<(Command, f64)> {
         let (width, jump, _) = self.pumps[pump].sticks;
         let (breaks, left) = (0.5 * width * (1.0 + jump), 0.5 * width * (1.0 - jump));

@@ -1,4 +1,4 @@
-//! A box that estimates are kept to, step by step: by projection, which is hard, or by penalties, which are soft.
+//! A box of bounds on the estimates, enforced at every step: by projection (hard), or by penalties (soft).
 
 use ct_rls::{ContinuousRls, Integrator, RecursiveEstimator};
 use nalgebra::SVector;
@@ -32,7 +32,7 @@ pub struct Bounds<const P: usize> {
 }
 
 impl<const P: usize> Bounds<P> {
-    /// A box that is kept to by projection.
+    /// A box that is enforced by projection.
     ///
     /// # Errors
     /// [`Error::Bounds`] where a lower bound is above its upper one, or either is NaN.
@@ -78,7 +78,7 @@ impl<const P: usize> Bounds<P> {
         &self.upper
     }
 
-    /// How the box is kept to.
+    /// How the box is enforced.
     pub fn keep(&self) -> Keep {
         self.keep
     }

@@ -144,7 +144,7 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
         }
     }
 
-    /// By how much each row is violated; unit of its `chi`.
+    /// Violation of each row; unit of its `chi`.
     pub fn violations(&self) -> [f64; R] {
         self.rows.map(|row| row.violation(self.rls.theta()))
     }

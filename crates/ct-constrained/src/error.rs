@@ -24,7 +24,7 @@ pub enum Error {
     RowGammaNotWeight {
         /// The row's entry of Gamma.
         gamma: f64,
-        /// Its weight.
+        /// Weight of the row.
         weight: f64,
     },
     /// A row's gamma with which the Lyapunov function could grow.
@@ -60,7 +60,7 @@ pub enum Error {
     TooLarge {
         /// `the length of f` or `chi`.
         what: &'static str,
-        /// Its size.
+        /// Value of the coefficient.
         value: f64,
         /// The largest that is taken.
         limit: f64,
@@ -81,7 +81,7 @@ pub enum Error {
         /// The value that was given.
         value: f64,
     },
-    /// There is no such row.
+    /// The row does not exist.
     #[error("row {index} does not exist: there are {rows} rows, counted from 0")]
     NoSuchRow {
         /// The index that was given.
@@ -94,11 +94,11 @@ pub enum Error {
         "parameter {index} is bounded below by {lower} and above by {upper}; the lower bound must not be above the upper one"
     )]
     Bounds {
-        /// Which parameter, from 0.
+        /// Index of the parameter, from 0.
         index: usize,
-        /// Its lower bound.
+        /// Lower bound.
         lower: f64,
-        /// Its upper bound.
+        /// Upper bound.
         upper: f64,
     },
     /// The projection found no point that obeys all rows.
@@ -108,7 +108,7 @@ pub enum Error {
     NoCommonPoint {
         /// The row, from 0; of a box, the parameter.
         row: usize,
-        /// By how much, the unit of its chi.
+        /// Violation, in the unit of chi.
         violation: f64,
     },
 }

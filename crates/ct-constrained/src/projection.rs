@@ -39,13 +39,13 @@ use crate::{Error, Relation, Row};
 /// A row is obeyed within this share of the size of its terms.
 const OBEYED: f64 = 1e-12;
 
-/// A row whose part outside the active ones is below this share says nothing new.
+/// A row is linearly dependent on the active rows if its part outside them is below this share.
 const DEPENDENT: f64 = 1e-13;
 
-/// Rounding of a way, as a share of its length.
+/// Rounding error of a step, as a share of its length.
 const WAY: f64 = 16.0 * f64::EPSILON;
 
-/// Steps for each row and parameter before it is said that there is no end; a few in all are usual.
+/// Steps for each row and parameter before the search is stopped; a few in all are usual.
 const STEPS: usize = 20;
 
 /// Moves the estimates to the nearest point that obeys all `rows`; weights play no part. Returns whether anything moved.
@@ -162,7 +162,7 @@ impl<const P: usize> Interval<P> {
     }
 }
 
-/// A row that is active or becomes so, with the sign of the bound that holds.
+/// A row that is active or becomes active, with the sign of its active bound.
 #[derive(Clone, Copy)]
 struct Active {
     row: usize,

@@ -9,15 +9,15 @@ pub enum Error {
     NotFinite {
         /// The object that was given.
         what: &'static str,
-        /// Which entry of it, from 0.
+        /// Index of the entry, from 0.
         index: usize,
-        /// Its value.
+        /// Value of the entry.
         value: f64,
     },
     /// A polynomial without a coefficient other than zero, where one is needed.
     #[error("{what} is zero; give at least one coefficient that is not")]
     ZeroPolynomial {
-        /// What was given.
+        /// The polynomial or list in question.
         what: &'static str,
     },
     /// A transfer function that differentiates.
@@ -99,7 +99,7 @@ pub enum Error {
     /// Numbers too large for what was asked of them.
     #[error("{what} overflows f64 (largest finite number 1.8e308); {mend}")]
     Overflow {
-        /// What was being computed.
+        /// The quantity in question.
         what: &'static str,
         /// The correction, in words.
         mend: &'static str,

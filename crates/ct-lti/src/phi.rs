@@ -29,7 +29,7 @@ use crate::matrix::{multiply, norm};
 /// Terms of the series of phi2: the first one left out is 0.5^15/17! = 1e-19 of the first.
 const TERMS: u32 = 14;
 
-/// Computes the functions of one matrix for any step, in memory of its own.
+/// Computes the functions of one matrix for any step, with preallocated memory.
 #[derive(Debug, Clone)]
 pub(crate) struct PhiFunctions {
     n: usize,

@@ -218,7 +218,7 @@ impl Polynomial {
 }
 
 impl From<f64> for Polynomial {
-    /// A constant. One that is not finite is refused by whatever is made of it.
+    /// A constant. A value that is not finite causes an error when a system is built from it.
     fn from(constant: f64) -> Self {
         Self::trimmed(vec![constant])
     }

@@ -89,7 +89,7 @@ impl TransferFunction {
         if positive_by_signs(p1, p2, d, order) {
             return Ok(Positivity::Strict);
         }
-        // The unit of time that makes the roots of P2 about 1 keeps the integers short.
+        // With time scaled so that the roots of P2 are about 1, the integers are short.
         let scale = scale(p2);
         let n = real_part(&Exact::new(p1.coefficients(), scale), p2, d, scale);
         if n.is_positive_from_zero() {
@@ -154,7 +154,7 @@ fn positive_by_signs(p1: &Polynomial, p2: &Polynomial, d: f64, order: usize) -> 
     })
 }
 
-/// The point of `[0, inf)` where a polynomial that is not positive there is lowest, measured by its terms.
+/// For a polynomial that is not positive on `[0, inf)`: the point with its lowest value relative to its terms.
 fn witness(n: &[f64]) -> f64 {
     let relative = |x: f64| {
         // Reversed above 1, so that nothing overflows.

@@ -148,7 +148,7 @@ impl Double {
         Self::sum(sum.high, sum.low + self.low)
     }
 
-    /// `a + b` and what rounding takes from it (Knuth).
+    /// `a + b` and its rounding error (Knuth).
     fn sum(a: f64, b: f64) -> Self {
         let high = a + b;
         let b_part = high - a;
@@ -263,7 +263,7 @@ fn starts(c: &[f64]) -> Vec<Complex64> {
         let count = pair[1] - pair[0];
         let radius = libm::exp((logs[pair[0]] - logs[pair[1]]) / count as f64);
         for j in 0..count {
-            // The offset keeps the starts off the real axis, where the iteration would stay.
+            // The offset keeps the starts off the real axis, because iterates on the axis stay on it.
             let angle = TAU * (j as f64 / count as f64 + k as f64 / c.len() as f64) + 0.7;
             starts.push(Complex64::from_polar(radius, angle));
         }

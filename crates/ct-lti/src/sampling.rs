@@ -19,7 +19,7 @@ pub(crate) const OUT_OF_RANGE: Error = Error::Overflow {
 /// Steps of different length that are remembered.
 const REMEMBERED: usize = 4;
 
-/// `x+ = Phi x + g0 u[k] + g1 u[k+1]` over one step: a system as it looks at its samples.
+/// `x+ = Phi x + g0 u[k] + g1 u[k+1]` over one step: the sampled system.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sampled {
     /// Phi, row by row, n*n entries.

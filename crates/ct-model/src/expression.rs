@@ -138,7 +138,7 @@ pub enum Condition {
 /// A number that is computed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Expression {
-    /// A number that stands in the text, zero or above.
+    /// A constant in the text, zero or above.
     Number(f64),
     /// The time since the record began, in the unit of its time.
     Time,
@@ -205,7 +205,7 @@ impl Expression {
         }
     }
 
-    /// The value where variables have these values; a delay and a play give what goes into them.
+    /// The value for these values of the variables; a delay and a backlash return their input.
     #[must_use]
     pub fn value(&self, time: f64, of: &impl Fn(Variable) -> f64) -> f64 {
         match self {

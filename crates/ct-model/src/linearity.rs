@@ -3,7 +3,7 @@
 use crate::expression::{Expression, Function, Operator, Variable};
 use crate::spec::ModelSpec;
 
-/// Whether a model is linear in states and inputs, whatever its parameters are.
+/// Whether a model is linear in states and inputs for all values of its parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Linearity {
     /// Every equation is a sum of constants times states and inputs, and a constant.
@@ -146,7 +146,7 @@ fn part(expression: &Expression, flows: &[Part]) -> Part {
             match worst {
                 _ if timed => Other,
                 Parameters => branches,
-                // A branch that inputs choose changes the matrix where it holds states.
+                // If inputs choose the branch, the matrix depends on inputs where the branches contain states.
                 Inputs => of_inputs(branches.max(Inputs)),
                 States | Other => Other,
             }

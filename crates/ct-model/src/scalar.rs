@@ -87,7 +87,7 @@ impl Scalar for f64 {
 pub struct Dual<const N: usize> {
     /// The value.
     pub re: f64,
-    /// Its derivatives with respect to `N` chosen parameters.
+    /// Derivatives with respect to `N` chosen parameters.
     pub eps: [f64; N],
 }
 

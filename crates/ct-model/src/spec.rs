@@ -5,7 +5,7 @@ use crate::expression::{Expression, Variable};
 /// Attributes of every variable.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct About {
-    /// Its name.
+    /// Name of the variable.
     pub name: String,
     /// Unit as written, `W/K`; empty if the text gives none.
     pub unit: String,
@@ -17,7 +17,7 @@ pub struct About {
     pub max: f64,
 }
 
-/// How a parameter is given.
+/// Source of a parameter's value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Given {
     /// The parameter is fitted, and its value is the start of a fit.
@@ -89,7 +89,7 @@ pub struct Output {
 pub struct ModelSpec {
     /// Its name.
     pub name: String,
-    /// What it is, in a few words.
+    /// Description of the model in a few words.
     pub description: String,
     /// Parameters in the order of the text.
     pub parameters: Vec<Parameter>,

@@ -34,7 +34,7 @@ pub(crate) struct Tape {
     pub guards: Vec<Guard>,
     /// The derivative of each state.
     pub derivatives: Vec<Register>,
-    /// Each output.
+    /// Register of each output.
     pub outputs: Vec<Register>,
     /// The initial value of each state as the text has it.
     pub starts: Vec<Register>,
@@ -148,7 +148,7 @@ impl Tape {
         self.of_inputs = self.made_of(|register| register != 0 && !moving.contains(&register));
     }
 
-    /// Leaves out what only branches need that are not taken.
+    /// Removes operations that only unselected branches need.
     fn choose_operations<T: Scalar>(&self, registers: &mut Registers<T>) {
         let Registers {
             taken,
@@ -259,7 +259,7 @@ impl Tape {
         self.first_delayed + i
     }
 
-    /// Computes everything from the time, inputs, states and delayed values, with the answers of the guards that the registers hold.
+    /// Computes all registers from the time, inputs, states and delayed values, with the stored answers of the guards.
     pub fn evaluate<T: Scalar>(&self, registers: &mut Registers<T>) {
         run(&registers.all, &mut registers.values, registers.extended);
     }

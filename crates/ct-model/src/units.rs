@@ -20,7 +20,7 @@ pub struct UnitWarning {
 /// Knowledge of a dimension.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Known {
-    /// A number: in a sum it takes that of the others.
+    /// A constant: in a sum it has the dimension of the other terms.
     Number,
     /// No unit is given, or the unit is unknown.
     Open,

@@ -218,7 +218,7 @@ fn shares(
     let (pieces, range) = if least_squares && same_memory {
         (1, whole)
     } else {
-        // the slower of two decays; beyond 45 nothing is left of it
+        // the slower of two decays; beyond 45 the result is zero
         let power = (c1 / w1.gamma()).min(c2 / w2.gamma());
         (PIECES, whole.min(4.0 + 45.0 / power))
     };

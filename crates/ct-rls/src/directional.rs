@@ -77,7 +77,7 @@ impl Memory for Directional {
         weights.gamma() * squared * cap < weights.eta()
     }
 
-    // its bound is that of the eigenvalues, which `weak` keeps
+    // the bound refers to the eigenvalues, which `weak` stores
     #[inline(always)]
     fn raised(bound: f64, _step: &Step, _intensity: &[f64]) -> f64 {
         bound

@@ -61,7 +61,7 @@ pub enum Error {
         "P(0) is not positive definite: pivot {index} is {pivot} where the diagonal is {diagonal}; use a diagonal of 10 to 1000 times the squared size of each parameter"
     )]
     NotPositiveDefinite {
-        /// Which pivot of `P = U D U'`, from 0.
+        /// Index of the pivot of `P = U D U'`, from 0.
         index: usize,
         /// Value of the pivot; it has to exceed the rounding error of the diagonal.
         pivot: f64,
@@ -136,7 +136,7 @@ pub enum Error {
         /// The step, s.
         dt: f64,
     },
-    /// `P` lost its definiteness, to a step too long or to rounding. The estimates from before that step are kept.
+    /// `P` is no longer positive definite, because of a long step or of rounding. The estimates before the step are kept.
     #[error(
         "{integrator} stopped: pivot {index} of P became {pivot} over a step of {dt} s; use ExactHold, shorten the step, or lower P(0)"
     )]

@@ -8,7 +8,7 @@ pub trait RecursiveEstimator {
     type Sample;
     /// The estimates.
     type Theta: ?Sized;
-    /// The matrix that stands for their covariance.
+    /// Type of the covariance matrix.
     type Covariance;
     /// Reason why a run has stopped.
     type Error;
@@ -38,7 +38,7 @@ pub trait RecursiveEstimator {
 pub struct Innovation {
     /// `eps = y - theta^' phi` before the update, unit of y.
     pub epsilon: f64,
-    /// `s = phi' P phi` before the update; times `gamma h` it says how much is learnt: above 1, much.
+    /// `s = phi' P phi` before the update; a value of `gamma h s` above 1 means a large update.
     pub s: f64,
     /// Whether and how the sample was used.
     pub outcome: Outcome,

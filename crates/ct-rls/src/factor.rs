@@ -97,7 +97,7 @@ pub(crate) fn information_norm(u: &[f64], d: &[f64], x: &mut [f64]) -> f64 {
 #[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((fours_a, rest_a), (fours_b, rest_b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
-    // adding it changes nothing, not even the sign of 0, so where there are no fours it costs nothing
+    // the addition does not change the result, not even the sign of 0, so the loop for groups of four can be skipped
     let mut sums = [-0.0; 4];
     for (a, b) in fours_a.iter().zip(fours_b) {
         for i in 0..4 {

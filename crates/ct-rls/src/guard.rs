@@ -8,7 +8,7 @@ use crate::settings::{Guards, MAX_PHI_SQUARED, Step, Weights};
 /// The start of the cap on the trace, times the trace of `P(0)`.
 const TRACE_LIMIT: f64 = 1e6;
 
-/// Everything around the step that does not depend on how `P` is kept: guards, counts, and why the run stopped.
+/// Parts of the step that are independent of the form of `P`: guards, counts, and the reason why the run stopped.
 #[derive(Clone, Debug)]
 pub(crate) struct Guard {
     pub guards: Guards,
@@ -50,7 +50,7 @@ impl Guard {
 
     /// The guards as they were saved.
     pub fn restored(guards: Guards, bound: f64, counts: Counts) -> Result<Self, Error> {
-        // The trace may be above the cap by rounding, and its bound is what counts.
+        // Rounding may put the trace above the cap, so the bound is used.
         let mut guard = Self::new(1.0)?;
         guard.set(guards, 0.0)?;
         let Counts {

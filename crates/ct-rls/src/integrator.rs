@@ -64,7 +64,7 @@ pub(crate) mod sealed {
         }
     }
 
-    /// `P` in the form that a rule keeps it in.
+    /// `P` in the form that a rule uses.
     pub trait Covariance<const P: usize>: Capped + Clone + Debug {
         fn from_matrix(matrix: &SMatrix<f64, P, P>) -> Result<Self, Error>;
         /// Another `P`, all else as it is.
@@ -163,7 +163,7 @@ pub(crate) mod sealed {
     }
 }
 
-/// `P` as it stands, for the rules that have no factored form; symmetric to the bit.
+/// The full matrix `P`, for rules without a factored form; exactly symmetric.
 #[derive(Clone, Copy, Debug)]
 pub struct Plain<const P: usize>(pub(crate) [[f64; P]; P]);
 

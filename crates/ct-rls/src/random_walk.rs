@@ -186,7 +186,7 @@ fn raise(u: &mut [f64], d: &mut [f64], j: usize, more: f64, left: &mut [f64]) {
     let raised = d[j] + more;
     let kept = d[j] / raised;
     d[j] = raised;
-    // what the column loses goes to the block before it, as one more rank-one term
+    // the loss of this column is added to the block before it, as one more rank-one term
     let mut weight = more * kept;
     for (left, u) in left.iter_mut().zip(&mut u[j * p..j * p + j]) {
         *left = *u;

@@ -12,7 +12,7 @@ use crate::integrator::sealed::{Covariance, Memory, Refusal, Rule};
 use crate::integrator::{Plain, take};
 use crate::settings::{MAX_EPSILON, Step, Weights};
 
-/// Runge-Kutta of fourth order, on `P` as it stands. Stops where `P` is no longer positive definite.
+/// Runge-Kutta method of fourth order for the full matrix `P`. Stops if `P` is no longer positive definite.
 #[derive(Clone, Copy, Debug)]
 pub struct Rk4;
 

@@ -94,7 +94,7 @@ impl Weights {
     }
 }
 
-/// What keeps `P` from growing without end where the regressor says nothing (wind-up).
+/// Limits the growth of `P` while the regressor contains no information (wind-up).
 ///
 /// Both only ever forget less than `eta` asks for, so the Lyapunov function still decreases. They act on all parameters at once;
 /// [`Directional`](crate::Directional) forgets by directions, and [`RandomWalk`](crate::RandomWalk) without `eta` by parameters;
@@ -165,7 +165,7 @@ impl Guards {
     }
 }
 
-/// `e^{eta h}` and `(e^{eta h} - 1)/eta` of one step, kept while `eta` and `h` stay as they are.
+/// `e^{eta h}` and `(e^{eta h} - 1)/eta` of one step; valid while `eta` and `h` do not change.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     eta: f64,
@@ -177,7 +177,7 @@ pub struct Step {
     pub length: f64,
 }
 
-/// A longer regressor is taken for a fault: within this and the other limits no number of updates leaves the floating-point range.
+/// A longer regressor counts as a fault: within this and the other limits no number of updates overflows.
 pub const MAX_REGRESSOR: f64 = 1e30;
 pub(crate) const MAX_PHI_SQUARED: f64 = MAX_REGRESSOR * MAX_REGRESSOR;
 /// Largest output error.
@@ -189,7 +189,7 @@ const MAX_C: f64 = 1e40;
 /// Largest trace of P; its pivots start above the inverse of it.
 pub(crate) const MAX_TRACE: f64 = 1e100;
 
-/// Beyond this, one step forgets everything, and `e^{eta h}` leaves the floating-point range.
+/// Beyond this value, one step forgets everything, and `e^{eta h}` overflows.
 const MAX_ETA_DT: f64 = 300.0;
 
 impl Step {

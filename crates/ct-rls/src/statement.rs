@@ -36,7 +36,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
         information: f64,
         ratio: f64,
     ) -> Option<f64> {
-        // with c = 1, the product of weight and length is all that counts
+        // with c = 1, only the product of weight and length matters
         let weights = Weights::new(1.0, ratio, 0.0).ok()?;
         let step = length_of(information, f.norm_squared())?;
         self.guard.running().ok()?;
@@ -110,7 +110,8 @@ pub fn absorb_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     }
 }
 
-/// The exact solution where `P` stays: both blocks move by what is left of the error, `1 - e^{-(c_1 s_1 + c_2 s_2) length}`.
+/// The exact solution for constant `P`: both blocks change in proportion to the reduction of the error, `1 - e^{-(c_1 s_1 + c_2 s_2)
+/// length}`.
 fn relax_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     (first, f1): (&mut ContinuousRls<A, I>, &SVector<f64, A>),
     (second, f2): (&mut ContinuousRls<B, I>, &SVector<f64, B>),

@@ -38,8 +38,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Whitener};
 
-/// Partial correlations stay this far inside -1..1, so that even a constant or a sine leaves a
-/// stable predictor.
+/// Partial correlations keep this distance from -1 and 1, so that even a constant or a sine gives a stable predictor.
 pub(crate) const MARGIN: f64 = 1e-9;
 /// Squares that sum to less are those of nothing: products of them underflow.
 pub(crate) const NOTHING: f64 = 1e-200;

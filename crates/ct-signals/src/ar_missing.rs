@@ -124,7 +124,7 @@ fn of_series(series: &Series<impl Whiten>, max_order: usize) -> ArModel {
             sparse = true;
             series.search(&mut k, &mut at);
         } else if sparse {
-            // Partial correlations that no pairs show are not independent of the others.
+            // Partial correlations without any pairs of samples are determined by the other ones.
             series.refine(&mut k, &mut at, ROUGH);
         } else {
             series.step(&mut k, &mut at, &[order - 1], SMALL * penalty);
@@ -149,13 +149,13 @@ fn of_series(series: &Series<impl Whiten>, max_order: usize) -> ArModel {
     ArModel::of_stationary(&k, (at.squares / left).sqrt())
 }
 
-/// The samples that are there whitened by a model of variance 1, and `log|R|`.
+/// Whitens the present samples with a model of variance 1, and returns `log|R|`.
 trait Whiten: Fn(&ArModel, &[&[f64]]) -> (Vec<f64>, f64) {}
 impl<F: Fn(&ArModel, &[&[f64]]) -> (Vec<f64>, f64)> Whiten for F {}
 
 struct Series<'a, W> {
     segments: &'a [&'a [f64]],
-    /// Samples that are there.
+    /// Number of present samples.
     n: usize,
     whiten: W,
 }
@@ -184,7 +184,7 @@ fn whiten(model: &ArModel, segments: &[&[f64]]) -> (Vec<f64>, f64) {
 
 #[derive(Clone)]
 struct Whitened {
-    /// `x` of the samples that are there.
+    /// `x` of the present samples.
     x: Vec<f64>,
     /// `sum w^2`.
     squares: f64,
@@ -206,7 +206,7 @@ impl<W: Whiten> Series<'_, W> {
         }
     }
 
-    /// Samples that are there with another one `lag` before.
+    /// Number of present samples with another present sample `lag` before.
     fn pairs(&self, lag: usize) -> usize {
         let there = |(a, b): (&f64, &f64)| usize::from(!a.is_nan() && !b.is_nan());
         self.segments
@@ -301,7 +301,7 @@ impl<W: Whiten> Series<'_, W> {
     }
 }
 
-/// The partial correlations after a step of some of them, or as much of it as keeps all of them within their range.
+/// The partial correlations after a step of some of them, with the step shortened so that all stay within their range.
 fn within(k: &[f64], of: &[usize], step: &[f64]) -> Vec<f64> {
     let mut share = 1.0_f64;
     for (&i, step) in of.iter().zip(step) {

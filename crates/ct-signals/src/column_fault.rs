@@ -12,7 +12,7 @@ pub enum ColumnFault {
         role: &'static str,
         /// The name that was looked for, quoted, or the letter it was to begin with.
         wanted: String,
-        /// All the columns of the file, quoted.
+        /// All columns of the file, quoted.
         columns: String,
         /// The column whose name is close to the one that was looked for.
         closest: Option<String>,
@@ -45,8 +45,8 @@ pub enum ColumnFault {
 }
 
 impl ColumnFault {
-    /// The fault and its mend as they follow the place in a message: `namer` is what named the columns, `mend` begins in small
-    /// letters.
+    /// The fault and its correction in the form that follows the place in a message: `namer` is the source of the column names, `mend`
+    /// begins in small letters.
     #[must_use]
     pub fn said(&self, namer: &str, mend: &str) -> String {
         match self {
@@ -102,7 +102,7 @@ impl ColumnFault {
                 file_unit,
                 named_unit,
             } => {
-                // No constant of a model is in the unit of the time.
+                // No constant of a model has the unit of the time.
                 let of_time = [file_unit, named_unit]
                     .iter()
                     .all(|unit| unit::seconds(unit).is_some());

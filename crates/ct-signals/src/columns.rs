@@ -29,7 +29,7 @@ pub struct Columns {
     pub references: Vec<String>,
     /// Format of dates and times in the notation of `strftime`: `%d.%m.%Y %H:%M:%S`. Without it the format is found from the column.
     pub time_format: Option<String>,
-    /// The zone of dates that do not say: `Europe/Berlin`, `UTC`, `+01:00`. UTC where it is absent.
+    /// Zone of dates without a zone: `Europe/Berlin`, `UTC`, `+01:00`. Default UTC.
     pub time_zone: Option<String>,
     /// Words and numbers that mark a missing sample, in addition to the usual ones: `-999`, `Offline`.
     pub missing: Vec<String>,
@@ -59,7 +59,7 @@ struct Named {
     missing: Vec<String>,
 }
 
-/// The name of a zone that there is.
+/// Reads the name of an existing zone.
 fn zone<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
     let name = Option::<String>::deserialize(deserializer)?;
     if let Some(name) = &name {
@@ -182,7 +182,7 @@ pub(crate) struct Layout {
     pub inputs: Vec<Found>,
     pub outputs: Vec<Found>,
     pub references: Vec<Found>,
-    /// Outputs that are named and not there, with their positions among the named ones; where outputs are needed there is none.
+    /// Named outputs that the file does not have, with their positions among the named ones; empty if outputs are required.
     pub absent: Vec<(usize, String)>,
 }
 
@@ -196,7 +196,7 @@ pub(crate) enum Purpose {
 }
 
 impl Layout {
-    /// The columns that hold values: inputs, outputs, references.
+    /// The columns with values: inputs, outputs, references.
     pub fn channels(&self) -> impl Iterator<Item = &Found> {
         self.inputs
             .iter()
@@ -234,7 +234,7 @@ impl Columns {
         }
     }
 
-    /// The columns that would be taken where none is named; what is not plain is left out.
+    /// The columns that are chosen without names; ambiguous ones are left out.
     #[must_use]
     pub fn guessed(headings: &[Heading]) -> Self {
         let names: Vec<String> = headings.iter().map(|h| h.header.clone()).collect();

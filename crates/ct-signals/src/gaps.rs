@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::record::quantile_of_steps;
 use crate::{Channel, Hold, Record};
 
-/// A step of the time is this many sampling intervals or more where rows are missing: half-way between one and two.
+/// A step of the time of this number of sampling intervals or more means missing rows: half-way between one and two.
 const GAP: f64 = 1.5;
 /// Steps of an evenly sampled record differ from whole intervals by at most this part of one ...
 const EVEN: f64 = 0.25;
@@ -26,7 +26,7 @@ const USUAL: f64 = 0.95;
 const SAME_RATE: f64 = 0.2;
 /// ... and at least this many occur one after the other: lost rows cause steps of any length, one at a time.
 const STAYS: usize = 3;
-/// A logger has several rates where this share of the long steps stands in such a row.
+/// A logger has several rates if this share of the long steps occurs in such a sequence.
 const OF_A_RATE: f64 = 0.5;
 /// More rows are never put in.
 const MOST_PUT_IN: usize = 100_000;
@@ -75,8 +75,8 @@ struct Sampling {
 }
 
 impl Sampling {
-    /// Where the steps are whole multiples of one interval, that is the interval; otherwise their median. Of a logger that goes over to
-    /// longer steps where little happens, as a tester of batteries does, the steps of its slowest rate are no gaps.
+    /// If the steps are whole multiples of one interval, that interval; otherwise their median. For a logger that reduces its rate while
+    /// the signals are slow, such as a battery tester, the steps of the slowest rate are no gaps.
     fn of(time: &[f64]) -> Self {
         let plain = Self::of_one_rate(time);
         match slowest_rate(time, plain.interval) {
@@ -274,7 +274,7 @@ impl Record {
                     gaps.longest_hold = gaps.longest_hold.max(unknown);
                 } else {
                     gaps.cut += 1;
-                    // A held input acts until its next sample should have come: that row's outputs are still known to follow from it.
+                    // A held input is valid until its next sample is due: the output in that row still depends on known inputs only.
                     let next = last + 1;
                     let acts = !lines
                         && next < k

@@ -5,7 +5,7 @@ use statrs::statistics::{Data, OrderStatistics};
 
 use crate::{Calendar, Error, csv::constant};
 
-/// The fewest rows that a record needs, whatever the model.
+/// Least number of rows of a record for any model.
 pub const MIN_ROWS: usize = 20;
 
 /// Rows needed for each fitted parameter.
@@ -74,7 +74,7 @@ impl Channel {
             })
     }
 
-    /// The samples that are there, in order.
+    /// The present samples, in order.
     pub fn present(&self) -> impl Iterator<Item = f64> + '_ {
         self.values.iter().copied().filter(|value| !value.is_nan())
     }
@@ -157,7 +157,7 @@ impl Record {
         self.time.is_empty()
     }
 
-    /// A part of it, by positions of its rows, under the same name; times are kept.
+    /// A part of the record, by positions of its rows, under the same name; times do not change.
     ///
     /// Positions beyond the last row are left out.
     #[must_use]

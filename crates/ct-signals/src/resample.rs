@@ -1,4 +1,4 @@
-//! A record on an even grid: done only where somebody asks for it, as it changes the data.
+//! Resampling of a record on an even grid: only on request, because it changes the data.
 
 use crate::{Channel, Error, Hold, Record};
 
@@ -54,7 +54,7 @@ impl Record {
         let end = |k: usize| self.time.get(k + 1).copied().unwrap_or(f64::INFINITY);
         let acts = ACTS * self.sample_interval();
         let known = |k: usize, until: f64| {
-            // The last sample goes on to the end of its interval of the grid.
+            // The last sample is valid to the end of its interval of the grid.
             k + 1 >= self.len() || until - self.time[k] <= acts
         };
         grid.iter()

@@ -272,7 +272,7 @@ fn check_length(task: &'static str, n: usize, lags: usize) -> Result<(), Error> 
     })
 }
 
-/// Sums over the pairs `u[t]`, `e[t + lag]` that are there.
+/// Sums over the present pairs `u[t]`, `e[t + lag]`.
 struct Pairs {
     count: usize,
     product: f64,

@@ -24,11 +24,11 @@ const ROLES: [&str; 3] = ["time", "input", "output"];
 /// Format of the times of rows.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RowTimes {
-    /// As numbers.
+    /// Times are numbers.
     Numbers,
     /// Times of day without a date; they count from the first row.
     TimesOfDay,
-    /// As dates.
+    /// Times are dates.
     Dates {
         /// Origin of the times.
         calendar: Calendar,
@@ -41,7 +41,7 @@ pub enum RowTimes {
 #[derive(Debug, Clone)]
 pub struct Rows {
     delimiter: u8,
-    /// The header, where there is one: it may come again.
+    /// The header, if there is one: it may be repeated in the stream.
     header: Option<String>,
     /// Fields of a row.
     fields: usize,
@@ -49,7 +49,7 @@ pub struct Rows {
     at: Vec<usize>,
     /// Number of inputs, at least one.
     inputs: usize,
-    /// Their headers.
+    /// Headers of the columns.
     names: Vec<String>,
     /// Units of inputs and outputs.
     units: Vec<String>,
@@ -242,8 +242,7 @@ impl Rows {
         self.start = Some((calendar.start, calendar.start.after(last)));
     }
 
-    /// The times go on as those of other rows of the same stream, which came before: dates count from the same zero, and what was a number
-    /// stays one.
+    /// Continues the times of earlier rows of the same stream: dates count from the same zero, and numbers stay numbers.
     pub fn go_on(&mut self, before: &Self) {
         self.times = match &before.times {
             Some(Times::Numbers(_)) => Some(Times::Numbers(self.seconds)),

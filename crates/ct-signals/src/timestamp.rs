@@ -70,7 +70,7 @@ impl Timestamp {
         self.nanoseconds
     }
 
-    /// Seconds from another instant to this one; nothing is lost but what an `f64` cannot hold.
+    /// Seconds from another instant to this one, exact to the precision of an `f64`.
     #[must_use]
     pub fn seconds_since(self, first: Self) -> f64 {
         let seconds = self.seconds.saturating_sub(first.seconds);
@@ -222,7 +222,7 @@ impl TimestampReader {
         fields.is_ok_and(|fields| fields.offset.is_none())
     }
 
-    /// The next cell follows this instant: of an hour that occurs twice it tells which one is meant.
+    /// Notes that the next cell is later than this instant: this decides between the two occurrences of a repeated hour.
     pub(crate) fn follow(&mut self, instant: Timestamp) {
         self.previous = Some(instant);
     }

@@ -160,7 +160,7 @@ impl Whitener {
         }
     }
 
-    /// As so many calls of [`Whitener::skip`] where all of the last `p` rows are lost.
+    /// As `rows` calls of [`Whitener::skip`] if all of the last `p` rows are lost.
     fn skip_squaring(&mut self, mut rows: usize) {
         let (p, lanes) = (self.scales.len(), self.lanes);
         let slots: Vec<usize> = (1..=p)

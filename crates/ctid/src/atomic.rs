@@ -1,4 +1,4 @@
-//! Writes a file whole or not at all: beside it under another name first, then renamed.
+//! Writes a file completely or not at all: first under a temporary name in the same folder, then renamed.
 
 #[cfg_attr(unix, path = "atomic/unix.rs")]
 #[cfg_attr(not(unix), path = "atomic/other.rs")]
@@ -109,7 +109,7 @@ fn replace(path: &Path, content: &[u8], still: impl FnOnce() -> bool) -> io::Res
     Ok(true)
 }
 
-/// A new file; one that is there is an error, also where it came at the last moment.
+/// Creates a file; an existing one is an error, also if it appeared at the last moment.
 fn new(path: &Path, content: &[u8]) -> io::Result<()> {
     let mut file = beside(path)?;
     file.write_all(content)?;
@@ -127,7 +127,7 @@ fn target(path: &Path) -> io::Result<PathBuf> {
             io::ErrorKind::NotFound,
             "it is a link to a file that is not there",
         )),
-        // A file that is not there yet has no canonical name.
+        // A file that does not exist yet has no canonical name.
         Err(_) => Ok(path.to_path_buf()),
     }
 }
@@ -138,7 +138,7 @@ pub(crate) fn leads_nowhere(path: &Path) -> bool {
     link && fs::metadata(path).is_err()
 }
 
-/// The last resort: what stood there is written back where this fails, but a kill between leaves a part.
+/// The last resort: the old content is restored after an error, but a kill in between leaves a partial file.
 fn write_in_place(path: &Path, content: &[u8]) -> io::Result<()> {
     let before = fs::read(path)?;
     let mut file = OpenOptions::new().write(true).open(path)?;
@@ -208,7 +208,7 @@ fn is_temporary(name: &OsStr) -> bool {
     })
 }
 
-/// The folder that holds a path.
+/// The folder that contains a path.
 pub(crate) fn folder(path: &Path) -> PathBuf {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),

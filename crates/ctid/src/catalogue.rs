@@ -1,4 +1,4 @@
-//! `ctid effects`: the catalogue, and what it knows of one effect.
+//! `ctid effects`: the catalogue of effects, and the description of one effect.
 
 use plants::{CATALOGUE, Domain, EffectInfo, Known, ParameterInfo, Place, Placed, Plant};
 
@@ -25,7 +25,7 @@ fn offered(model: &ModelFile, effect: &'static EffectInfo) -> bool {
         && model.effects.iter().all(|on| on.effect.id != effect.id)
 }
 
-/// The effects that go with what somebody says of the plant, best first; of a model those that may be added to it.
+/// The effects that match a description of a symptom, best first; with a model, those that may be added to it.
 ///
 /// # Errors
 /// Where none does.

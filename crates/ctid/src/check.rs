@@ -10,7 +10,7 @@ use crate::look::{Look, Side, table};
 use crate::model_file;
 use crate::own_model::{self, AnyModelFile};
 
-/// Reads a model and says what it holds; of a model file the model that it names, with its effects in it.
+/// Reads a model and prints a summary; for a model file, the model that it names with its effects included.
 ///
 /// # Errors
 /// One line that names the file, line and column, what is wrong and the correction.
@@ -135,7 +135,7 @@ fn linearity(model: &ModelSpec) -> String {
     }
 }
 
-/// Name, unit, what is said of it, bounds, description.
+/// Name, unit, kind, bounds, description.
 fn row(about: &About, value: &str, kind: &str) -> Vec<String> {
     let bounds = match (about.min.is_finite(), about.max.is_finite()) {
         (false, false) => String::new(),

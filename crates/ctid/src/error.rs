@@ -34,7 +34,7 @@ pub enum Error {
         /// What is wrong and the correction.
         what: String,
     },
-    /// A file that was changed by somebody else between reading and writing.
+    /// Another program changed the file between reading and writing.
     #[error("{file}: {what}")]
     Changed {
         /// The path as it was given.
@@ -125,7 +125,7 @@ impl From<linear_identification::Error> for Error {
 }
 
 impl Error {
-    /// Something about a file as a whole.
+    /// An error about a file as a whole.
     pub(crate) fn file(path: &Path, what: impl Into<String>) -> Self {
         Self::File {
             file: path.display().to_string(),

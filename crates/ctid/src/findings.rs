@@ -77,7 +77,7 @@ fn one_error<T>(diagnosis: &Diagnosis, only: T, weighted: T) -> (T, &str) {
     }
 }
 
-/// The error that a single effect leaves, and its unit.
+/// Simulation error with a single effect, and its unit.
 pub(crate) fn score_error<'a>(diagnosis: &'a Diagnosis, score: &Score) -> (f64, &'a str) {
     one_error(diagnosis, score.rmse, score.weighted_rmse)
 }

@@ -19,7 +19,7 @@ pub(crate) fn flag() -> &'static AtomicBool {
             if ASKED.swap(true, Ordering::Relaxed) {
                 exit(INTERRUPTED);
             }
-            // On a terminal the progress bar says it.
+            // On a terminal the progress bar shows this message.
             if !io::stderr().is_terminal() {
                 let _ = writeln!(
                     io::stderr(),

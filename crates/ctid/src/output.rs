@@ -13,7 +13,7 @@ use linear_identification::{Identification, side_by_side::SideBySide};
 /// Number of bytes of an existing page that are searched for the mark.
 const HEAD: u64 = 4096;
 
-/// Who has written a file of results, as its first key says.
+/// Name of the program in the first key of a file of results.
 const WRITTEN_BY: &str = "ctid";
 
 /// Results as they are written.
@@ -49,17 +49,17 @@ pub enum Kind {
 
 /// Result of a command, written as JSON with `schema` and a mark that identifies files of ctid, or as a page.
 pub trait Found: Serialize {
-    /// The page, complete, where there is one.
+    /// The complete page, if there is one.
     fn page(&self) -> String {
         String::new()
     }
 
-    /// The record as CSV, where there is one.
+    /// The record as CSV, if there is one.
     fn record(&self) -> Option<String> {
         None
     }
 
-    /// The model's text, where there is one.
+    /// The model's text, if there is one.
     fn model(&self) -> Option<String> {
         None
     }
@@ -84,7 +84,7 @@ impl Found for Diagnosis {
 pub struct Output {
     kind: Kind,
     path: PathBuf,
-    /// A file of ctid's, or an empty one, stood there when the command began.
+    /// A file of ctid, or an empty file, was there when the command began.
     replaces: bool,
 }
 
@@ -210,7 +210,7 @@ pub fn free_report(folder: &Path, record: &str) -> Result<Output, Error> {
     }
 }
 
-/// The first of `STEM.csv`, `STEM-2.csv`, ... in a folder that is free: nothing in a record says who wrote it.
+/// The first free name of `STEM.csv`, `STEM-2.csv`, ... in a folder: a record does not contain its author, so it is never overwritten.
 pub(crate) fn free_record(folder: &Path, stem: &str) -> PathBuf {
     let first = PathBuf::from(format!("{stem}.csv"));
     let others = (2_u64..).map(|number| PathBuf::from(format!("{stem}-{number}.csv")));
@@ -330,7 +330,7 @@ fn check(kind: Kind, path: &Path) -> Result<Standing, Error> {
     Ok(standing)
 }
 
-/// Two paths lead to one file, whether it is there yet or not.
+/// Whether two paths lead to the same file, existing or not.
 pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     let resolve = |path: &Path| {
         fs::canonicalize(path).ok().or_else(|| {

@@ -19,7 +19,7 @@ pub(crate) const MODEL: Color = Color::Yellow;
 /// Colour of the residual.
 pub(crate) const RESIDUAL: Color = Color::Magenta;
 
-/// A line through points; where there are more than dots it becomes the band they fill.
+/// A line through points; with more points than dots it becomes a band.
 pub(crate) struct Curve<'a> {
     pub values: &'a [f64],
     pub colour: Color,
@@ -43,7 +43,7 @@ pub(crate) fn plot(
         .max(6)
         + 2;
     let columns = look.width.saturating_sub(margin + 3).max(20);
-    // The canvas has one dot more than it is told, in both directions.
+    // The canvas has one more dot than requested, in both directions.
     let (width, height) = (columns * ACROSS - 1, rows * DOWN - 1);
     // A flat curve still needs a scale.
     let (low, high) = if y.1 > y.0 { y } else { (y.0 - 1.0, y.0 + 1.0) };
@@ -54,7 +54,7 @@ pub(crate) fn plot(
         for (row, line) in drawn(&points, width, height).lines().enumerate() {
             for (column, cell) in line.chars().enumerate() {
                 let dots = u32::from(cell).saturating_sub(BLANK);
-                // A later curve lies above an earlier one.
+                // A later curve covers an earlier one.
                 if dots > 0
                     && let Some(cell) = cells.get_mut(row).and_then(|row| row.get_mut(column))
                 {
@@ -94,7 +94,7 @@ fn drawn(points: &[(f32, f32)], width: usize, height: usize) -> String {
     chart.frame()
 }
 
-/// A line of cells; neighbours of one colour share their escape codes.
+/// A line of cells; neighbours of the same colour share their escape codes.
 fn coloured(cells: &[(u32, Option<Color>)], look: Look) -> String {
     let mut line = String::new();
     let drawn = cells.iter().rposition(|(dots, _)| *dots != BLANK);

@@ -1,4 +1,4 @@
-//! The program from its arguments to its exit code: 0 on any verdict, 2 with one line on standard error where something is wrong.
+//! The program from its arguments to its exit code: 0 for any verdict, 2 with one line on standard error after an error.
 
 use std::ffi::OsString;
 use std::io::{self, Write};

@@ -14,7 +14,7 @@ use crate::interrupt;
 pub struct Bar {
     bar: ProgressBar,
     phase: Mutex<&'static str>,
-    /// Limit on the time of the search, where there is one.
+    /// Time limit of the search, if there is one.
     limit: Option<Duration>,
 }
 
@@ -61,7 +61,7 @@ impl Bar {
         self.bar.enable_steady_tick(Duration::from_millis(120));
     }
 
-    /// Shows how far it is; may be called from any thread.
+    /// Shows the progress; may be called from any thread.
     pub fn show(&self, progress: Progress) {
         if let Ok(mut phase) = self.phase.lock() {
             // The threads report in any order: a bar never runs back within a phase.
@@ -87,7 +87,7 @@ impl Bar {
         }
     }
 
-    /// Takes it away.
+    /// Removes the progress bar.
     pub fn clear(&self) {
         self.bar.finish_and_clear();
     }

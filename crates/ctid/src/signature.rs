@@ -1,4 +1,4 @@
-//! The trace that an effect leaves: a standard experiment on a tank that has it, and what a model that lacks it cannot follow.
+//! Signature of an effect: a standard experiment on a tank with the effect, and the residual of a model without it.
 
 use std::collections::BTreeMap;
 

@@ -91,7 +91,7 @@ impl Sought {
                 |stem: &&str| word.starts_with(stem) || word.len() > 3 && stem.starts_with(word);
             let family = FAMILIES.iter().find(|family| family.iter().any(&means));
             let of_family = family.into_iter().flat_map(|family| family.iter());
-            // The word itself counts for more than others of its family.
+            // The word itself has more weight than related words.
             stems.extend(
                 of_family.map(|stem| ((*stem).to_string(), if means(stem) { 4 } else { 1 })),
             );

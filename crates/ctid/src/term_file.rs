@@ -26,7 +26,7 @@ pub(crate) const HEADER: &str = "place,variable,at";
 pub struct TermFile {
     /// Where it acts.
     pub place: String,
-    /// What it depends on.
+    /// Variable of the term.
     pub variable: String,
     /// Knots.
     pub at: Vec<f64>,
@@ -106,7 +106,7 @@ pub(crate) fn variable_of(word: &str) -> Result<Variable, String> {
         })
 }
 
-/// Whether a file begins as those of a diagnosis do: with all their columns, of which nobody need write the last.
+/// Whether a file has the header of a diagnosis, with all its columns; in a user's file the last column is optional.
 pub(crate) fn is_own(text: &str) -> bool {
     let header = text.lines().next().unwrap_or_default();
     let columns: Vec<&str> = header.split(',').collect();

@@ -32,7 +32,7 @@ pub struct Tour {
 /// # Errors
 /// Where the folder or `out` cannot be written to.
 pub fn run(folder: &Path, out: &mut dyn Write, look: Look, bar: &Bar) -> Result<Tour, Error> {
-    // Before anything is told: a tour that cannot end well does not begin.
+    // Checked before the first output: if the report cannot be written, the tour does not begin.
     let report = output::free_report(folder, DATA.0)?;
     let problem = problem()?;
     let options = Options::default();

@@ -31,7 +31,7 @@ impl Context<'_> {
         chance * looks < self.thresholds.false_claim
     }
 
-    /// Takes out, one by one, what the noise explains as well, first what is worth least.
+    /// Backward elimination: removes effects that the noise explains as well, the least significant first.
     pub fn confirm(&self, mut node: Node, base: &Node, noise: &Noise) -> Result<Node, Error> {
         loop {
             let lacking = self.each_lacking(&node, base, noise);
@@ -68,8 +68,8 @@ impl Context<'_> {
             || !self.beyond_chance((node, &with), (lacking, &lacks))
     }
 
-    /// A set, compared by its simulation error, less the effects that rest on one reading; `None` where no other stays that the criterion
-    /// needs.
+    /// A set without the effects that depend on a single reading, compared by its simulation error; `None` if no effect stays that the
+    /// criterion needs.
     pub fn of_many_readings(&self, mut node: Node, base: &Node) -> Option<Node> {
         let white = Noise::white(node.spec().outputs.len());
         while node.added.len() > base.added.len() {
@@ -86,8 +86,8 @@ impl Context<'_> {
         None
     }
 
-    /// The reading (series and row) that makes half or more of what a set fits better than one that lacks some of its effects. In coloured noise
-    /// a reading shows in as many rows after it as the noise model has coefficients.
+    /// The reading (series and row) that causes half or more of the improvement of a set over one that lacks some of its effects. With
+    /// coloured noise, a reading affects as many rows after it as the noise model has coefficients.
     fn telling_reading(
         &self,
         node: &Node,

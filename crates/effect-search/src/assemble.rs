@@ -15,10 +15,10 @@ use crate::{Error, held_out};
 
 /// A result.
 pub(crate) struct Finding<'a> {
-    /// The believed model, and the last one.
+    /// The believed model.
     pub base: &'a Node,
     pub last: &'a Node,
-    /// The fit whose noise is told: that of the last model with the noise model of its own residual.
+    /// The fit that gives the reported noise: the last model with the noise model of its own residual.
     pub own: &'a Fit,
     pub verdict: Verdict,
     pub groups: Vec<Vec<usize>>,
@@ -59,8 +59,8 @@ pub(crate) fn assemble(
         }
     };
     let floors: Vec<f64> = own.noise.iter().map(level).collect();
-    // Outputs count by their noise. Errors are compared in one metric, that of the simulation error; the last model has its own where it
-    // leaves noise.
+    // Outputs are weighted by their noise. Errors are compared with a single weighting, that of the simulation error; the last model is
+    // weighted by its own noise model if its residual is noise.
     let white = Noise::white(outputs.len());
     let weighted = Context {
         scales: (outputs.len() > 1).then(|| floors.clone()),
@@ -141,7 +141,7 @@ pub(crate) fn assemble(
     })
 }
 
-/// The believed model, then the effects one by one, each time the one that lowers the error most.
+/// Error ladder: the believed model, then the effects one by one, each time the one that lowers the error most.
 fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<Vec<Node>, Error> {
     let mut nodes = vec![context.subset(last, base.added.clone(), noise, FINE)?];
     // Fit also from the estimates of the believed model.

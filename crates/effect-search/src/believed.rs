@@ -17,7 +17,7 @@ use crate::Error;
 use crate::node::{Context, FINE, Node};
 use crate::problem::{Kept, Limit, Options, Problem};
 
-/// The believed model with the effects of the model file in it.
+/// The believed model, including the effects of the model file.
 #[derive(Debug, Clone)]
 pub struct Believed {
     /// The model; the values of its parameters are fitted ones, with white noise.

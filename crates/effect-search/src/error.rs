@@ -1,6 +1,6 @@
 //! Errors of a search.
 
-/// What can go wrong in a search.
+/// Error of a search.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -34,7 +34,7 @@ pub enum Error {
     /// An effect of the model file that the model cannot have.
     #[error("effect {id} cannot act in this model: `ctid effects --model` lists what can")]
     UnknownEffect {
-        /// Its identifier.
+        /// Identifier of the effect.
         id: String,
     },
     /// An effect of the model file beside which the model cannot be simulated.

@@ -14,8 +14,8 @@ use crate::node::{Context, Node, ROUGH};
 use crate::search::{best_first, same_set};
 
 impl Context<'_> {
-    /// Sets of up to so many effects that do not follow time, fitted with white noise. `sets`: what earlier searches fitted, in whatever
-    /// metric.
+    /// Floating search: sets of up to the given number of effects that are no functions of time, fitted with white noise. `sets`: sets of
+    /// earlier searches, with any noise model.
     pub fn floating(&self, base: &Node, sets: &[Node], max_effects: usize) -> Vec<Node> {
         let white = Noise::white(base.spec().outputs.len());
         let timeless = self.timeless();

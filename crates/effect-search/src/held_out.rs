@@ -103,7 +103,7 @@ fn states_are_known(setup: &ModelSetup, x: &[f64], first: usize, noise: &[f64]) 
             count += 1;
         }
     }
-    // A state that moves nothing needs not be known.
+    // A state without influence needs no estimate.
     let ridge = 1e-9 * all.diagonal().max() / count.max(1) as f64;
     for i in 0..states {
         information[(i, i)] += ridge;

@@ -102,7 +102,7 @@ impl Residuals for Joined<'_> {
         self.setup.samples()
     }
 
-    /// The rows at the point that was given, whatever the vector.
+    /// The rows at the given point, independent of the vector.
     fn each_row(&self, _: &[f64], mut each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
         let mut row = vec![0.0; self.columns.len() + 1];
         for ((output, known), (_, own)) in self.known.series().zip(self.own.series()) {

@@ -188,7 +188,8 @@ impl Context<'_> {
             .collect()
     }
 
-    /// Whether a candidate may be added to a set: one that repeats another only beside that one, as alone the two are the same.
+    /// Whether a candidate may be added to a set: a candidate that repeats another one only in addition to it, because alone the two are
+    /// equal.
     pub fn may_stand_beside(&self, candidate: usize, added: &[usize]) -> bool {
         let repeated = self.candidates[candidate].repeats.as_ref();
         repeated.is_none_or(|id| added.iter().any(|&i| self.candidates[i].id == *id))
@@ -197,7 +198,7 @@ impl Context<'_> {
     /// Whether a candidate is, under another name, one of a set.
     pub fn repeats_one_of(&self, candidate: usize, added: &[usize]) -> bool {
         let first = |mut i: usize| {
-            // A candidate repeats one that stands before it.
+            // A candidate repeats an earlier one.
             while let Some(id) = &self.candidates[i].repeats
                 && let Some(before) = self.candidates[..i].iter().position(|c| c.id == *id)
             {
@@ -208,7 +209,8 @@ impl Context<'_> {
         added.iter().any(|&i| first(i) == first(candidate))
     }
 
-    /// Positions of the candidates that do not follow time: those that do imitate any slow disturbance, and leave no room for others.
+    /// Positions of the candidates that are no functions of time: functions of time compensate for any slow disturbance, and leave nothing
+    /// for other effects.
     pub fn timeless(&self) -> Vec<usize> {
         let all = 0..self.candidates.len();
         all.filter(|&i| !self.candidates[i].follows_time())

@@ -1,4 +1,4 @@
-//! The largest part of the error that effects explain, where what they leave is slower than noise that a search may trust.
+//! Partial explanation: the largest part of the error that effects explain, if the residual is slower than noise that a search can model.
 //!
 //! Measured records hold several causes, and disturbances that are nearly integrated. A noise model with a long memory looks at changes from
 //! sample to sample alone: it takes every slow effect for noise, and a fit in its metric lets the simulation drift off. There sets are compared
@@ -25,8 +25,8 @@ use crate::node::{Context, FINE, Node, ROUGH};
 use crate::search::{best_first, same_set};
 
 impl Context<'_> {
-    /// The set that explains the largest part of the error, fitted with white noise, and that part; `None` where no set is a part of the
-    /// answer. `sets`: fitted in whatever metric; `base`: fitted with white noise.
+    /// The set that explains the largest part of the error, fitted with white noise, and that part; `None` if no set is a partial
+    /// explanation. `sets`: fitted with any noise model; `base`: fitted with white noise.
     pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<(Node, f64)>, Error> {
         let white = Noise::white(self.problem.records[0].outputs.len());
         let own_base = self.in_limited_noise(base)?;
@@ -89,7 +89,7 @@ impl Context<'_> {
         set.added.len() + set.added.iter().filter(in_time).count()
     }
 
-    /// The share of the error above the noise that a set explains, and whether it is a part of the answer.
+    /// The share of the error above the noise that a set explains, and whether the set is a partial explanation.
     fn is_part(&self, base: &Node, own_base: &Fit, set: &Node) -> Result<(f64, bool), Error> {
         let own = self.in_limited_noise(set)?;
         let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
@@ -114,7 +114,7 @@ impl Context<'_> {
         Ok((share, accepted))
     }
 
-    /// The fit of a set with a noise model of its own residual whose memory is limited.
+    /// The fit of a set with a noise model of its own residual, with limited memory.
     pub fn in_limited_noise(&self, node: &Node) -> Result<Fit, Error> {
         let setup = self.setup(&node.model)?;
         let memory = Some(self.longest_memory());
@@ -210,7 +210,7 @@ impl Context<'_> {
     }
 }
 
-/// The relative fall of squared errors. Outputs count alike; one without an error before says nothing.
+/// The relative fall of squared errors. Outputs have equal weight; an output without an error before is left out.
 pub(crate) fn fall(before: &[f64], after: &[f64]) -> f64 {
     let pairs = before.iter().zip(after);
     let ratios: Vec<f64> = pairs

@@ -97,7 +97,7 @@ impl ProblemBuilder {
         self
     }
 
-    /// A candidate of the user's own, beside those of the catalogue.
+    /// Adds a user's own candidate to those of the catalogue.
     pub fn candidate(mut self, name: impl Into<String>, candidate: OwnCandidate) -> Self {
         self.problem.candidates.insert(name.into(), candidate);
         self

@@ -15,7 +15,7 @@ pub enum Verdict {
     Effect,
     /// An effect is missing, and another candidate fits as well as at least one added effect.
     Undecided,
-    /// The added effects explain the larger part of the error, and something else remains that is not noise.
+    /// The added effects explain the larger part of the error, and the residual is not noise.
     Partial,
     /// The residual is not noise, and no candidate explains it.
     Unexplained,
@@ -36,7 +36,7 @@ pub struct Estimate {
     pub unit: String,
     /// The value is not fitted.
     pub known: bool,
-    /// The effect whose parameter it is; `None` of the believed model's own.
+    /// The effect of the parameter; `None` for the believed model's own parameters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub effect: Option<String>,
 }
@@ -44,7 +44,7 @@ pub struct Estimate {
 /// One of the reported models: the believed one, or a model with one more effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
-    /// The effect that was added; `None` of the believed model.
+    /// The added effect; `None` for the believed model.
     pub added: Option<String>,
     /// Simulation error of an only output on the fitted records \[its unit\].
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -113,13 +113,13 @@ pub struct Diagnosis {
     pub groups: Vec<Vec<String>>,
     /// The single effects, best first; `none` first where the model is adequate.
     pub ranked: Vec<String>,
-    /// The believed model, and every model after it.
+    /// The believed model, and every later model.
     pub steps: Vec<Step>,
     /// The share of the squared error above the noise that the effects explain; `None` without effects.
     pub share: Option<f64>,
     /// Structure in the residual of the last model that is not noise.
     pub left: Option<Left>,
-    /// The shape of what no candidate explains, beside the last model; `None` where nothing is left to explain.
+    /// The unexplained error of the last model; `None` if its residual is noise.
     pub unknown: Option<Unknown>,
     /// The noise of each output, of the last model's residual.
     pub noise: Vec<NoiseFloor>,

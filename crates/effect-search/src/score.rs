@@ -24,13 +24,13 @@ pub(crate) const DAMPING: f64 = 1e-9;
 /// Parts of the predicted step from which a fit may begin, as shares of it.
 const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
 
-/// A candidate beside a set of effects, before it is fitted.
+/// A candidate for addition to a set of effects, before it is fitted.
 #[derive(Debug, Clone)]
 pub(crate) struct Trial {
     /// Position among the candidates.
     pub candidate: usize,
     pub model: Arc<Model>,
-    /// Starts of its fit, best first: where it was linearised, or one step from there where that is better.
+    /// Starts of its fit, best first: the points of linearisation, or one step from there if that is better.
     pub starts: Vec<Vec<f64>>,
     /// Predicted fall of the deviance.
     pub fall: f64,

@@ -13,7 +13,7 @@ use crate::node::{Context, FINE, Node, ROUGH};
 use crate::pairs::joint_scores;
 use crate::score::Trial;
 
-/// What is left out where the time has passed.
+/// Step that is left out if the time is over.
 const LARGER: &str = "larger sets of effects";
 
 /// Result of a search with one noise model.

@@ -35,7 +35,7 @@ pub fn stationary_p(noise: &ArModel, residual: &[f64], thresholds: &Thresholds) 
         if transform.process(&mut part, &mut spectrum).is_err() {
             return 1.0;
         }
-        // Without the mean, and without the line at half the sampling rate, which has one degree of freedom.
+        // Without frequency zero, and without the Nyquist frequency, whose line has one degree of freedom.
         let power: Vec<f64> = spectrum[1..size.div_ceil(2)]
             .iter()
             .map(|line| line.norm_sqr())
@@ -96,7 +96,7 @@ mod tests {
         for run in 0..400 {
             let mut e = noise::ar1(SAMPLES, 0.1, [0.0, 0.5, 0.9, 0.97][run % 4], &mut rng);
             if run % 8 < 4 {
-                // Three times as large from the middle on: its colour is the same.
+                // Three times as large from the middle on, with the same spectrum.
                 e[SAMPLES / 2..].iter_mut().for_each(|e| *e *= 3.0);
             }
             let model = ArModel::fit(&[&e], 6).unwrap();
@@ -120,7 +120,7 @@ mod tests {
             let model = ArModel::fit(&[&e], 6).unwrap();
             seen += usize::from(stationary_p(&model, &e, &Thresholds::DEFAULT) < 1e-4);
         }
-        // An autoregressive model explains most of it: the test has what is left.
+        // An autoregressive model explains most of the change: the test uses the rest.
         assert!(seen >= RUNS / 2, "{seen} of {RUNS}");
     }
 }

@@ -43,7 +43,7 @@ pub struct Unknown {
     pub variable_unit: String,
     /// Unit of the term.
     pub unit: String,
-    /// Share of the mean squared error above the noise that it explains beside the last model.
+    /// Share of the mean squared error above the noise that the function explains in addition to the last model.
     pub share: f64,
     /// Fall of the mean squared error on parts of the records that the function was not fitted to; `None` if it was not computed.
     pub share_left_out: Option<f64>,
@@ -51,11 +51,11 @@ pub struct Unknown {
     pub rmse_per_output: BTreeMap<String, f64>,
     /// Arguments of the function, over the visited range \[unit of the variable\].
     pub at: Vec<f64>,
-    /// The term there: what is added or, at a parameter, its relative change against its mean \[unit\].
+    /// Value of the function: an added term or, at a parameter, its relative change from the mean \[unit\].
     pub value: Vec<f64>,
     /// Standard errors; `None` if not determined.
     pub std_error: Vec<Option<f64>>,
-    /// The heights of its bells, as `ctid add NAME --from` keeps them.
+    /// Heights of the Gaussian basis functions, as `ctid add NAME --from` keeps them.
     pub parameters: Vec<Estimate>,
     /// Ports and variables, the best first.
     pub places: Vec<PortScore>,
@@ -208,7 +208,7 @@ fn curve(
         unit[j] = 1.0;
         bells(&unit, share(k))
     };
-    // The parameter itself imitates a relative change of its mean.
+    // The parameter itself compensates for a constant relative change.
     let of_parameter = matches!(candidate.port, Port::Value(_) | Port::Dependence(..));
     let means: Vec<f64> = (0..heights.len())
         .map(|j| {

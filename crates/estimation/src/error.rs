@@ -1,6 +1,6 @@
 //! Errors of a fit.
 
-/// What can go wrong in a fit.
+/// Error of a fit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

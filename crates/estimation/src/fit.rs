@@ -44,13 +44,13 @@ pub struct Fit {
     pub priors: usize,
     /// Number of starts.
     pub starts: usize,
-    /// How many of them ended in the best minimum.
+    /// Number of starts that ended in the best minimum.
     pub agree: usize,
     /// Reason why the best fit stopped.
     pub stop: Stop,
     /// The folded rows at the minimum.
     pub triangle: Triangle,
-    /// Positions (among the fitted entries) that the gradient does not hold at a bound.
+    /// Positions (among the fitted entries) of the parameters that are not held at a bound.
     interior: Vec<usize>,
     free: Vec<usize>,
     /// Degrees of freedom of the variance of every interior entry.
@@ -299,7 +299,7 @@ pub fn fit_from(
         .iter()
         .map(|(_, minimum)| minimum.triangle.cost())
         .fold(f64::INFINITY, f64::min);
-    // Ends that the likelihood can hardly tell apart are one minimum.
+    // Results with nearly equal likelihood count as one minimum.
     let samples: usize = model.samples().iter().sum();
     let same = best * (SAME_MINIMUM / samples as f64).exp();
     let agree = minima
@@ -345,7 +345,7 @@ pub fn fit_from(
         free: free.to_vec(),
     };
     fit.freedom = vec![fit.degrees_left(); fit.interior.len()];
-    // Covariances multiply by this variance: with its root as their weight, rows of priors keep the standard errors that were given.
+    // Covariances are multiplied by this variance: weighting the priors by its root preserves their standard errors.
     let sigma = fit.variance().sqrt();
     fit.triangle = fit.triangle.with_prior_weight(sigma);
     Ok(fit)
@@ -379,7 +379,7 @@ impl End {
             }
             sums[sample.output] += row[0] * row[0];
             let variance = whitener.push_with_variance(row);
-            // Most rows have seen all that matters to them.
+            // Late rows hardly change with the memory.
             if variance != 1.0 {
                 log_det += variance.ln();
             }

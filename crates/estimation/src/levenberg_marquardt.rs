@@ -39,7 +39,7 @@ pub(crate) struct Minimum {
     pub stop: Stop,
 }
 
-/// The nearest value between two bounds. Unlike `clamp` it takes bounds of any order; what is not a number stays so.
+/// The nearest value between two bounds. Unlike `clamp` it accepts bounds in any order; NaN stays NaN.
 pub fn within(x: f64, (lower, upper): (f64, f64)) -> f64 {
     if x < lower {
         lower
@@ -50,7 +50,7 @@ pub fn within(x: f64, (lower, upper): (f64, f64)) -> f64 {
     }
 }
 
-/// Whether the gradient holds a parameter at its bound.
+/// Whether a parameter is at a bound and its gradient points outwards.
 pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
     // With only one bound, the width is infinite, and every value would be within a share of the width.
     let width = upper - lower;

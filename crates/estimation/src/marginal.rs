@@ -159,7 +159,7 @@ struct Criterion {
     value: f64,
     /// Variance of the innovations.
     variance: f64,
-    /// Degrees of freedom that the residual keeps.
+    /// Degrees of freedom of the residual.
     left: f64,
 }
 
@@ -271,7 +271,7 @@ pub(crate) mod tests {
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
 
-    /// Covariance of the rows that are there, one block for each series.
+    /// Covariance of the present rows, one block for each series.
     pub(crate) fn covariance(noise: &Noise, lengths: &[usize], there: &[usize]) -> DMatrix<f64> {
         let n = lengths.iter().sum();
         let mut all = DMatrix::zeros(n, n);
@@ -354,7 +354,7 @@ pub(crate) mod tests {
                 assert_relative_eq!(ours.variance, squares / freedom, max_relative = 1e-9);
                 assert_relative_eq!(ours.left, freedom);
             }
-            // The search starts from the model of the samples that are there, and lowers the criterion.
+            // The search starts from the model of the present samples, and lowers the criterion.
             let most = noise(&rows, &[0, 1], 3).unwrap();
             let (relative, variance) = most.relative();
             let at = Criterion::of(&rows, &[0, 1], &relative);

@@ -12,13 +12,13 @@ use ct_signals::ArModel;
 pub(crate) struct Factor {
     predictors: Vec<Vec<f64>>,
     scales: Vec<f64>,
-    /// Row by row from the first that is there; `None` where none is missing.
+    /// Gains row by row from the first present one; `None` if no row is missing.
     gains: Option<Gains>,
 }
 
 /// The filter of one record, row by row.
 struct Gains {
-    /// Missing rows before the first that is there.
+    /// Number of missing rows before the first present one.
     before: usize,
     rows: Vec<Row>,
 }
@@ -77,7 +77,7 @@ impl Factor {
         self.scales.len() - 1
     }
 
-    /// `L' x` in place: the rows that follow are known when a row's turn comes, backwards in time.
+    /// `L' x` in place, backwards in time: later rows are processed first.
     pub(crate) fn colour_transposed(&self, rows: &mut [f64], lanes: usize) {
         if let Some(gains) = &self.gains {
             self.adjoint(gains, rows, lanes, true);

@@ -16,7 +16,7 @@ pub struct Prior {
     pub std_error: f64,
 }
 
-/// A start that is further than so many standard errors from a prior begins there: the cost of a prior grows exponentially.
+/// A start further than this number of standard errors from a prior is moved to this distance: the cost of a prior grows exponentially.
 const FARTHEST_START: f64 = 5.0;
 
 impl Prior {
@@ -40,7 +40,7 @@ impl Prior {
     }
 }
 
-/// Moves the fitted entries of a start that are far from their priors near these.
+/// Moves fitted entries of a start that are far from their priors to near the priors.
 pub fn begin_near_priors(model: &impl Residuals, x: &mut [f64]) {
     for (_, prior) in free_priors(model) {
         x[prior.entry] = prior.near(x[prior.entry]);

@@ -54,7 +54,7 @@ pub trait Residuals: Sync {
         0.0
     }
 
-    /// Standard deviations of the outputs' noise where these are known: outputs then count by them, and not by their residuals.
+    /// Standard deviations of the outputs' noise, if known: outputs are weighted by these, and not by their residuals.
     fn known_scales(&self) -> Option<&[f64]> {
         None
     }

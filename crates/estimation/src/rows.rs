@@ -8,7 +8,7 @@ use crate::{Noise, Triangle};
 pub struct Rows {
     /// Entries of a row: the free entries of the vector, then the residual, NaN where the sample is missing.
     pub columns: usize,
-    /// How many outputs there are.
+    /// Number of outputs.
     pub outputs: usize,
     /// Samples of each series.
     pub lengths: Vec<usize>,

@@ -93,7 +93,7 @@ impl Triangle {
         let Some((mut pivot, mut rest)) = self.block.split_at_mut_checked(BLOCK) else {
             return;
         };
-        // A pass over a column applies one reflection and takes the product for the next.
+        // One pass over a column applies one reflection and computes the product for the next one.
         let products = &mut self.products;
         products[0] = dot(&pivot[..filled], &pivot[..filled]);
         for (product, column) in products[1..].iter_mut().zip(rest.chunks_exact(BLOCK)) {
@@ -128,7 +128,7 @@ impl Triangle {
         }
     }
 
-    /// Folds in what is left; call it before reading.
+    /// Processes the remaining rows; call it before reading the factor.
     pub fn finish(&mut self) {
         if self.filled > 0 {
             self.fold();
@@ -283,7 +283,7 @@ impl Triangle {
         self.finish();
     }
 
-    /// Folds in the rows of a finished triangle, its column j to column `places[j]`; the others count as zero.
+    /// Adds the rows of another finished R factor, with its column j as column `places[j]`; the other columns are zero.
     pub fn append(&mut self, other: &Self, places: &[usize]) {
         let rows = self.rows + other.rows;
         let mut row = vec![0.0; self.columns];

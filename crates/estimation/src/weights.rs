@@ -80,7 +80,7 @@ impl Squares {
             .max(f64::MIN_POSITIVE)
     }
 
-    /// All samples.
+    /// Number of all samples.
     fn count(&self) -> f64 {
         self.samples.iter().sum::<usize>() as f64
     }

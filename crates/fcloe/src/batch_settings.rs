@@ -45,9 +45,9 @@ pub enum Coordinates {
 /// Settings of the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Settings {
-    /// How a step is made.
+    /// Step rule.
     pub method: Method,
-    /// What is iterated.
+    /// Coordinates of the iteration.
     pub coordinates: Coordinates,
     /// The fit ends with a step that changes no parameter by more than this share of itself, or from a point whose
     /// minimum of the linearised model changes y^ by no more than this share of the residual (root mean square both).

@@ -32,9 +32,9 @@ pub struct Mismatch {
     pub rms: f64,
     /// Root mean square of that part of it which follows r.
     pub systematic: f64,
-    /// Root mean square of what noise alone would show of that; it is taken off.
+    /// Root mean square of the difference that noise alone would cause; it is subtracted.
     pub by_chance: f64,
-    /// Root mean square of u, its slowest moves left out where the controller integrates.
+    /// Root mean square of u, without its slowest changes if the controller integrates.
     pub size: f64,
 }
 

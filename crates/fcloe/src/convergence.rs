@@ -28,7 +28,7 @@ pub struct Condition {
     pub frequency: f64,
 }
 
-/// The answer of condition (14), and how bad it is where it fails; the worse, the greater.
+/// Result of condition (14), and its severity if it fails; a greater value is worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -36,8 +36,7 @@ pub enum Verdict {
     Holds,
     /// `Re (P^/P)` falls to 1/2 or below, but stays above 0: convergence is not guaranteed, and usual.
     Positive,
-    /// `Re (P^/P)` is 0 or below at some frequency: what the data say at that frequency moves the estimates the wrong
-    /// way.
+    /// `Re (P^/P)` is 0 or negative at some frequency: data at that frequency move the estimates in the wrong direction.
     Negative,
     /// P itself is not Hurwitz, so there is no such loop.
     Unstable,

@@ -5,7 +5,7 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A polynomial, a transfer function or a sampling step that is no such thing.
+    /// An invalid polynomial, transfer function or sampling step.
     #[error(transparent)]
     Lti(#[from] ct_lti::Error),
     /// Error of the recursive least squares.
@@ -144,7 +144,7 @@ pub enum Error {
         /// The median step \[s\].
         expected: f64,
     },
-    /// An output without readings, or without those that say its level.
+    /// An output without readings, or without readings that determine its level.
     #[error(
         "{record}: no reading of y is there{}; give a part of the record that has some",
         match all {
@@ -198,7 +198,7 @@ pub enum Error {
         /// Parameters, estimated offsets included.
         parameters: usize,
     },
-    /// The signal that drives the model never moves.
+    /// The signal that drives the model is constant.
     #[error(
         "{signal} is {value} throughout, in all records, so nothing can be learnt about the dynamics; record an experiment in which it moves"
     )]
@@ -227,10 +227,10 @@ pub enum Error {
         "theta[{index}] starts at 0, so theta0 (1 + delta) cannot move it; start it elsewhere, or iterate in theta"
     )]
     ZeroStart {
-        /// Its index.
+        /// Index of the parameter.
         index: usize,
     },
-    /// Parameters that the data do not tell apart.
+    /// The data do not determine all parameters.
     #[error(
         "{samples} samples do not determine {parameters} parameters: the output does not depend on some combination of them; lower the orders, or excite the loop more"
     )]

@@ -17,7 +17,7 @@ pub enum Noise<'a> {
     None,
     /// Noise is added to the output that the controller reads: it is fed back, and the record contains `A S/P w`.
     InLoop(&'a [f64]),
-    /// Added to the recorded y alone: the controller never sees it.
+    /// Noise is added to the recorded y alone: the controller does not read it.
     OnRecord(&'a [f64]),
 }
 

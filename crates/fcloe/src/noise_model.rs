@@ -1,4 +1,4 @@
-//! What the residual is made of, and what its colour does to the standard errors.
+//! Noise model of the residual, and its influence on the standard errors.
 //!
 //! Model: `v = H e`, e white of variance sigma^2, where H is an autoregression, and after it, for noise that circulates in the loop, `F = A
 //! S/P` sampled under a hold: in the loop the residual is `A S/P w` (Baysse, Carrillo, Habbadi, (13)). No autoregression of modest order
@@ -41,7 +41,7 @@ use crate::{ClosedLoop, Error};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePath {
-    /// On the record: the controller does not see it.
+    /// Output noise: the controller does not read it.
     Record,
     /// In the loop: the residual is `A S/P w`.
     Loop,
@@ -59,7 +59,7 @@ pub(crate) struct Residual {
 /// A model of the residual.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseModel {
-    /// Where the noise enters.
+    /// Point where the noise enters.
     pub path: NoisePath,
     /// The noise there.
     pub ar: ArModel,
@@ -143,7 +143,7 @@ impl NoiseModel {
 }
 
 impl NoiseModel {
-    /// The same where readings are missing: residuals are NaN there.
+    /// As before with missing readings: their residuals are NaN.
     fn of_some(
         residuals: &[Residual],
         closed: &ClosedLoop,

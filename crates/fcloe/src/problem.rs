@@ -235,7 +235,7 @@ fn constant(values: &[f64]) -> bool {
     values.iter().all(|v| Some(v) == values.first())
 }
 
-/// Standard deviation of the values that are there.
+/// Standard deviation of the present values.
 fn spread(values: &[f64]) -> f64 {
     let there = values.iter().filter(|v| !v.is_nan());
     let n = there.clone().count().max(1) as f64;

@@ -40,7 +40,7 @@ pub enum Offsets {
 /// r, u and y of one experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoopRecord {
-    /// For messages.
+    /// Name in messages.
     pub name: String,
     /// Sampling interval \[time\], above 0.
     pub step: f64,
@@ -48,7 +48,7 @@ pub struct LoopRecord {
     pub r: Option<Vec<f64>>,
     /// Input of the plant, the controller's output; needed in open loop.
     pub u: Option<Vec<f64>>,
-    /// Output as the controller sees it, at the sampling instants; NaN where the reading is missing.
+    /// Output as the controller reads it, at the sampling instants; NaN if the reading is missing.
     pub y: Vec<f64>,
     /// Hold of r between samples.
     pub r_hold: Hold,
@@ -138,7 +138,7 @@ impl LoopRecord {
         self.y.is_empty()
     }
 
-    /// Number of readings of the output that are there.
+    /// Number of present readings of the output.
     pub fn readings(&self) -> usize {
         self.y.iter().filter(|y| !y.is_nan()).count()
     }

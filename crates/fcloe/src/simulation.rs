@@ -64,11 +64,11 @@ impl Block {
 #[derive(Debug, Clone)]
 pub struct LoopSimulator {
     transition: Transition,
-    /// y^ in x, and what of the drive reaches it at once.
+    /// y^ as a function of x, and the direct term from the drive.
     output: (Vec<f64>, f64),
     /// u^ likewise.
     input: (Vec<f64>, f64),
-    /// P over its leading coefficient, which is left out.
+    /// P divided by its leading coefficient, which is not stored.
     monic: Vec<f64>,
     /// R and S over P's leading coefficient; R is empty in open loop.
     r: Vec<f64>,

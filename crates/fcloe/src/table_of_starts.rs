@@ -25,7 +25,7 @@ pub struct StartRun {
     pub end: Option<Vec<f64>>,
     /// The largest relative error of a parameter there; infinite without a run.
     pub error: f64,
-    /// Steps that were refused to keep the loop stable.
+    /// Number of steps that were rejected to keep the loop stable.
     pub refused: u64,
 }
 

@@ -130,7 +130,7 @@ mod tests {
         ];
         assert_eq!(clock.with_records(&test).begins, [600.0, 0.0, 0.0]);
         assert_eq!(clock.with_records(&parts), clock);
-        // A single record has a clock of its own, which a later one continues.
+        // A single record has a separate clock, which a later record continues.
         let alone = Clock::of(&parts[..1]);
         assert_eq!(alone.begins, [0.0]);
         assert_eq!(alone.with_records(&parts[1..2]).begins, [110.0]);

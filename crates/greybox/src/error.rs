@@ -18,7 +18,7 @@ pub enum Error {
     UnknownParameter {
         /// The name that was given.
         name: String,
-        /// The names that there are.
+        /// Names of the parameters.
         known: String,
     },
     /// A prior is not a finite number with a positive standard error within the bounds.
@@ -32,7 +32,7 @@ pub enum Error {
         value: f64,
         /// Standard error of the prior.
         std_error: f64,
-        /// The smallest value that a fit takes.
+        /// Smallest value of the fit.
         lower: f64,
         /// The largest.
         upper: f64,
@@ -56,7 +56,7 @@ pub enum Error {
     Inputs {
         /// The record.
         record: String,
-        /// How many it has.
+        /// Number in the record.
         given: usize,
         /// Number in the model.
         needed: usize,

@@ -64,7 +64,7 @@ pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error>
         });
     }
     record.validate()?;
-    // The controller saw readings that the record lacks; a line between their neighbours stands for them.
+    // The controller used readings that the record lacks; they are interpolated linearly.
     let Some(read) = record.outputs.get(controller.output()) else {
         return Err(Error::Outputs {
             record: record.name.clone(),

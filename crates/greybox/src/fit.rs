@@ -6,16 +6,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Setup, random_starts, starts::extend_levels};
 
-/// How to fit.
+/// Options of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FitOptions {
     /// Number of random starts.
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
-    /// Largest order of the noise model that is tried; zero takes the noise for white.
+    /// Largest order of the noise model; zero assumes white noise.
     pub noise_order: usize,
-    /// When to stop.
+    /// Stopping criteria.
     pub stopping: Stopping,
 }
 
@@ -79,7 +79,7 @@ pub fn fit_onward(
     )
 }
 
-/// The fit's errors are those of a simulation on the measured command, whatever was fitted.
+/// The reported errors are always those of a simulation on the measured command.
 fn done(setup: &Setup, fit: Result<Fit, NoFit>) -> Result<Fit, Error> {
     if setup.stopped() {
         return Err(Error::Stopped);

@@ -254,7 +254,7 @@ struct WithoutEffect {
 }
 
 impl WithoutEffect {
-    /// `apart`: places of parameters that do not take part; `gain`: of the pump's gain.
+    /// `apart`: positions of parameters that do not take part; `gain`: position of the pump's gain.
     fn at(
         x: Vec<f64>,
         apart: &[usize],
@@ -337,8 +337,8 @@ fn project(column: &mut [f64], basis: &[Vec<f64>]) {
     }
 }
 
-/// Makes a column one of length one that is orthogonal to a basis, and says how long it was then; `None` where it lies in the basis, but
-/// for rounding.
+/// Orthonormalises a column to a basis, and returns its length before normalisation; `None` if it is in the span of the basis, up to
+/// rounding.
 fn orthogonalise(column: &mut [f64], basis: &[Vec<f64>]) -> Option<f64> {
     const ROUNDING: f64 = 1e-7;
     let before = dot(column, column).sqrt();

@@ -25,7 +25,7 @@ fn product(a: Expression, b: Expression) -> Expression {
     Expression::Binary(Operator::Multiply, Box::new(a), Box::new(b))
 }
 
-/// Outputs that show a state as it is, each with its state.
+/// Outputs that equal a state, each with its state.
 fn shown(spec: &ModelSpec) -> Vec<(usize, usize)> {
     let outputs = spec.outputs.iter().enumerate();
     let state = |(o, output): (usize, &Output)| {

@@ -117,7 +117,7 @@ impl ModelSetup<'_> {
     fn moved(&self, i: usize, draw: f64) -> f64 {
         let (value, (low, high)) = (self.start()[i], self.bound(i));
         if i >= self.parameter_count() {
-            // A state may be near zero by chance: what it may reach says how far off it may be.
+            // A state may be near zero by chance: its bounds give the scale of its uncertainty.
             let reach = if value == 0.0 { 1.0 } else { value.abs() };
             return value + STATE_SPREAD * draw * reach;
         }

@@ -93,7 +93,7 @@ fn prediction(
             let simulated = &model[r * outputs + output];
             values.extend(before.iter().chain([&k]).map(|&j| simulated[j]));
             for input in &record.inputs {
-                // Before this row alone: in a loop the input of a row answers to the reading of that row.
+                // Rows before this one only: in a loop the input of a row depends on the reading of that row.
                 values.extend((1..=others).map(|lag| input.values[k.saturating_sub(lag)]));
             }
             for other in (0..outputs).filter(|o| *o != output) {
@@ -123,7 +123,8 @@ mod tests {
 
     use super::*;
 
-    /// Noise of one colour in two outputs, the second of which is read at every fifth row: they weigh as their deviations say.
+    /// Two outputs with the same noise spectrum, the second one read at every fifth row: their weights follow from their standard
+    /// deviations.
     #[test]
     fn coloured_noise_of_a_slow_output_weighs_as_its_deviation() {
         const ROWS: usize = 4000;

@@ -93,7 +93,7 @@ impl FitUncertainty {
         ct_signals::student_half_width(level, self.freedom)
     }
 
-    /// Adds an error that moves all entries together, by these amounts \[unit of each entry of the vector\].
+    /// Adds an error that changes all entries together, by these amounts \[unit of each entry of the vector\].
     pub fn widen(&mut self, moved: &[f64]) {
         for (row, &i) in self.covariance.iter_mut().zip(&self.entries) {
             for (value, &j) in row.iter_mut().zip(&self.entries) {
@@ -294,7 +294,7 @@ pub fn output_errors(
     Some(errors)
 }
 
-/// A model whose outputs count by a noise that is known.
+/// A model whose outputs are weighted by known noise.
 struct Weighted<'m, M> {
     model: &'m M,
     scales: &'m [f64],

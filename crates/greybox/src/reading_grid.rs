@@ -12,7 +12,7 @@
 
 use ct_signals::Record;
 
-/// A reading lies on the grid within this share of the step: of readings anywhere a fifth do.
+/// A reading is on the grid if its distance is below this share of the step: one fifth of random readings are.
 const NEAR: f64 = 0.1;
 /// Share of the readings that must lie on the grid.
 const MOST: f64 = 0.9;
@@ -113,7 +113,7 @@ pub fn reading_grid(records: &[Record], output: usize) -> Option<ReadingGrid> {
         .filter(|step| span <= MOST_STEPS * step)
         .find_map(|step| {
             let (offset, share, spread) = held_against(step, &sorted)?;
-            // Two levels make a step and an offset; each further one lies so near by chance.
+            // Two levels determine a step and an offset; each further level is this close by chance with the probability below.
             let chance = tried * (2.0 * spread).powi(levels.len() as i32 - 2);
             (share >= MOST && chance < CHANCE).then_some(ReadingGrid {
                 step,

@@ -54,14 +54,14 @@ fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
     let count = ((MOST_STEPS - FEWEST_STEPS) / span / grid).min(1e5) as usize;
     let at = |k: usize| FEWEST_STEPS / span + grid * k as f64;
     let coarse: Vec<f64> = (0..count).map(|k| aligned(at(k), &some)).collect();
-    // Readings that lie on multiples of D lie on those of D/2 too, so the first is the answer.
+    // Readings on multiples of D are also on multiples of D/2, so the first (largest) step is the result.
     let tried = (1..count.saturating_sub(1))
         .filter(|&k| coarse[k] > 0.5 * ALIGNED)
         .filter(|&k| coarse[k] >= coarse[k - 1] && coarse[k] >= coarse[k + 1])
         .map(|k| climb(at(k), grid, &all));
     let mut tried = tried.map(|steps| (aligned(steps, &all), steps));
     let first = tried.find(|(alignment, _)| *alignment > ALIGNED)?;
-    // A neighbour that counts one step more or less on the way up is aligned well too, but not as well.
+    // A neighbouring frequency with one step more or less over the range has a high alignment too, but a lower one.
     let nearby = tried.take_while(|(_, steps)| *steps < 1.5 * first.1);
     let best = nearby.fold(
         first,

@@ -24,7 +24,7 @@ pub fn random_starts(setup: &Setup, n: usize, seed: u64) -> Vec<Vec<f64>> {
         .map(|_| {
             let mut tau = || shortest * (longest / shortest).powf(rng.random::<f64>());
             let tau = [tau(), tau()];
-            // Heads of tanks that are joined, as shares of the measured level: nobody reads them all.
+            // Head differences of coupled tanks, as shares of the measured level: not all of them are measured.
             let mut head = || 0.05_f64 * 40.0_f64.powf(rng.random::<f64>());
             let heads = if setup.structure.plant.joined() {
                 [head(), head()]
@@ -39,7 +39,7 @@ pub fn random_starts(setup: &Setup, n: usize, seed: u64) -> Vec<Vec<f64>> {
 fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     let structure = &setup.structure;
     let scales = &structure.scales;
-    // The output that the others lead into, wherever it stands among them.
+    // The output furthest downstream, whatever its position among the outputs.
     let last = scales.lowest_output();
     let read = scales.outputs[last].vessel;
     let (mut u, mut y, mut uu, mut uy, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -136,7 +136,7 @@ fn joined_tanks(setup: &Setup, (read, mean): (usize, f64), flow: f64, heads: [f6
         _ => mean,
     };
     let outlet = outlet.max(0.05 * mean);
-    // Two levels that are read say the head between them.
+    // Two measured levels determine the head between them.
     let known = [0, 1, 2].map(|vessel| mean_level(setup, vessel));
     let between = |a: usize, b: usize| Some((known[a]? - known[b]?).abs());
     let least = 1e-3 * mean;
@@ -194,7 +194,7 @@ fn first_reading(setup: &Setup, record: &Record, vessel: usize) -> Option<f64> {
     output.present().next()
 }
 
-/// The mean reading of a vessel's level, if it is above zero; `None` where nobody reads it.
+/// The mean reading of a vessel's level, if it is above zero; `None` if it is not measured.
 fn mean_level(setup: &Setup, vessel: usize) -> Option<f64> {
     let output = output_of(setup, vessel)?;
     let outputs = setup.records.iter().map(|record| &record.outputs[output]);

@@ -9,7 +9,7 @@ use crate::{Setup, at_rest, levels_from_readings};
 
 /// The step doubles at most so often, from the sampling interval on.
 const DOUBLINGS: usize = 24;
-/// Levels that move by less than this share of the largest over two steps rest.
+/// Levels are at rest if they change by less than this share of the largest level over two steps.
 const STILL: f64 = 1e-12;
 
 /// The initial states of the first record of a setup at rest under its first inputs \[units of the levels\], for these parameters; `None` where

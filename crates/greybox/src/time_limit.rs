@@ -21,7 +21,7 @@ pub struct TimeLimit {
 }
 
 impl TimeLimit {
-    /// A search that begins now; `None`: it may take as long as it needs.
+    /// A limit for a search that begins now; `None`: without limit.
     #[must_use]
     pub fn new(whole: Option<Duration>) -> Self {
         let limit = Self {

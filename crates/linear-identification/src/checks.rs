@@ -4,7 +4,7 @@ use ct_signals::{Channel, Record};
 
 use crate::{Error, MAX_ORDER, Order};
 
-/// A record that was put together in code.
+/// Checks a record that was built in code.
 pub(crate) fn whole(record: &Record) -> Result<(), Error> {
     record.validate()?;
     for (channels, kind) in [(&record.inputs, "input"), (&record.outputs, "output")] {

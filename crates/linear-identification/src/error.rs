@@ -9,7 +9,7 @@ use crate::{MAX_ORDER, Method, Order, warnings::or_lower};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// No record.
+    /// No record is given.
     #[error("no record is given")]
     NoRecord,
     /// A record without an input or an output.
@@ -28,7 +28,7 @@ pub enum Error {
         /// Requested order.
         order: Order,
     },
-    /// A signal that does not move.
+    /// A signal is constant.
     #[error(
         "{record}: \"{signal}\" stands at {value} throughout, so that nothing can be identified; record at least a step up and a step down"
     )]
@@ -175,7 +175,7 @@ pub enum Error {
         /// What is wrong and the correction.
         what: String,
     },
-    /// Rows are missing, and the fit that says for how long the input may be held failed.
+    /// Rows are missing, and the first fit for the longest hold failed.
     #[error(
         "{record}: rows or samples of the input are missing, and a first fit that says for how long the input may be held failed: {why}; choose a part with --from and --to, or put the record on a coarser grid with --resample"
     )]

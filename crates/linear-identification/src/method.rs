@@ -19,14 +19,15 @@ pub enum Method {
     Fcloe,
     /// Closed-loop output error, recursive
     RecursiveFcloe,
-    /// Refined instruments for white noise; where the reference moves those of a loop, whatever its controller (CLSRIVC)
+    /// Refined instrumental variables for white noise; in a loop with a reference the instruments come from the reference, and no
+    /// controller is needed (CLSRIVC)
     Srivc,
     /// Refined instruments with an autoregressive model of the noise (CLRIVC in a loop)
     Rivc,
 }
 
 impl Method {
-    /// As it is typed.
+    /// Name as typed.
     pub fn id(self) -> &'static str {
         match self {
             Self::StabilizedOe => "stabilized-oe",

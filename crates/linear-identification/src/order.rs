@@ -8,9 +8,9 @@ pub const MAX_ORDER: usize = 4;
 /// n and m, `m <= n`, n from 1 to [`MAX_ORDER`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Order {
-    /// Of A.
+    /// Degree of A.
     pub n: usize,
-    /// Of B.
+    /// Degree of B.
     pub m: usize,
 }
 

@@ -2,7 +2,7 @@
 
 use crate::{DelayChoice, LevelChoice, Method, Order};
 
-/// What may be asked for.
+/// Options of an identification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     /// The method.

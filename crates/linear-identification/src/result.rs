@@ -1,4 +1,4 @@
-//! What was found.
+//! Results of an identification.
 
 use ct_signals::Channel;
 use missing_effect::{MendedGaps, Parameter};
@@ -44,7 +44,7 @@ pub struct Identification {
     pub simulation_rmse: f64,
     /// `100 (1 - simulation_rmse/s)` with the standard deviation s of the output, %.
     pub fit_percent: f64,
-    /// What should be known before it is used.
+    /// Warnings about the use of the model.
     pub warnings: Vec<String>,
     /// The parameters over the record; of a recursion.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -55,7 +55,7 @@ pub struct Identification {
     /// Additional results of SRIVC and RIVC.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refined: Option<Refined>,
-    /// Gain and time constant over the level; nothing where the level stands, or the record is too short to tell.
+    /// Gain and time constant over the level; `None` if the level is constant, or if the record is too short.
     pub drift: Option<Drift>,
     /// Handling of missing rows and samples of the input; `None` if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -36,7 +36,7 @@ pub(crate) fn worse_than_first_order(
     ))
 }
 
-/// A highest coefficient that may as well be 0 says that the order is too high.
+/// A highest coefficient that is not significantly different from 0 means that the order is too high.
 pub(crate) fn doubtful(parameters: &[Parameter], order: Order) -> Vec<String> {
     let mut highest = Vec::new();
     if let Some(lower) = order.lower() {

@@ -1,4 +1,4 @@
-//! The dual method: rows enter the active set, and those that are in their way leave it.
+//! Dual active-set method: rows enter the active set, and rows that block a step leave it.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -18,7 +18,7 @@ pub(super) struct Search<'a, const P: usize, const N: usize> {
     /// `sqrt(P_ii)`
     spread: SVector<f64, P>,
     active: [Active; P],
-    /// How many rows are active.
+    /// Number of active rows.
     count: usize,
     /// `Q`, by columns.
     q: [SVector<f64, P>; P],
@@ -92,7 +92,7 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
                 z -= q * part;
             }
             left = z.norm_squared();
-            // once more where much has gone, so that rounding is no part of what is left
+            // repeat the projection after strong cancellation, so that rounding errors do not dominate
             let again = left < 0.01 * before && left > DEPENDENT * DEPENDENT;
             if !again {
                 return (h, z, left);

@@ -300,7 +300,7 @@ fn unbounded() -> About {
     }
 }
 
-/// Exchanges the places of flows that are outputs, so that they stand in the order of the outputs: a text has one order.
+/// Sorts the flows that are outputs in the order of the outputs: a text has a single order.
 fn outputs_in_order(spec: &mut ModelSpec) {
     let flow = |output: &Output| match output.variable {
         Variable::Flow(i) => Some(i),
@@ -340,7 +340,7 @@ fn outputs_in_order(spec: &mut ModelSpec) {
     }
 }
 
-/// A parameter that others define stays one only where all of these do not change with time.
+/// A parameter that depends on others stays a parameter only if none of them changes with time.
 fn of_parameters_still(spec: &mut ModelSpec) {
     for i in spec.order.clone() {
         let mut still = spec.flows[i].of_parameters;

@@ -22,7 +22,7 @@ pub struct EffectParameter {
     pub name: String,
     /// Name of the parameter in the effect: `tau`.
     pub short: String,
-    /// Its unit.
+    /// Unit of the parameter.
     pub unit: String,
     /// Description of the parameter.
     pub description: String,
@@ -39,13 +39,13 @@ pub struct EffectParameter {
 /// An effect at a port of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// Its identifier: `lag(u)`, `varies_with(k,T)`, or the name of an own candidate.
+    /// Identifier of the effect: `lag(u)`, `varies_with(k,T)`, or the name of a user's own candidate.
     pub id: String,
     /// Port at which the effect acts.
     pub port: Port,
     /// The effect; `None` for a candidate of the model file.
     pub effect: Option<&'static Effect>,
-    /// Its parameters.
+    /// Parameters of the effect.
     pub parameters: Vec<EffectParameter>,
     /// Numbers of the record that the effect's equations contain, by their names in its text ([`Effect::record_numbers`]). If they are
     /// passed to [`candidates_keeping`], the effect means the same for another record.
@@ -59,7 +59,7 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// [`Candidate::record_numbers`] as results keep them.
+    /// [`Candidate::record_numbers`] in the form of the results.
     #[must_use]
     pub fn numbers_of_record(&self) -> BTreeMap<String, f64> {
         let all = self.record_numbers.iter();

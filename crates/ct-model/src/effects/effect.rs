@@ -39,13 +39,13 @@ pub enum Place {
 /// Role of an effect's parameter in a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// At its absent value the effect is not there, and the outputs have a derivative by it (from one side where a bound is there).
+    /// At the absent value the effect vanishes, and the outputs have a derivative with respect to the parameter (one-sided at a bound).
     Size,
     /// The parameter states when, where or how fast the effect acts. No output depends on it while the size of the effect is zero. A grid
     /// of starts covers it.
     Shape,
-    /// At its absent value the effect is not there, but the outputs have no derivative by it there: a limit at the edge of what was
-    /// visited, a step of a converter. A grid of starts covers it.
+    /// At the absent value the effect vanishes, but the outputs have no derivative with respect to the parameter there: a limit at the edge
+    /// of the visited range, a quantisation step. A grid of starts is used.
     Threshold,
     /// The parameter takes one of its start values and no value in between: upper or lower. It is not fitted.
     Choice,
@@ -81,15 +81,15 @@ pub enum Starts {
 /// stand for those of the signal, of the parameter or flow, of the time and of the equation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
-    /// Its name: `lag`.
+    /// Name of the effect: `lag`.
     pub id: &'static str,
     /// Where it acts.
     pub place: Place,
-    /// Its text.
+    /// Model text of the effect.
     pub text: &'static str,
     /// Role and starts of the parameters.
     pub parameters: &'static [(&'static str, Role, Starts)],
-    /// Its physics in a sentence.
+    /// Physics of the effect in a sentence.
     pub physics: &'static str,
     /// Effects that leave similar traces, as `name(port)`.
     pub confused_with: &'static [&'static str],

@@ -72,7 +72,7 @@ pub(super) fn instance(
         flows: Vec::new(),
         action: Action::Add(Vec::new()),
     };
-    // Parameters first, then the constants that equations use; a pure number stands where it is used.
+    // Parameters first, then the constants of the equations; a pure number is written into its expression.
     let mut own: Vec<Expression> = small.parameters.iter().map(|p| signed(p.value)).collect();
     for constants in [false, true] {
         for (i, parameter) in small.parameters.iter().enumerate() {
@@ -90,7 +90,7 @@ pub(super) fn instance(
             }
         }
     }
-    // The right-hand side is a flow of its own, after those of the effect.
+    // The right-hand side becomes an additional flow after the flows of the effect.
     let rate = Variable::Flow(counts.flows + small.flows.len());
     let of = |variable: Variable| match variable {
         Variable::Parameter(i) => own[i].clone(),

@@ -44,7 +44,7 @@ pub struct OwnParameter {
 /// A state of a candidate.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OwnState {
-    /// Its unit; empty where none is given.
+    /// Unit of the state; empty if none is given.
     pub unit: String,
     /// Start value of the initial state.
     pub start: f64,

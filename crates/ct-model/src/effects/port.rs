@@ -20,9 +20,9 @@ pub enum Port {
     Between(usize, usize),
     /// An input, and the equation of a state.
     InputAndBalance(usize, usize),
-    /// The equation of a state, and another variable that takes part.
+    /// The equation of a state, and another variable in the effect.
     BalanceAnd(usize, Variable),
-    /// An output, and another variable that takes part.
+    /// An output, and another variable in the effect.
     OutputAnd(usize, Variable),
     /// Several places: a candidate of the model file.
     Own,
@@ -31,7 +31,8 @@ pub enum Port {
 /// Parts of a model that have ports.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ports {
-    /// Inputs, outputs and the equations of states that are balances: not those that only say that one state is another's speed.
+    /// Inputs, outputs and the balance equations of states. An equation that only defines a velocity as the derivative of a position is not
+    /// a balance.
     pub single: Vec<Port>,
     /// Parameters that are fitted, and named flows that no fitted parameter scales alone.
     pub values: Vec<Port>,
@@ -63,7 +64,7 @@ impl Port {
 }
 
 impl ModelSpec {
-    /// Its ports.
+    /// Ports of the model.
     #[must_use]
     pub fn ports(&self) -> Ports {
         let inputs = (0..self.inputs.len()).map(Port::Input);
@@ -93,7 +94,8 @@ impl ModelSpec {
         }
     }
 
-    /// An expression, or what a flow that stands alone is equal to: of an output that shows a state that state.
+    /// Resolves an expression that is a single flow to the definition of the flow; for an output that equals a state, the result is that
+    /// state.
     #[must_use]
     pub fn behind<'a>(&'a self, mut expression: &'a Expression) -> &'a Expression {
         // Flows are sorted: no circle.

@@ -186,7 +186,7 @@ mod tests {
     }
 
     proptest! {
-        /// The quotient measures what it stands for, no symbol stands in it twice, and it times the divisor is what was divided.
+        /// The quotient has the right dimension, contains no symbol twice, and its product with the divisor is the dividend.
         #[test]
         fn a_quotient_is_one_and_is_reduced(a in unit(), b in unit()) {
             let found = quotient(&a, &b);

@@ -7,7 +7,7 @@ use crate::expression::Variable;
 use crate::simulation::{Model, NoSolution, Simulation};
 use crate::spec::{ModelSpec, Output};
 
-/// Quantiles that are kept of a signal, at equal distances.
+/// Number of stored quantiles of a signal, at equal distances.
 const QUANTILES: usize = 101;
 
 /// Range of the values of a variable, in its unit.
@@ -54,7 +54,7 @@ impl Span {
         }
     }
 
-    /// The value below which this share of all lies.
+    /// The quantile for this share.
     #[must_use]
     pub fn quantile(&self, share: f64) -> f64 {
         let Some(last) = self.quantiles.len().checked_sub(1) else {
@@ -187,7 +187,7 @@ impl Visited {
         })
     }
 
-    /// The range of another record beside that of this one.
+    /// Joins the range of another record to this one.
     pub fn join(&mut self, other: &Self) {
         for (variable, span) in &other.spans {
             let joined = self.spans.get(variable).map(|own| own.joined(span));

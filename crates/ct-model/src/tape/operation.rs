@@ -34,7 +34,7 @@ pub(super) enum Operation {
     Copy(Register),
 }
 
-/// `f(a)` of this value and slope. Where the slope is infinite, as that of a root at zero, it is left out: there a limit holds the argument.
+/// `f(a)` from this value and slope. An infinite slope, such as that of a root at zero, is set to zero: a limit keeps the argument there.
 fn slope<T: Scalar>(a: T, value: f64, slope: f64) -> T {
     T::with_slopes(value, [(a, if slope.is_infinite() { 0.0 } else { slope })])
 }

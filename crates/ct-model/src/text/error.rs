@@ -21,7 +21,7 @@ pub struct TextError {
     pub source_line: String,
 }
 
-/// Longest piece of the source that a message shows \[characters\].
+/// Longest quotation of the source in a message \[characters\].
 const LONGEST: usize = 60;
 
 impl TextError {

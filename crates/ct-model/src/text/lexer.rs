@@ -15,7 +15,7 @@ pub(crate) enum Word {
     End,
 }
 
-/// A word and where it stands \[bytes\].
+/// A word and its position \[bytes\].
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Token {
     pub(crate) word: Word,

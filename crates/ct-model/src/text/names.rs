@@ -12,7 +12,7 @@ use crate::spec::ModelSpec;
 /// Names that a variable cannot have.
 const RESERVED: [&str; 6] = ["time", "delay", "noEvent", "smooth", "Real", "der"];
 
-/// Whether a name has a meaning of its own.
+/// Whether a name is reserved.
 pub(crate) fn is_reserved(name: &str) -> bool {
     RESERVED.contains(&name) || Function::ALL.iter().any(|f| f.name() == name)
 }

@@ -52,12 +52,12 @@ pub(crate) fn parse(text: &str) -> Result<Syntax, TextError> {
     .model()
 }
 
-/// An expression that stands alone.
+/// Parses a single expression.
 pub(crate) fn parse_expression(text: &str) -> Result<Node, TextError> {
     parse_part(text, |parser| parser.expression())
 }
 
-/// An equation that stands alone, with or without its `;`.
+/// Parses a single equation, with or without its `;`.
 pub(crate) fn parse_equation(text: &str) -> Result<Equation, TextError> {
     parse_part(text, |parser| {
         let (left, right) = parser.sides()?;
@@ -139,7 +139,7 @@ impl Parser<'_> {
         Err(TextError::at(self.text, self.from(), what))
     }
 
-    /// The word that stands here does not belong here.
+    /// Error: the present word is not allowed here.
     fn unexpected<T>(&self, wanted: &str) -> Result<T, TextError> {
         let found = match self.word() {
             Word::End => "the end of the text".to_string(),

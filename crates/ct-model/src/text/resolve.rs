@@ -68,7 +68,7 @@ struct Builder<'a> {
 }
 
 impl ModelSpec {
-    /// The flows that each flow needs; a delayed one too, as its present value goes into the delay.
+    /// For each flow, the flows that it depends on; a delay depends on the present value of its argument.
     fn needs(&self) -> Vec<Vec<usize>> {
         let of = |flow: &Flow| {
             let mut needed = Vec::new();
@@ -94,9 +94,9 @@ impl ModelSpec {
 /// Kinds of variables that an expression may contain.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Holds {
-    /// Numbers and parameters that stand before it; these are not used by it.
+    /// Constants and earlier parameters; the parameters do not count as used.
     Numbers,
-    /// Numbers and parameters that stand before it.
+    /// Constants and earlier parameters.
     Parameters,
     Everything,
 }

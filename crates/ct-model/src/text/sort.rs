@@ -1,6 +1,6 @@
 //! An order in which assignments can be computed.
 
-/// An order in which each comes after what it needs, the first of the text first; or a circle.
+/// A topological order that keeps the order of the text where possible; or a cycle.
 pub(super) fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
     #[derive(Clone, Copy, PartialEq)]
     enum Mark {

@@ -83,7 +83,7 @@ pub(crate) struct Equation {
     pub(crate) right: Node,
 }
 
-/// A model as it stands.
+/// Syntax of a model.
 #[derive(Debug, Clone)]
 pub(crate) struct Syntax {
     pub(crate) name: String,

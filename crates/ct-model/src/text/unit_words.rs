@@ -6,7 +6,7 @@ use super::error::{TextError, shown};
 use super::parser;
 use super::syntax::Attribute;
 
-/// Units that are known as words beside those that are converted. Prefixes of the SI may stand before them.
+/// Units that are known as words, in addition to those that can be converted. SI prefixes are allowed.
 const OTHER: [&str; 33] = [
     "H", "S", "T", "Wb", "F", "C", "cd", "lm", "lx", "Bq", "Gy", "Sv", "kat", "sr", "dB", "B",
     "pH", "mmHg", "inHg", "Torr", "torr", "mmH2O", "inH2O", "mH2O", "cal", "BTU", "Btu", "eV", "M",

@@ -191,7 +191,7 @@ fn description(text: &str) -> String {
 }
 
 impl ModelSpec {
-    /// States and flows in an order that keeps that of the states, that of the flows and that of the outputs.
+    /// States and flows in an order that is consistent with the orders of states, flows and outputs.
     fn declared(&self) -> Vec<Variable> {
         let states = (0..self.states.len()).map(Variable::State);
         let of_time = |i: &usize| !self.flows[*i].of_parameters;

@@ -1,4 +1,4 @@
-//! Cells of a CSV file: numbers, and what stands there where a sample is missing.
+//! Cells of a CSV file: numbers, and marks of missing samples.
 
 use super::place::Place;
 use crate::{Error, TimestampError, quoted};
@@ -51,7 +51,7 @@ const MISSING: &[&str] = &[
 /// Words that are meant only where another follows.
 const BEGINNINGS: &[&str] = &["no", "scan", "i/o", "comm", "under", "over", "calc", "pt"];
 
-/// Whether a cell says that its sample is missing.
+/// Whether a cell marks a missing sample.
 pub(crate) fn says_missing(cell: &str) -> bool {
     if cell.is_empty() {
         return true;

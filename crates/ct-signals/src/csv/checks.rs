@@ -216,7 +216,7 @@ pub(super) fn rounded(value: f64) -> f64 {
     format!("{value:.9e}").parse().unwrap_or(value)
 }
 
-/// The value of a signal that stays the same to a part in a billion, missing samples aside.
+/// The value of a signal that is constant to a part in a billion, without missing samples.
 pub(crate) fn constant(values: &[f64]) -> Option<f64> {
     let first = *values.iter().find(|value| !value.is_nan())?;
     values

@@ -43,7 +43,7 @@ pub struct ReadOptions {
     pub to: Option<String>,
     /// Refuses missing samples and missing rows.
     pub strict: bool,
-    /// The record is put on an even grid of this interval \[s\]; `None`: it stays as it was sampled.
+    /// Interval of the even grid for resampling \[s\]; `None`: the record keeps its sampling.
     pub resample: Option<f64>,
 }
 

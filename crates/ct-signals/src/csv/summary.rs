@@ -11,7 +11,7 @@ use crate::{Calendar, duration};
 pub struct MissingSamples {
     /// The column's name.
     pub column: String,
-    /// How many.
+    /// Number of samples.
     pub samples: usize,
     /// Contents of the cells with missing samples, with the number of each; empty text for an empty cell.
     pub words: Vec<(String, usize)>,
@@ -63,7 +63,7 @@ pub struct ReadSummary {
 }
 
 impl ReadSummary {
-    /// Whether the file was read as it stands: nothing was missing, left out or converted.
+    /// Whether the file was read unchanged: no sample was missing, left out or converted.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.outside == 0

@@ -146,13 +146,13 @@ pub(super) fn read_table(
     }
 }
 
-/// Whether a row below the header holds units: words alone, and none that says that a sample is missing.
+/// Whether a row below the header contains units: words only, and no mark of a missing sample.
 fn is_row_of_units(row: &StringRecord) -> bool {
     let says = |cell: &str| !cell.is_empty() && cell != "-" && says_missing(cell);
     row.iter().all(is_word) && !row.iter().any(says)
 }
 
-/// Counts what stands in a cell whose sample is missing: the first words that occur by themselves, the others together.
+/// Counts the contents of cells with missing samples: the first different words separately, the others together.
 fn count_word(words: &mut Vec<(String, usize)>, cell: &str) {
     const MOST: usize = 6;
     const LONGEST: usize = 24;

@@ -25,7 +25,7 @@ pub enum BadLine {
         /// The column's header.
         column: String,
     },
-    /// A cell that says that its sample is missing.
+    /// The cell marks a missing sample.
     #[error("column \"{column}\": \"{text}\" stands for a missing sample")]
     Missing {
         /// The column's header.
@@ -57,7 +57,7 @@ pub enum BadLine {
         /// Why.
         error: Box<TimestampError>,
     },
-    /// A cell that holds no number.
+    /// The cell contains no number.
     #[error("column \"{column}\": \"{text}\" is not a number; {mend}")]
     Text {
         /// The column's header.

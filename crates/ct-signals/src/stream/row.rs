@@ -121,7 +121,7 @@ impl Rows {
         })
     }
 
-    /// The time of a row \[s\]; the first one says how times are written.
+    /// The time of a row \[s\]; the first row determines the format.
     fn time(&mut self, cell: &str) -> Result<f64, CellFault> {
         if let Some(times) = &mut self.times {
             return times.read(cell, &mut self.numbers);

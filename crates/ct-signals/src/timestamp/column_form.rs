@@ -37,7 +37,7 @@ pub(super) fn find_form<'a>(
     }
 }
 
-/// The message that asks for a format, with the two that fit.
+/// The message that requests a format, with the two possible formats.
 pub(super) fn undecided(cell: &str, form: &Form) -> TimestampError {
     let separator = match form.date {
         DateForm::Undecided(separator) => char::from(separator),

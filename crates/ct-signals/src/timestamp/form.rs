@@ -1,4 +1,4 @@
-//! How the dates of a column are written, and what one cell says.
+//! Formats of dates in a column, and the reading of a cell.
 //!
 //! A [`Form`] holds what must be the same in all cells: the order and the separator of the date, and whether an offset follows. Whether
 //! a cell has a time, seconds and a fraction may differ from row to row: many programs leave out what is zero.
@@ -31,7 +31,7 @@ pub(super) enum DateForm {
     Undecided(u8),
     /// `31-Jan-2026`
     MonthName(u8),
-    /// No date: `14:25:00`
+    /// Time without a date: `14:25:00`
     TimeOnly,
 }
 
@@ -54,7 +54,7 @@ pub(super) struct Fields {
 pub(super) enum Fault {
     /// The cell has another format.
     Form,
-    /// There is no such date or time.
+    /// The date or time does not exist.
     Range,
 }
 
@@ -235,7 +235,7 @@ impl Form {
     }
 }
 
-/// Seconds ahead of UTC that a text such as `+01:00`, `-0330`, `+01` or `Z` says.
+/// Seconds ahead of UTC for a text such as `+01:00`, `-0330`, `+01` or `Z`.
 pub(super) fn offset(text: &str) -> Option<i32> {
     let mut scan = Scanner {
         bytes: text.as_bytes(),

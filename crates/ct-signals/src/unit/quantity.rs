@@ -49,7 +49,7 @@ impl Conversion {
         self.factor * value + self.offset
     }
 
-    /// Whether values stay as they are.
+    /// Whether the conversion does not change values.
     #[must_use]
     pub fn is_identity(&self) -> bool {
         self.factor == 1.0 && self.offset == 0.0
@@ -119,7 +119,7 @@ impl Unit {
         if self.dimension != other.dimension || !angles {
             return None;
         }
-        // Fractions are kept to the end, so that 1000 is 1000 and 32 is 32.
+        // Exact fractions are used to the end, so that 1000 is exactly 1000 and 32 exactly 32.
         let factor = (self.size.0 * other.size.1) / (self.size.1 * other.size.0);
         let zeros = self.zero.0 * other.zero.1 - other.zero.0 * self.zero.1;
         let offset = zeros * other.size.1 / (self.zero.1 * other.zero.1 * other.size.0);
@@ -165,10 +165,10 @@ impl Unit {
     }
 }
 
-/// What is left of a unit's text.
+/// The part of a unit's text that is not read yet.
 struct Parser<'a> {
     rest: &'a str,
-    /// Whether this is within brackets, where there are no further ones.
+    /// Whether the parser is inside brackets; nested brackets are not allowed.
     bracketed: bool,
 }
 

@@ -8,7 +8,7 @@ pub(super) fn links(_: &Metadata) -> u64 {
     1
 }
 
-/// Gives a file what another has beside its content.
+/// Copies the metadata of a file to another file.
 pub(super) fn copy(_: &File, old: &Metadata, new: &File) -> io::Result<()> {
     new.set_permissions(old.permissions())
 }

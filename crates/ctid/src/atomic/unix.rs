@@ -9,7 +9,7 @@ pub(super) fn links(metadata: &Metadata) -> u64 {
     metadata.nlink()
 }
 
-/// Gives a file what another has beside its content.
+/// Copies the metadata of a file to another file.
 ///
 /// # Errors
 /// Where the user may not, as with the owner of a file of somebody else.

@@ -36,17 +36,17 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Fit the model and show it over the measurements, and where it fails
+    /// Fit the model, plot it against the measurements, and show where it fails
     Compare(Compare),
-    /// Find the missing effect: score the catalogue, confirm by refit, say what the data can tell
+    /// Find the missing effect: score the catalogue, confirm by refit, report what the data can show
     Diagnose(Diagnose),
     /// Add an effect to a model file; comments and layout stay
     Add(Add),
     /// Remove an effect from a model file; comments and layout stay
     Remove(Remove),
-    /// List the catalogue of effects, or say all about one
+    /// List the catalogue of effects, or describe one
     Effects(Effects),
-    /// Read a model in Modelica and say what it holds: states, inputs, outputs, parameters, units that do not fit
+    /// Read a model in Modelica and summarise it: states, inputs, outputs, parameters, inconsistent units
     Check(Check),
     /// Simulate a model on new inputs, with a 95 % band where it is fitted to records first
     Simulate(Simulate),
@@ -234,7 +234,7 @@ pub(crate) fn finish(
     failed
 }
 
-/// Writes text; a reader that has seen enough and gone is no error.
+/// Writes text; a reader that has closed the pipe is no error.
 pub(crate) fn say(out: &mut dyn Write, text: &str) -> Result<(), Error> {
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),

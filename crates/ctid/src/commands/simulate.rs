@@ -33,7 +33,7 @@ pub(super) struct Simulate {
     /// Write the result as JSON
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
-    /// Fit the model to these records first; without it a model of your own takes the values of its text, without a band
+    /// Fit the model to these records first; without this option your own model uses the values of its text, and there is no band
     #[arg(long, value_name = "DATA.csv", num_args = 1..)]
     fit: Vec<PathBuf>,
     /// Leave out rows of the records of --fit before this; --from and --to are of the inputs

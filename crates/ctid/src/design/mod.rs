@@ -51,7 +51,7 @@ pub struct Arguments {
     /// Seed of the random sequences
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
-    /// Limit on the time of the search; the result says what it left out
+    /// Limit on the time of the search; the result lists the steps that were left out
     #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
     effort: EffortLevel,
     /// Where the experiment goes as CSV, if one is worth applying; without it next.csv, or next-2.csv where that is there

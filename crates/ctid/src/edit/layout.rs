@@ -4,7 +4,7 @@ use toml_edit::{Array, DocumentMut, Item, Table, Value, value};
 
 use crate::Error;
 
-/// The text as a document that keeps its layout; `file` names it in messages.
+/// The text as a document with its layout; `file` is its name in messages.
 pub(crate) fn document(file: &str, text: &str) -> Result<DocumentMut, Error> {
     text.parse()
         .map_err(|error: toml_edit::TomlError| Error::File {

@@ -101,7 +101,7 @@ pub(crate) fn change(
     for _ in 0..READINGS {
         let text = model_file::read_text(path)?;
         let edited = edit(&text)?;
-        // The editor writes LF; a file from an editor that writes CRLF keeps it.
+        // The editor writes LF; a file with CRLF keeps CRLF.
         let written = if text.contains("\r\n") {
             edited.text.replace("\r\n", "\n").replace('\n', "\r\n")
         } else {
@@ -233,7 +233,7 @@ pub(crate) fn with_column(
     {
         _ if column.is_empty() => drop(table.remove(signal)),
         Some(said) => {
-            // A comment after it stays.
+            // A comment after the value stays.
             let decor = said.decor().clone();
             *said = column.into();
             *said.decor_mut() = decor;
@@ -251,7 +251,7 @@ fn has_table(document: &DocumentMut, name: &str) -> bool {
         .is_some_and(|terms| terms.contains_key(name))
 }
 
-/// The text of a model file without an effect or a term; its `[effect.X]` table stays for another day.
+/// The text of a model file without an effect or a term; its `[effect.X]` table is kept for later use.
 ///
 /// # Errors
 /// As [`remove`].

@@ -254,7 +254,7 @@ fn set(table: &mut dyn toml_edit::TableLike, key: &str, mut item: Item) {
     table.insert(key, item);
 }
 
-/// The text of a model file without an effect; its `[effect."..."]` table stays for another day.
+/// The text of a model file without an effect; its `[effect."..."]` table is kept for later use.
 ///
 /// # Errors
 /// Where it is not on.

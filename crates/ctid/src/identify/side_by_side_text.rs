@@ -41,7 +41,7 @@ pub(crate) fn measure(found: &SideBySide) -> String {
     )
 }
 
-/// The methods that found something.
+/// The methods with a result.
 pub(crate) fn with_results(found: &SideBySide) -> impl Iterator<Item = (&Row, &Outcome)> {
     let rows = found.methods.iter();
     rows.filter_map(|row| row.found.as_ref().map(|outcome| (row, outcome)))

@@ -137,7 +137,7 @@ pub(super) fn check_units(pumps: usize, records: &[Record], test: &[Record]) -> 
     Ok(())
 }
 
-/// Some fitted record has an input that moves; those beside it, and held-out ones, may be at rest.
+/// At least one fitted record has an input that changes; the other records may be at rest.
 pub(super) fn check_movement(records: &[Record]) -> Result<(), Error> {
     let mut still = records.iter().map(Record::require_moving_input);
     match records.first() {

@@ -14,7 +14,7 @@ use missing_effect::Problem;
 
 use crate::numbers;
 
-/// A command has moved where it is this part of its whole range away from where it stood.
+/// A command has changed if its distance from the previous constant value is this share of its whole range.
 const MOVE: f64 = 0.1;
 
 /// The range of white noise of up to 100 000 samples is below this many medians of its first differences.
@@ -36,14 +36,14 @@ pub enum ExcitationWarning {
     },
     /// All fitted records together contain one step of the command.
     SingleStep {
-        /// The record that holds it.
+        /// The record with the step.
         record: String,
         /// Commands before and after it.
         levels: (f64, f64),
         /// Unit of the command.
         unit: String,
     },
-    /// An output of a record shows no influence of its command.
+    /// An output of a record does not respond to the command.
     NoAnswer {
         /// The record.
         record: String,
@@ -140,7 +140,7 @@ pub(crate) fn of_records<'a>(
     warnings
 }
 
-/// The one step of the command, where all records hold no more; a second command that moves is more.
+/// The single step of the command, if all records together contain no other change.
 fn single_step<'a>(records: impl Iterator<Item = &'a Record> + Clone) -> Option<ExcitationWarning> {
     let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
     let (low, high) = records.clone().map(Record::input_range).reduce(wider)?;
@@ -170,7 +170,7 @@ fn single_step<'a>(records: impl Iterator<Item = &'a Record> + Clone) -> Option<
     found
 }
 
-/// The moves of a signal by more than `least`: from where it stood, to where it went.
+/// The changes of a signal by more than `least`: value before and after.
 fn moves(signal: &Channel, least: f64) -> Vec<(f64, f64)> {
     let mut moves = Vec::new();
     let mut values = signal.present();
@@ -186,7 +186,7 @@ fn moves(signal: &Channel, least: f64) -> Vec<(f64, f64)> {
     moves
 }
 
-/// Range of an output and median of its first differences, where it does not answer to the command.
+/// Range of an output and median of its first differences, if the output does not respond to the command.
 fn no_answer(record: &Record, output: &Channel) -> Option<(f64, f64)> {
     let (low, high) = output.range();
     let (input, output) = (&record.inputs[0].interpolated(), &output.values);
@@ -359,7 +359,7 @@ mod tests {
         };
         let once = record("a.csv", 30.0, 20.0, 1, &single);
         assert_eq!(warnings(std::slice::from_ref(&once)), [expected]);
-        // A measured command has noise of its own.
+        // A measured command contains noise.
         let measured: Vec<f64> = single
             .iter()
             .zip(noise::white(400, 0.005, &mut ChaCha8Rng::seed_from_u64(7)))

@@ -57,7 +57,7 @@ pub struct ReadArguments {
     /// Refuse missing samples and missing rows
     #[arg(long)]
     strict: bool,
-    /// Put the records on an even grid of this interval [s]
+    /// Resample the records on an even grid of this interval [s]
     #[arg(long, value_name = "S", value_parser = interval, allow_negative_numbers = true)]
     resample: Option<f64>,
 }

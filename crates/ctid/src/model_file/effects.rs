@@ -71,7 +71,7 @@ impl Source<'_> {
         Ok(settings)
     }
 
-    /// The `[term.X]` tables, and whether each is kept as it stands; one that is not on is checked too.
+    /// The `[term.X]` tables, and whether each term is in the model; a term that is not in the model is checked too.
     pub(super) fn terms(
         &self,
         (plant, known): (Plant, &Known),

@@ -63,7 +63,7 @@ pub struct ModelFile {
     pub known: Known,
     /// First guesses by name, as [`Structure::parameter_names`] writes it: `alpha`, `overflow.rim`.
     pub start: BTreeMap<String, f64>,
-    /// Names of the parameters that stay at their value in `start`.
+    /// Names of the parameters that keep their value in `start`.
     pub fixed: Vec<String>,
     /// Prior knowledge of parameters, by the same names.
     pub priors: BTreeMap<String, PriorValue>,
@@ -75,7 +75,7 @@ pub struct ModelFile {
     pub waiting: Vec<String>,
 }
 
-/// A term of the user's own, and the units that it is written in; empty where the file does not say.
+/// A user's own term, and its units; empty if the file does not give them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnTerm {
     /// The term.
@@ -87,7 +87,7 @@ pub struct OwnTerm {
 }
 
 impl ModelFile {
-    /// The domain of the model, as far as its own text says the output's unit.
+    /// The domain of the model, derived from the output's unit.
     #[must_use]
     pub fn domain(&self) -> Domain {
         Domain::of(self.plant, self.columns.output_unit())

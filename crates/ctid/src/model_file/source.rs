@@ -1,4 +1,4 @@
-//! The file being read: what is wrong in it is said with its line.
+//! The file being read: errors contain their line.
 
 mod known;
 
@@ -10,7 +10,7 @@ use self::known::disturbed;
 use super::raw::Number;
 use crate::{Error, names};
 
-/// The file being read: it knows its lines.
+/// The file being read, with its line numbers.
 pub(crate) struct Source<'a> {
     pub(crate) file: &'a str,
     pub(crate) text: &'a str,
@@ -54,7 +54,7 @@ impl Source<'_> {
                 names::suggestion(written, known.iter().copied())
             );
         } else if let Some((_, rest)) = what.split_once("unknown variant `") {
-            // The only key that takes one of some words without being looked at afterwards.
+            // The only key with a fixed list of words that is not checked later.
             let word = rest.split('`').next().unwrap_or_default();
             what = format!(
                 "hold = \"{}\" is not known; write hold = \"zero\" (the command is held between rows) or hold = \"first\" (a straight line between rows)",
@@ -71,7 +71,7 @@ impl Source<'_> {
         } else if let Some(mend) = number_with_more(self.line(error)) {
             what = format!("numbers without a unit and with a decimal point: {mend}");
         } else if toml::from_str::<toml::Table>(self.text).is_err() {
-            // what is wrong is the writing, not what it says
+            // the notation is wrong, not the content
             what += "; write `key = value`, words in quotes, numbers without quotes and without a unit, each key once";
         }
         let Some(span) = error.span() else {

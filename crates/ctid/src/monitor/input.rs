@@ -84,7 +84,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// The row that was read last, and why it lacks the first reading that it lacks, where the line says so.
+    /// The last row, and the reason for its first missing reading, if the line gives one.
     fn readings(&self, time: f64) -> (Row, Option<BadLine>) {
         let mut row = Row::with_inputs(time, &[], &[]);
         let mut bad = None;
@@ -127,7 +127,7 @@ impl<'a> Session<'a> {
             _ => return Ok(false),
         };
         rows.go_on(known);
-        // Who does not say a unit does not change it.
+        // A file without a unit does not change the unit.
         let pairs = known.units().zip(rows.units());
         for (before, now) in pairs {
             if !now.is_empty() && !before.is_empty() && now != before {
@@ -157,7 +157,7 @@ impl<'a> Session<'a> {
         rows.map_or(String::new(), |rows| quoted(rows.name("time", 0)))
     }
 
-    /// A row; `bad`: why it lacks a reading, where the line says so.
+    /// Processes a row; `bad`: the reason for a missing reading, if the line gives one.
     fn row(&mut self, row: &Row, bad: Option<BadLine>) -> Result<(), Halt> {
         if self.restored
             && self.taken == 0

@@ -3,12 +3,12 @@
 
 use ct_signals::LONGEST_LINE;
 
-/// A line, or what is left of one that is too long.
+/// A line, or the rest of a line that is too long.
 #[derive(Debug, PartialEq)]
 pub(super) enum Cut<'a> {
     /// A line without its end.
     Line(&'a [u8]),
-    /// Longer than [`LONGEST_LINE`]; said once, when its end has come.
+    /// Longer than [`LONGEST_LINE`]; reported once, at the end of the line.
     TooLong,
 }
 

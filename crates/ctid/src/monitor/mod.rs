@@ -29,13 +29,13 @@ use trouble::Trouble;
 
 /// Name of the source of the rows in messages.
 const INPUT: &str = "standard input";
-/// What may be typed.
+/// Command line options.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Model file
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
-    /// Keep the state in this file: it is read at the start where it is there, and saved every minute and at the end
+    /// Keep the state in this file: it is read at the start if it exists, and saved every minute and at the end
     #[arg(long, value_name = "FILE")]
     state: Option<PathBuf>,
     /// Write the estimates with their band as JSON lines too, between the alarms
@@ -164,7 +164,7 @@ struct Session<'a> {
     trouble: Trouble,
     /// The rows' way to write times has been looked at.
     timed: bool,
-    /// Rows that a restored monitor has seen before, at the beginning.
+    /// Rows at the beginning that the restored monitor has already processed.
     seen_before: u64,
     taken: u64,
     screen: Screen,

@@ -141,7 +141,7 @@ impl Session<'_> {
         )
     }
 
-    /// Says where the parameters are, when it is time.
+    /// Prints the estimates of the parameters at the requested interval.
     pub(super) fn estimate(&mut self, time: f64) -> Result<(), Halt> {
         let Some(time_constant) = self.monitor.time_constant() else {
             return Ok(());

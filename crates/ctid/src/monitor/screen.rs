@@ -70,7 +70,7 @@ impl Screen {
         self.signals = outputs.into_iter().map(signal).collect();
     }
 
-    /// A line; whoever has closed standard error does not miss it.
+    /// Writes a line; a closed standard error is no error.
     pub(super) fn say(&mut self, text: &str) {
         self.clear();
         let _ = writeln!(io::stderr(), "{text}");

@@ -23,7 +23,7 @@ pub(super) enum Event {
     Stop,
 }
 
-/// Reads standard input in a thread of its own, so that a wish to stop is heard while no row comes.
+/// Reads standard input in a separate thread, so that a stop request is handled while no row comes.
 pub(super) fn open() -> Result<Receiver<Event>, Error> {
     let (sender, receiver) = sync_channel(WAITING);
     let stop = sender.clone();

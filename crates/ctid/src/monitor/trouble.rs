@@ -8,7 +8,7 @@ const FORGOTTEN: u64 = 1000;
 /// Counts bad rows.
 #[derive(Default)]
 pub(super) struct Trouble {
-    /// All of them.
+    /// Number of bad rows.
     pub bad: u64,
     recent: u64,
     good: u64,

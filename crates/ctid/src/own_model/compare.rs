@@ -209,7 +209,7 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
     })
 }
 
-/// Entries that the records do not determine: alone, or pairs of which they tell one combination only.
+/// Parameters that the records do not determine: single ones, or pairs of which only a combination is determined.
 fn not_determined(setup: &ModelSetup, fit: &Fit) -> Vec<Vec<String>> {
     let names = setup.names();
     let mut found = Vec::new();
@@ -249,7 +249,7 @@ mod tests {
     use crate::look::Look;
     use crate::own_model::{AnyModelFile, said};
 
-    /// A limit that has passed leaves a fit, and it is said in a line that it was cut short.
+    /// A time limit that has passed still gives a fit, and one line reports that it was cut short.
     #[test]
     fn the_limit_on_the_time_is_kept_and_said() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/models");

@@ -19,7 +19,7 @@ use crate::output::Found;
 use crate::simulate::{cell, csv_text, header};
 use crate::{Error, numbers};
 
-/// An effect that the records ask for lowers the criterion by this much.
+/// A significant effect lowers the criterion by this much.
 const NEEDED: f64 = 6.0;
 
 /// Searches the experiments.

@@ -46,7 +46,7 @@ pub struct OwnEffects {
     pub waiting: Vec<String>,
 }
 
-/// An identifier without the blanks that somebody has typed.
+/// An identifier without the blanks that the user typed.
 pub(crate) fn plain(id: &str) -> String {
     id.chars().filter(|c| !c.is_whitespace()).collect()
 }
@@ -148,7 +148,7 @@ pub(crate) fn every_candidate(
         .map_err(|error| Error::Columns(error.to_string()))
 }
 
-/// The candidate of an identifier.
+/// The candidate with this identifier.
 ///
 /// # Errors
 /// In one line where there is none, with the identifiers that may have been meant.
@@ -187,7 +187,7 @@ pub(crate) fn find<'c>(
 
 type Settings = (Kept, BTreeMap<String, f64>);
 
-/// The table of an effect: what is kept of it, and what is not fitted.
+/// The table of an effect: its kept values, and its fixed parameters.
 fn settings(
     candidate: &Candidate,
     table: &BTreeMap<Spanned<String>, Setting>,

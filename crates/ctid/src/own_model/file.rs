@@ -64,17 +64,17 @@ pub struct OwnSettings {
     pub known: BTreeMap<String, f64>,
     /// Side measurements of parameters.
     pub priors: BTreeMap<String, PriorValue>,
-    /// What the inputs do between rows.
+    /// Hold of the inputs between rows.
     pub hold: Hold,
     /// Identifiers of the effects that are in the model, in order.
     pub effects: Vec<String>,
-    /// What is kept of them.
+    /// Kept values of the effects.
     pub kept: BTreeMap<String, Kept>,
     /// Effects of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
 }
 
-/// Records as the model takes them.
+/// Records in the order and units of the model.
 #[derive(Debug, Clone)]
 pub struct Records {
     /// Fitted.

@@ -128,7 +128,7 @@ impl FittedModel {
         })
     }
 
-    /// The model as it was given, its effects beside it.
+    /// The model without inserted effects, and the effects separately.
     #[must_use]
     pub fn given(&self) -> &OwnModelFile {
         &self.given

@@ -1,4 +1,4 @@
-//! The linear model that `ctid identify` finds, beside the transfer function of a user's own model.
+//! The linear model from `ctid identify`, compared with the transfer function of a user's own model.
 
 use std::path::Path;
 
@@ -211,7 +211,7 @@ impl<'f> OneByOne<'f> {
         let scale = if a[0].abs() > 1e-12 * largest {
             a[0]
         } else {
-            // It integrates.
+            // The model has an integrator.
             a[0] = 0.0;
             a[1.min(a.len() - 1)]
         };

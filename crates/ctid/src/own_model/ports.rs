@@ -77,7 +77,7 @@ fn by_effect(all: &[&Candidate], words: &EffectWords, look: Look) -> String {
     text
 }
 
-/// `ctid effects --like WORD --model M.toml`: those that go with what somebody says of the plant, best first.
+/// `ctid effects --like WORD --model M.toml`: the effects that match a symptom, best first.
 ///
 /// # Errors
 /// Where none does.

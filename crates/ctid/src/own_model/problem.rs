@@ -1,4 +1,4 @@
-//! A model file and its records as the search takes them, and the model with the effects of its file in it.
+//! A model file and its records as a search problem, and the model with the effects of its file inserted.
 
 use std::collections::BTreeMap;
 

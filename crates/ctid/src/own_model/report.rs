@@ -163,7 +163,7 @@ fn only(values: &[f64]) -> f64 {
     }
 }
 
-/// Root mean square of the errors, each divided by its output's noise; each output counts as one.
+/// Root mean square of the errors, each divided by its output's noise; all outputs have equal weight.
 fn weighted(outputs: &[String], errors: &BTreeMap<String, f64>, floors: &[f64]) -> f64 {
     let errors = outputs.iter().filter_map(|name| errors.get(name).copied());
     let errors: Vec<f64> = errors.collect();

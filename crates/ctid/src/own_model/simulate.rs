@@ -241,7 +241,7 @@ fn runs_away(setup: &ModelSetup, record: &Record, path: &Path, x: &[f64], model:
         let setup = setup.with_records(&part);
         setup.is_ok_and(|setup| setup.simulate(x).is_some())
     };
-    // The last row that is reached.
+    // The last row before the simulation diverges.
     let (mut good, mut bad) = (0, record.len());
     while bad - good > 1 {
         let middle = usize::midpoint(good, bad);

@@ -23,7 +23,7 @@ pub(crate) enum Site {
 }
 
 impl Site {
-    /// What it is.
+    /// Kind of the effect.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Input(_) => "input",
@@ -131,7 +131,7 @@ fn port_of_term(spec: &ModelSpec, name: &str) -> Option<Port> {
     }
 }
 
-/// A variable with what its text says of it.
+/// A variable with the description from the model text.
 fn named(about: &About) -> String {
     match about.description.as_str() {
         "" => about.name.clone(),

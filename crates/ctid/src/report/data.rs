@@ -112,8 +112,8 @@ struct Run {
     residual: Curve,
 }
 
-/// Samples of the fitted records, spread evenly over them: what the residual depends on. The
-/// extremes alone would show a wider cloud than there is.
+/// Samples of the fitted records at equal distances, for plots of the residual against a variable. Selecting only extremes would show too
+/// wide a scatter.
 #[derive(Serialize)]
 struct Cloud {
     level: Vec<f64>,
@@ -341,7 +341,7 @@ fn pick(values: &[f64], at: &[usize]) -> Vec<f64> {
         .collect()
 }
 
-/// Rounds to significant digits: nobody sees more, and the file is half as large.
+/// Rounds to significant digits: more are not visible in a plot, and the file is half as large.
 pub(crate) fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
 }

@@ -29,7 +29,7 @@ pub(super) struct Figure {
     pub curves: Vec<Curve>,
 }
 
-/// One ordinate.
+/// A panel with one ordinate.
 #[derive(Debug, Serialize)]
 pub(super) struct Panel {
     pub title: String,

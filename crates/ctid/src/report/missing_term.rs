@@ -27,7 +27,7 @@ pub(crate) struct MissingTerm {
     pub ordinates: Vec<f64>,
     /// Standard errors; `None` where the records do not determine them.
     pub ordinate_errors: Vec<Option<f64>>,
-    /// The command that keeps it in the model file.
+    /// The command that adds the function to the model file.
     pub command: String,
     /// Ports and variables that were compared, the best first.
     pub places: Vec<ComparedPort>,

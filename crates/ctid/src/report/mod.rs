@@ -51,7 +51,7 @@ pub fn html(diagnosis: &Diagnosis) -> String {
     html_with(diagnosis, None)
 }
 
-/// The same of a user's own model, with what nothing explains there.
+/// The report of a user's own model, with its unexplained error.
 pub(crate) fn html_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> String {
     let title = format!("ctid: {}", escape(&diagnosis.plant));
     let data = data::json_with(diagnosis, term);
@@ -201,7 +201,7 @@ fn shown(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// Chooses the output of the plots that show one.
+/// Selection of the output for the plots of one output.
 fn output_choice(diagnosis: &Diagnosis) -> String {
     if !findings::several(diagnosis) || diagnosis.steps.is_empty() {
         return String::new();

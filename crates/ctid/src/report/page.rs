@@ -5,7 +5,7 @@ use super::text::escape;
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
                       img-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'";
 pub(crate) const STYLE: &str = include_str!("report.css");
-/// Colours, axes and the unpacking of plotly.js: comes before the page's own script.
+/// Colours, axes and the unpacking of plotly.js: included before the page's own script.
 pub(crate) const PLOTS: &str = include_str!("plots.js");
 /// plotly.js, gzipped, in base64.
 pub(crate) const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
@@ -88,7 +88,7 @@ pub(super) fn figure_with(id: &str, heading: &str, caption: &str) -> String {
     )
 }
 
-/// A number in large type, what it is, and what stands below that: an item of a list of class `trail`; all of it is HTML.
+/// A number in large type, its label, and further text below: an item of a list of class `trail`; all arguments are HTML.
 pub(super) fn large(number: &str, unit: &str, label: &str, below: &str) -> String {
     format!(
         "<li><span class=\"number\">{number} <small>{unit}</small></span>\

@@ -96,7 +96,7 @@ pub(super) fn variable(name: &str) -> &str {
 const BINNED: &str = "Above the samples with the mean of each bin, below the root mean square of each bin; \
                       first fitted record.";
 
-/// Chooses the record of the residual plot and whether the axes stay, where there is a choice.
+/// Selection of the record of the residual plot and of common axes, if there is a choice.
 fn choices(diagnosis: &Diagnosis) -> String {
     let mut choices = String::new();
     if diagnosis.records.len() > 1 {
@@ -144,7 +144,7 @@ pub(super) fn residual_tests(diagnosis: &Diagnosis) -> String {
     if !any {
         return String::new();
     }
-    // The script leaves those of the chosen output.
+    // The script shows only those of the chosen output.
     let said = |of: fn(&ResidualTests) -> String| {
         let said = last.outputs.iter().map(|output| {
             let finding = of(&output.tests);

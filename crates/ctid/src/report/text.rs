@@ -1,4 +1,4 @@
-//! Words and numbers as HTML shows them: escaping, the signs of print, units, p-values in words.
+//! Words and numbers in HTML: escaping, typographic signs, units, p-values in words.
 
 use crate::numbers::{self, exponent};
 
@@ -59,7 +59,7 @@ pub(super) fn unit(unit: &str) -> String {
     html
 }
 
-/// A number with this many significant digits; a dash where there is none.
+/// A number with this many significant digits; a dash if there is none.
 pub(super) fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return "–".to_owned();

@@ -1,4 +1,4 @@
-//! The routes of the page's requests; the head of the module `serve` says what each takes and gives.
+//! Routes of the page's requests; the head of the module `serve` describes their inputs and outputs.
 
 mod run;
 

@@ -16,8 +16,8 @@ const LONGEST_SILENCE: Duration = Duration::from_secs(10);
 /// Time limit for receiving a whole body.
 const LONGEST: Duration = Duration::from_secs(60);
 
-/// The body, and its share of the room, a permit for each byte that is under way. Nobody waits for another's body: where there is no
-/// room it is refused.
+/// Reads the body within the memory limit for transfers, with a permit for each byte. If there is not enough memory, the request is
+/// rejected at once.
 pub(super) async fn whole<'a>(
     body: Body,
     most: usize,

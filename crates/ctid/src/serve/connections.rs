@@ -1,8 +1,8 @@
-//! The connections: so many at once, and none that is constant keeps another out.
+//! Connections: their number is limited, and an idle connection does not block others.
 //!
 //! On a new connection nobody has shown yet that he knows the secret. Such connections have places of their own, so that other users of the
 //! machine, who can connect too, take none of the owner's; they end with their first answer, a refusal. Where all places are taken the next
-//! connection is let in and the one that has was constant for the longest time is closed: of those that do not know the secret the oldest,
+//! connection is let in and the one that was idle for the longest time is closed: of those that do not know the secret the oldest,
 //! whatever it sends.
 
 use std::convert::Infallible;
@@ -43,7 +43,7 @@ pub(super) struct Bounds {
     pub unknown: usize,
     /// The head of a request is here within this time after the connection or the request before it; else the connection ends.
     pub head: Duration,
-    /// Some of an answer is taken within this time; else the connection ends.
+    /// Time limit for the transfer of a part of an answer; else the connection ends.
     pub silence: Duration,
 }
 
@@ -83,7 +83,8 @@ impl Client {
 struct Clients(Mutex<Vec<(Arc<Client>, AbortHandle)>>);
 
 impl Clients {
-    /// Closes those that have was constant for the longest time, until there are at most so many that know the secret, or do not.
+    /// Closes the connections that were idle for the longest time, until at most `most` of this kind (with or without the access key) are
+    /// left.
     fn keep(&self, knowing: bool, most: usize) {
         let mut all = lock(&self.0);
         loop {
@@ -146,7 +147,7 @@ pub(super) async fn serve(listener: TcpListener, guard: Guard, router: Router, b
         // The lock is held until it is among them: it may be over at once.
         let mut all = lock(&door.clients.0);
         let task = tokio::spawn(async move {
-            // A client that goes away is no fault.
+            // A client that disconnects is no error.
             let _ = connection.await;
             at.clients.leave(&of);
         });
@@ -154,7 +155,7 @@ pub(super) async fn serve(listener: TcpListener, guard: Guard, router: Router, b
     }
 }
 
-/// Answers where the guard admits it.
+/// Answers requests that the guard admits.
 async fn answer(
     door: Arc<Door>,
     client: Arc<Client>,

@@ -77,7 +77,7 @@ impl IntoResponse for Refusal {
     }
 }
 
-/// Who may speak for this server, and the secret.
+/// Names of this server that requests may use, and the access key.
 #[derive(Debug)]
 pub(super) struct Guard {
     hosts: Vec<String>,
@@ -147,7 +147,7 @@ impl Guard {
     }
 }
 
-/// Whether two texts of one length are the same; how long that takes does not tell where they differ.
+/// Whether two texts of one length are equal, in constant time, so that the duration does not show where they differ.
 fn is_same(given: &str, secret: &str) -> bool {
     let pairs = given.bytes().zip(secret.bytes());
     pairs.fold(0, |differing, (a, b)| black_box(differing | (a ^ b))) == 0
@@ -162,7 +162,7 @@ fn text(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
     Some(value.to_str().unwrap_or("?"))
 }
 
-/// Refuses a body that says itself that it is too large, before it is read.
+/// Rejects a body whose header gives too large a length, before it is read.
 pub(super) fn check_length(headers: &HeaderMap) -> Result<(), Refusal> {
     let length = text(headers, header::CONTENT_LENGTH).and_then(|text| text.parse::<u64>().ok());
     if length.is_some_and(|length| length > LARGEST_BODY as u64) {

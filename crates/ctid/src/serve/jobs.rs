@@ -1,4 +1,4 @@
-//! The computations: one for each tab, on a thread of its own. The functions of the commands do the work.
+//! Computations: one for each tab, in a separate thread, with the functions of the commands.
 
 use std::num::NonZeroU8;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -38,7 +38,7 @@ pub(super) enum Task {
         max_effects: Option<NonZeroU8>,
         effort: EffortLevel,
     },
-    /// The experiment within these limits that tells apart two effects of a group of the diagnosis.
+    /// Designs the experiment within these limits that distinguishes two effects of a group of the diagnosis.
     Design {
         group: usize,
         between: [String; 2],

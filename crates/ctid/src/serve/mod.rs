@@ -46,7 +46,7 @@
 //!
 //! # What is bounded
 //! Eight tabs. 64 connections on which the secret was known, and 128 others whose request begins within ten seconds and which end with
-//! their one refusal; where there are more, the one that has was constant for the longest time is closed. An answer that is not taken, and
+//! their one refusal; where there are more, the one that was idle for the longest time is closed. An answer that is not taken, and
 //! a body of which nothing more comes, for ten seconds end their connection; nobody waits for them. Of the bodies 256 MB are under way at
 //! once. 64 MB of files and 20 records in a tab, 500 columns in a file, twelve fits in a tab. Over all tabs 512 MB of files, of what is
 //! read from them (at most four times as much) and of what was computed; the tab that was seen last may hold more, and is then alone. One
@@ -99,7 +99,7 @@ use crate::own_model::AnyModelFile;
 const PORT: u16 = 8420;
 /// Number of ports that are tried, from the first on.
 const TRIED: u16 = 20;
-/// Files of the largest size that may be on their way at once.
+/// Number of files of the largest size that may be transferred at once.
 const FILES_AT_ONCE: usize = 4;
 /// Other requests of the largest size.
 const REQUESTS_AT_ONCE: usize = 64;
@@ -107,10 +107,10 @@ const REQUESTS_AT_ONCE: usize = 64;
 /// What may be typed.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Records (CSV) that are there from the start; others can be dropped on the page
+    /// Records (CSV) that are loaded at the start; others can be dropped on the page
     #[arg(value_name = "DATA.csv")]
     data: Vec<PathBuf>,
-    /// Model file, which the page edits; without it the page keeps one that can be downloaded
+    /// Model file that the page edits; without it the page holds one that can be downloaded
     #[arg(long, value_name = "M.toml")]
     model: Option<PathBuf>,
     /// Held-out record; may be repeated
@@ -125,7 +125,7 @@ pub struct Arguments {
 #[derive(Debug)]
 struct App {
     sessions: Sessions,
-    /// Bytes of files that may be on their way.
+    /// Number of bytes of files that may be transferred at once.
     uploading: Semaphore,
     /// Bytes of other requests that may be.
     asking: Semaphore,
@@ -155,7 +155,7 @@ impl Arguments {
         runtime.block_on(serve(listener, guard, sessions))
     }
 
-    /// The records of the command line; what is wrong with them or the model is said before anything is served.
+    /// The records of the command line; errors in the records or the model are reported before the server starts.
     fn records(&self) -> Result<(Vec<Upload>, Option<Own>), Error> {
         let files = Files {
             data: self.data.clone(),

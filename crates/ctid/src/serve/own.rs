@@ -97,7 +97,7 @@ pub(super) enum Change {
     Begin,
     /// Return to the built-in plants.
     End,
-    /// An example in place of all that is there.
+    /// Loads an example in place of the present model and records.
     Example { name: String },
     /// Text, model file, or both.
     Write {
@@ -198,7 +198,7 @@ impl Own {
             });
             signals.collect::<Vec<_>>()
         });
-        // A mistake of the text is that of the file too, and said once.
+        // An error of the text is also an error of the file, and is reported once.
         let file_error = match (&spec, &model) {
             (Ok(_), Err(error)) => Some(error.to_string()),
             _ => None,

@@ -1,4 +1,4 @@
-//! The next experiment of a user's own model, as the page asks for it and shows it.
+//! The design of an experiment for a user's own model: request and answer of the page.
 
 use ct_signals::Hold;
 use effect_search::design::{Design, Limits};

@@ -15,7 +15,7 @@ use crate::report::COMPARED;
 #[derive(Debug, Clone)]
 pub(super) struct Diagnosed {
     pub id: u64,
-    /// Of which texts and records.
+    /// Texts and records of the result.
     pub text: String,
     pub file: String,
     pub data: u64,
@@ -23,7 +23,7 @@ pub(super) struct Diagnosed {
     pub findings: Findings,
     /// The effects that were added.
     pub effects: Vec<String>,
-    /// What the page shows.
+    /// JSON for the page.
     pub body: Value,
 }
 
@@ -76,7 +76,7 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
     })
 }
 
-/// The ports of a model, each with the effects that are on there and those that were found there.
+/// The ports of a model, each with the effects that are in the model and those that were found.
 pub(super) fn ports(model: &OwnModelFile, found: &[String]) -> Value {
     let spec = &model.base;
     let words = EffectWords::of(spec, &model.candidates);

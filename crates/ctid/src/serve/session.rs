@@ -27,7 +27,7 @@ use crate::model_file::{self, ModelFile};
 const MOST_RECORDS: usize = 20;
 /// Bytes of a model file at most.
 const LARGEST_MODEL: usize = 1 << 20;
-/// Fitted models that are kept.
+/// Largest number of stored fits.
 const MOST_MODELS: usize = 12;
 /// Name of a model without a file.
 pub(super) const UNNAMED: &str = "model.toml";
@@ -46,7 +46,7 @@ pub(super) struct Found<T> {
 /// Kinds of computations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// The fit of the model as it stands.
+    /// The fit of the present model.
     Compare,
     /// The fit of the model with other effects.
     Chain,
@@ -132,7 +132,7 @@ impl Session {
         session
     }
 
-    /// Bytes that it holds: records as they were sent and as they were read, and what was computed.
+    /// Memory in bytes: records as sent and as read, and results.
     pub(super) fn held(&self) -> usize {
         let records: usize = self.records.iter().map(Upload::held).sum();
         let fits: usize = self.models.iter().map(|fitted| fitted.body.len()).sum();
@@ -184,7 +184,7 @@ impl Session {
         }
     }
 
-    /// Tells the page of another text, and stops a fit that is of no use for it.
+    /// Reports a changed text to the page, and stops a fit of the old text.
     fn text_changed(&mut self) {
         self.failure = None;
         self.version += 1;
@@ -218,7 +218,7 @@ impl Session {
         }
     }
 
-    /// The model as it stands.
+    /// The present model.
     pub(super) fn model(&self) -> Result<ModelFile, Error> {
         model_file::parse(&self.model_name(), &self.text)
     }
@@ -267,7 +267,7 @@ impl Session {
         Ok(done)
     }
 
-    /// Another model in place of the text that was shown.
+    /// Replaces the displayed text by another model.
     ///
     /// # Errors
     /// Where it is no model file, or another text stands there meanwhile; everything is then as it was.
@@ -289,7 +289,7 @@ impl Session {
         Ok(())
     }
 
-    /// Takes a record; one of the same name is replaced.
+    /// Adds a record; a record with the same name is replaced.
     ///
     /// # Errors
     /// Where there is no room, or it is here under another name.
@@ -378,7 +378,7 @@ impl Session {
     pub(super) fn stop(&mut self) {
         if let Some(job) = self.job.take() {
             job.stop.store(true, Ordering::Relaxed);
-            // A search of a user's own model knows this flag alone.
+            // A search of a user's own model checks only this flag.
             job.interrupt.store(true, Ordering::Relaxed);
             self.version += 1;
         }

@@ -19,7 +19,7 @@ const ALONE: Duration = Duration::from_secs(180);
 /// A tab's session.
 pub(super) type Shared = Arc<Mutex<Session>>;
 
-/// A tab. When its page asked last stands beside its session, which may be busy: no tab waits for another's.
+/// A tab. The time of the page's last request is stored outside the session, which may be locked: no tab waits for another one.
 #[derive(Debug)]
 struct Tab {
     id: String,
@@ -109,7 +109,7 @@ impl Sessions {
         some.map(|tab| tab.session.clone()).collect()
     }
 
-    /// The one that was not seen for the longest time, but `id`; what it computes stops. Whether there was one.
+    /// Drops the tab with the oldest last request, except `id`; its computation stops. Returns whether there was one.
     fn forget_oldest(&self, id: &str) -> bool {
         let mut all = lock(&self.all);
         let others = all.iter().enumerate().filter(|(_, tab)| tab.id != id);
@@ -146,7 +146,7 @@ mod tests {
         assert_eq!(lock(&sessions.all).len(), MOST);
     }
 
-    /// Two records that take little as they were sent, and more once they are read.
+    /// Two records with small files and larger memory after reading.
     #[test]
     fn what_is_read_needs_room_too() {
         let sessions = Sessions::new(None, None, Vec::new());

@@ -36,7 +36,7 @@ struct Known {
     input_range: Option<f64>,
 }
 
-/// The tanks whose levels are measured: one, or as many as there are outputs.
+/// Tanks with measured levels: one, or as many as there are outputs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 enum Measured {
@@ -68,7 +68,7 @@ pub(super) struct Form {
 }
 
 impl Form {
-    /// The text with what the form says.
+    /// Writes the settings of the form into the text.
     ///
     /// # Errors
     /// [`Error::Changed`] where the text says something else than the form was filled from; where the result is no model file.

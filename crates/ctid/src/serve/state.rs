@@ -172,7 +172,7 @@ fn chain_name(chain: &Chain) -> String {
     named.collect::<Vec<_>>().join(" + ")
 }
 
-/// Chains worth a look: none, the model's own, those that were fitted, and each found or ranked effect on the model as it stands.
+/// Sets of effects to compare: none, the model's own, the fitted ones, and each found or ranked effect added to the present model.
 fn choices(session: &Session, model: &ModelFile, kin: &[&Arc<Fitted>]) -> Vec<Chain> {
     let now = effects_of(model);
     let mut all = vec![Chain::new(), now.clone()];

@@ -52,8 +52,8 @@ impl Upload {
         })
     }
 
-    /// Bytes that it holds, as it was sent and as it was read. A number is two bytes at least in the file, with what parts it from
-    /// the next, and eight in memory: what is read takes at most four times the file.
+    /// Memory in bytes, as sent and as read. A number has at least two bytes in the file, including the separator, and eight in memory: a
+    /// read record takes at most four times the size of the file.
     pub(super) fn held(&self) -> usize {
         let read = self
             .read

@@ -1,4 +1,4 @@
-//! Results as the page shows them: what is drawn as the report draws it, numbers as the terminal writes them.
+//! Results for the page: plots as in the report, numbers as in the terminal.
 
 use missing_effect::design::{Candidate, Design, Kind};
 use missing_effect::{Diagnosis, Parameter, Score, Step, Verdict, numbers};
@@ -10,7 +10,7 @@ use crate::findings::{self, Reader};
 use crate::model_file::ModelFile;
 use crate::report;
 
-/// Experiments of a design that the table shows.
+/// Number of experiments in the design's table.
 const EXPERIMENTS: usize = 8;
 
 /// A fitted model: curves, failures, parameters, sentences.
@@ -249,7 +249,7 @@ pub(super) fn design(id: u64, design: &Design) -> Value {
     })
 }
 
-/// Terms of the user's own that stand in the model file and are not on.
+/// The user's own terms that are in the model file but not in the model.
 pub(super) fn waiting(model: &ModelFile) -> Vec<Value> {
     let waiting = model.waiting.iter();
     let terms = waiting.filter_map(|table| table.strip_prefix("term."));
@@ -258,7 +258,7 @@ pub(super) fn waiting(model: &ModelFile) -> Vec<Value> {
         .collect()
 }
 
-/// The effects and terms of the model as it stands.
+/// The effects and terms of the present model.
 pub(super) fn effects(session: &Session) -> Vec<Value> {
     let Ok(model) = session.model() else {
         return Vec::new();

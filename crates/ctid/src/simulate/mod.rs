@@ -30,7 +30,7 @@ pub(crate) use self::text::said;
 pub use self::time_column::TimeColumn;
 use crate::output::Found;
 
-/// The band holds with this probability.
+/// Coverage of the band.
 pub(crate) const LEVEL: f64 = 0.95;
 /// Initial states are fitted to so many first readings of each output, as those of a held-out record are.
 pub(crate) const FIRST_READINGS: usize = 5;
@@ -47,7 +47,7 @@ pub struct Band {
 /// A simulated output.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SimulatedOutput {
-    /// The column that holds it where it is measured, without its unit.
+    /// Column of the measured signal, without its unit.
     pub name: String,
     /// Unit; empty if not known.
     pub unit: String,
@@ -81,7 +81,7 @@ pub struct Simulated {
     pub model: String,
     /// The record of its inputs.
     pub inputs: String,
-    /// The records that it was fitted to; none where its values stand in its text.
+    /// The records of the fit; empty if the values come from the text.
     pub fitted_to: Vec<String>,
     /// The parameters' names, values and standard errors.
     pub parameters: Vec<(String, f64, Option<f64>)>,

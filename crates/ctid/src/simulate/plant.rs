@@ -180,7 +180,7 @@ fn simulated(
     } = fitted;
     let records = std::slice::from_ref(record);
     let mut setup = own.with_records(records).map_err(wrong)?;
-    // A simulation takes no time that a search would miss.
+    // Simulations run without a time limit, because they are short compared with a search.
     (setup.time_limit, setup.interrupt) = (None, None);
     let count = setup.parameter_count();
     let parameters = &fit.x[..count];

@@ -10,9 +10,9 @@ use crate::Error;
 /// A column of times.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct TimeColumn {
-    /// Its header.
+    /// Header of the column.
     pub header: String,
-    /// Its cells.
+    /// Cells of the column.
     pub cells: Vec<String>,
 }
 

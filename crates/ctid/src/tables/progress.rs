@@ -1,4 +1,4 @@
-//! The progress of `ctid tables`, as the bar shows it.
+//! The progress of `ctid tables` for the progress bar.
 
 use missing_effect::Progress;
 use paper_tables::Stage;

@@ -16,7 +16,7 @@ const MOST_SAMPLES: usize = 20_000;
 /// Limits of an experiment; missing values are derived from the records.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Limits {
-    /// Inputs that are applied; where none is named, all that moved in the records. The others are held at their median.
+    /// Inputs that are applied; if none is named, all inputs that change in the records. The others are held at their median.
     pub inputs: Vec<String>,
     /// Smallest and largest value of an input \[its unit\]. Without it what the records visited.
     pub ranges: BTreeMap<String, (f64, f64)>,
@@ -60,9 +60,9 @@ pub enum Refused {
     /// The model has no input of this name.
     #[error("--input {name}: the model has no such input; it has {known}")]
     UnknownInput {
-        /// As given.
+        /// Name as given.
         name: String,
-        /// The inputs that there are.
+        /// Names of the inputs.
         known: String,
     },
     /// The range's ends are exchanged, equal or no numbers.
@@ -112,7 +112,7 @@ pub enum Refused {
     OutOfTime,
 }
 
-/// The limits as they hold.
+/// The checked limits.
 pub(super) struct Bounds {
     /// For each applied input, by its position in the model.
     pub applied: Vec<(usize, InputRange, Room)>,

@@ -133,7 +133,7 @@ pub fn design(
         model: problem.spec.name.clone(),
         bic_ahead: ahead[0],
         prospect: match prospect(&best.power) {
-            // A power that no refit has confirmed is a promise.
+            // A power without confirmation by a refit is only a prediction.
             Prospect::Decides if !best.refitted => Prospect::May,
             prospect => prospect,
         },

@@ -25,7 +25,7 @@ pub struct Power {
 pub enum Prospect {
     /// The best experiment will very probably decide.
     Decides,
-    /// It may.
+    /// The experiment may decide.
     May,
     /// The experiment will probably not decide, within these limits.
     Hardly,
@@ -43,7 +43,7 @@ const SAME_EXCURSION: f64 = 0.1;
 const SURE: f64 = 0.9;
 const LIKELY: f64 = 0.5;
 const NOTHING: f64 = 1.0;
-/// Quantile of the probability that a longer experiment is to reach.
+/// Quantile of the required probability for a longer experiment.
 const WANTED: f64 = 1.645;
 
 /// The probability that the criterion of the false one ends above that of the true one by more than 6: their

@@ -39,13 +39,13 @@ pub struct InputRange {
 /// Course of an input in an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InputSequenceKind {
-    /// Its name in the model.
+    /// Name of the input in the model.
     pub input: String,
     /// Kind of the sequence.
     pub kind: Kind,
-    /// Its smallest value.
+    /// Smallest value.
     pub low: f64,
-    /// Its largest value.
+    /// Largest value.
     pub high: f64,
     /// Duration of each level \[s\].
     pub clock: f64,
@@ -69,7 +69,7 @@ pub struct Reach {
 pub struct Experiment {
     /// Course of each input that changes; the other inputs are held at their median.
     pub inputs: Vec<InputSequenceKind>,
-    /// What it gives.
+    /// Power of the experiment.
     pub power: Power,
     /// The power is that of a refit; otherwise that of the models linearised at their fits.
     pub refitted: bool,
@@ -117,9 +117,9 @@ pub struct Design {
     pub ranges: Vec<InputRange>,
     /// Length \[s\].
     pub duration: f64,
-    /// Experiments, the best first: of those that have power in plenty the one that stays nearest to what the records visited.
+    /// Experiments, the best first: among those with ample power, the one closest to the range of the records.
     pub experiments: Vec<Experiment>,
-    /// What the longest record had, once more.
+    /// Repetition of the experiment of the longest record.
     pub again: Option<Experiment>,
     /// Applied so many times over, the best experiment would decide; `None` where it does already, or would not.
     pub times_as_long: Option<usize>,
@@ -129,7 +129,7 @@ pub struct Design {
     pub noise: BTreeMap<String, f64>,
     /// Steps that were left out because of the time limit.
     pub left_out: Vec<String>,
-    /// How long it took \[s\].
+    /// Computing time \[s\].
     pub seconds: f64,
 }
 

@@ -58,9 +58,9 @@ impl Kind {
 /// A sequence and how it came about.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
-    /// Its kind.
+    /// Kind of the sequence.
     pub kind: Kind,
-    /// How long a level is held \[s\].
+    /// Duration of each level \[s\].
     pub clock: f64,
     /// Levels of a staircase.
     pub levels: Option<usize>,
@@ -76,20 +76,20 @@ pub struct Sequence {
     pub values: Vec<f64>,
 }
 
-/// Clock periods over the slowest time constant: from what shows lags to what shows static curves.
+/// Clock periods over the slowest time constant: short ones excite lags, long ones show static curves.
 const CLOCKS: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 2.0, 4.0];
 /// Half periods of a square wave over the slowest time constant; the whole length is one more.
 const STEPS: [f64; 2] = [2.0, 5.0];
 const STAIRCASES: [usize; 3] = [3, 5, 9];
 /// Draws of a multi-level sequence for each clock period.
 const DRAWS: u64 = 2;
-/// A level is held for this part of the experiment at most: one that is held throughout shows nothing.
+/// Longest duration of a level as a share of the experiment: a constant level contains no information.
 const LONGEST: f64 = 0.25;
 /// Length of the shift register: its sequence is longer than any experiment.
 const REGISTER: u32 = 18;
 
-/// The whole range; its halves, in one of which a threshold or a bend lies; and what the records visited, once and twice as
-/// wide: there the models are known.
+/// Ranges to try: the whole range; its halves, one of which contains a threshold or a bend; and the range of the records, once and twice as
+/// wide, where the models are validated.
 fn parts(room: &Room) -> Vec<(f64, f64)> {
     let (low, high) = (room.low, room.high);
     let middle = 0.5 * (low + high);

@@ -17,8 +17,7 @@ pub fn coloured(
 ) -> Result<Fit, Error> {
     let (starts, agree) = (fit.starts, fit.agree);
     let mut fit = prewhitened(model, fit, order, None, stopping)?;
-    // The likelihood, by which models are compared, is at its best now; the errors follow from the colour that
-    // the fit has not bent.
+    // The fit maximises the likelihood, by which models are compared; the standard errors use the noise model of an unbiased residual.
     if fit.noise.order() > 0 {
         let (deviance, parameters, price) = (fit.deviance, fit.parameters, fit.price);
         let noise = noise_of(model, &fit, order)?;

@@ -1,4 +1,4 @@
-//! Several outputs: the R factor of each, and the weights that their residuals ask for.
+//! R factor of each output, and weights from the outputs' residuals.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! Residuals as a series with the other columns that are fitted beside it: its autoregression, and what whitening leaves.
+//! Residuals as a series together with the regressors: the autoregression, and the whitened result.
 
 use ct_signals::{ArModel, StationaryNoise};
 use estimation::Triangle;
@@ -70,7 +70,7 @@ impl Series {
         }
     }
 
-    /// The rows whose value is there, whitened as those of a process, and `log|R|` of them.
+    /// Whitens the present rows with the process, and returns their `log|R|`.
     pub(super) fn whitened(&self, process: &StationaryNoise) -> (Self, f64) {
         let mut whitener = process.whitener(1 + self.beside.len());
         let mut whitened = self.there();

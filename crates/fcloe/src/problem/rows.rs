@@ -151,7 +151,7 @@ impl Problem {
         Ok(true)
     }
 
-    /// Shows the rows of all samples, or those of the residual alone.
+    /// Passes each row of all samples, or the rows of the residual alone, to a function.
     fn each(
         &self,
         x: &[f64],

@@ -209,7 +209,7 @@ impl RecursiveFcloe {
         }
     }
 
-    /// F back to its start, and the forgetting too: after a jump of the parameters.
+    /// Resets F and the forgetting to their start values: for use after a step change of the parameters.
     ///
     /// # Errors
     /// [`Error::Rls`].
@@ -281,7 +281,7 @@ impl RecursiveEstimator for RecursiveFcloe {
                 outcome: Outcome::NotFinite,
             }
         };
-        // what was learnt stays learnt where the model's states leave the range of numbers and it begins again from rest
+        // the update is kept even if the model's states overflow and the model restarts from rest
         self.model.advance(self.last_drive, dt);
         self.time += dt;
         innovation
@@ -310,7 +310,7 @@ impl RecursiveEstimator for RecursiveFcloe {
 mod tests {
     use super::*;
 
-    /// The factors give what the equations of the head say of F itself, step by step.
+    /// The factored form agrees with the equations for F in the module's head, step by step.
     #[test]
     fn the_textbook_recursion() {
         let plant = PlantModel::new(&[210.0, 9000.0], &[5.0, 40.0]).unwrap();

@@ -34,8 +34,8 @@ pub struct RecursiveSettings {
     pub gain: f64,
     /// Forgetting rate eta at the beginning \[1/time\], at least 0.
     pub forgetting: f64,
-    /// The forgetting fades out with this time constant \[time\]; infinite to go on forgetting, which is needed to
-    /// follow parameters that drift.
+    /// Time constant with which the forgetting fades out \[time\]; infinite for constant forgetting, which is needed to follow drifting
+    /// parameters.
     pub fading: f64,
     /// Largest relative change of a parameter in one step, above 0.
     pub step_limit: f64,

@@ -149,7 +149,7 @@ pub fn pipeline(
         }
     }
     if found.is_empty() {
-        // Poles at the lower end of where a filter of that bandwidth would look for them.
+        // Poles at the lower end of the range for which a filter of this bandwidth is suitable.
         for lambda in lambda_ladder(records, controller, None)? {
             for plant in guesses(records, controller, orders, lambda / RUNGS[2]) {
                 if let Some(residual_rms) = residual(records, controller, &plant) {

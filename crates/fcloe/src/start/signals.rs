@@ -18,7 +18,7 @@ pub(super) fn input(record: &LoopRecord) -> Result<&[f64], Error> {
         })
 }
 
-/// u as the plant of the loop sees it, through a sensor's filter where there is one, and y, NaN where its reading is missing: deviations.
+/// u as the plant's input, through a sensor's filter if there is one, and y, NaN if its reading is missing: deviations.
 #[derive(Debug, Clone)]
 pub(super) struct Signals {
     pub(super) u: Vec<f64>,

@@ -26,9 +26,9 @@ pub use levels::LevelChoice;
 
 /// Points of the picture of condition (14).
 const POINTS: usize = 240;
-/// A controller that misses more than this share of the command is said.
+/// A controller whose output differs from the command by more than this share causes a warning.
 const MISSED: f64 = 0.03;
-/// A command at its limits for more than this share of the rows is said.
+/// A command at its limits in more than this share of the rows causes a warning.
 const LIMITED: f64 = 0.01;
 
 /// A simulation error below this share of the output's deviation is not compared with another.
@@ -298,7 +298,7 @@ impl Task<'_> {
         })
     }
 
-    /// The record's name before what the crate says, which does not always know it.
+    /// Adds the record's name to an error of the crate, which does not always know the name.
     fn named(&self, error: Error) -> Error {
         match error {
             Error::Loop(fcloe::Error::ControllerMismatch { mismatch, size, .. }) => {

@@ -7,7 +7,7 @@ use super::levels::chosen;
 use super::{Found, Start, Task};
 use crate::{Error, residual::rms};
 
-/// Renewals of instruments with a filter that stays, and of both.
+/// Number of iterations of instruments with a constant filter, and of both instruments and filter.
 const INSTRUMENTS: usize = 3;
 const REFINEMENTS: usize = 10;
 
@@ -93,7 +93,7 @@ impl Task<'_> {
         })
     }
 
-    /// Instruments with the filter that stays, then with one that is renewed.
+    /// Instruments with a constant filter, then with an updated filter.
     fn instruments(
         &self,
         records: &[LoopRecord],

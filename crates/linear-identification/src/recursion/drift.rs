@@ -1,5 +1,5 @@
-//! Whether the estimates move with the level: near one level any process is linear, so that a model which holds at one level and not at
-//! another says that the process is not linear, or not of this order.
+//! Test whether the estimates depend on the level. Near a single level any process is linear, so estimates that depend on the level show
+//! that the process is not linear, or not of this order.
 //!
 //! What the recursion says at a time belongs to the mean of the output as the recursion remembers it,
 //! ```text
@@ -37,7 +37,7 @@ pub struct Drift {
     pub time_constant: OverLevel,
     /// Memory over the length of the record.
     pub memory_part: f64,
-    /// Way of the level that is remembered, over the output's range.
+    /// Range of the remembered level, as a share of the output's range.
     pub level_part: f64,
 }
 
@@ -58,7 +58,7 @@ impl Drift {
 /// One parameter as a function of the level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OverLevel {
-    /// Its values.
+    /// Values of the parameter.
     pub values: Vec<f64>,
     /// Standard errors of the means.
     pub std_errors: Vec<f64>,

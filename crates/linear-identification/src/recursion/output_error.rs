@@ -19,8 +19,9 @@ const P_OUTPUT_ERROR: f64 = 10.0;
 /// Ranges of the plausible plants around the start, with bounds on c: factors; the widest range with guaranteed convergence is used.
 const PLAUSIBLE: [f64; 4] = [2.0, 1.5, 1.25, 1.1];
 const BOUNDS: [f64; 4] = [2.0, 1.5, 1.2, 1.05];
-/// The output error keeps every lag above this part of the sampling interval, where the others are those of the start. Less cannot be
-/// seen, and `y_m^(n)`, which is divided by `a_n`, would be so large that the recursion takes itself for sure.
+/// The output-error recursion keeps every lag above this share of the sampling interval, with the other lags as at the start. Shorter lags
+/// cannot be identified, and `y_m^(n)`, which is divided by `a_n`, would be so large that the recursion would underestimate its
+/// uncertainty.
 const SHORTEST_LAG: f64 = 0.05;
 
 /// Output error of a model in parallel.

@@ -11,7 +11,7 @@ const POINTS: usize = 500;
 /// A point of the recursion's trajectory.
 #[derive(Debug, Clone)]
 pub(super) struct Point {
-    /// Which sample.
+    /// Index of the sample.
     pub sample: usize,
     /// Time with readings, scaled.
     pub time: f64,
@@ -70,7 +70,7 @@ pub(super) fn is_kept(k: usize, count: usize) -> bool {
     k + 1 == count || k.is_multiple_of(count.div_ceil(POINTS))
 }
 
-/// The time of the rows that were learnt from, and how many these are.
+/// Total time and number of the rows that were used for updates.
 pub(super) struct Learnt {
     time: f64,
     pub rows: usize,
@@ -96,7 +96,7 @@ impl Learnt {
         }
     }
 
-    /// A row that was held for a time, and whether it was learnt from.
+    /// Adds a row that was held for a time, and whether it was used for an update.
     pub fn after(&mut self, learnt: bool, held: f64) {
         if learnt {
             self.time += held;

@@ -188,7 +188,7 @@ impl Scaled {
     }
 }
 
-/// Mean and standard deviation of the values that are there.
+/// Mean and standard deviation of the present values.
 fn moments(values: &[f64]) -> (f64, f64) {
     let there = values.iter().filter(|v| !v.is_nan());
     let n = there.clone().count() as f64;

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::scaled::Scaled;
 use crate::{Error, Order};
 
-/// A free response that still counts for this part of itself at the end of the record.
+/// A free response is significant if this share of it is present at the end of the record.
 const LASTING: f64 = 0.2;
 
 /// The simulated output in its unit, from an initial state that is fitted; a warning where that state explains what it should not.
@@ -65,7 +65,7 @@ impl Driven<'_> {
             .map(|state| self.response(&model, |_| 0.0, Some(state)))
             .collect::<Result<_, _>>()?;
         let count = self.y.len();
-        // each of size 1, so that none is lost beside another
+        // each is scaled to 1, so that none is lost by rounding
         let sizes: Vec<f64> = free
             .iter()
             .map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt())

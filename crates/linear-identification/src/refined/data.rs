@@ -1,4 +1,4 @@
-//! Records as `rivc` takes them.
+//! Records in the form of the crate `rivc`.
 
 use ct_signals::Record;
 use rivc::{Data, Structure};

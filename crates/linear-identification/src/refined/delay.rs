@@ -1,6 +1,6 @@
 //! Setting of the delay.
 
-/// What is said of the delay.
+/// Setting of the delay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DelayChoice {
     /// Known delay, s.

@@ -49,7 +49,7 @@ pub(super) fn plant(records: &[Mended], request: &Request) -> Result<(rivc::Plan
     Ok((found.plant, found.converged && known))
 }
 
-/// Structure and settings that a request comes to.
+/// Structure and settings of a request.
 fn asked(records: &[Mended], request: &Request) -> (Structure, rivc::Settings) {
     let Order { n, m } = request.order;
     let inputs = records

@@ -49,7 +49,7 @@ impl Joined {
     }
 }
 
-/// The signal that shows most in the simulation errors.
+/// The signal with the largest correlation with the simulation errors.
 #[derive(Default)]
 pub(super) struct Visible {
     tests: usize,

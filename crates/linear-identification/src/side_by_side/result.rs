@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::{Method, Order, Shown};
 
-/// What came of all methods.
+/// Results of all methods.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SideBySide {
     /// Version of this record.
@@ -14,7 +14,7 @@ pub struct SideBySide {
     pub record: String,
     /// The record comes from a loop with a known controller: errors on the measured command do not rank the methods.
     pub in_loop: bool,
-    /// What was done about missing rows and samples of the input; nothing where there are none.
+    /// Handling of missing rows and samples of the input; `None` if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<MendedGaps>,
     /// Names of the records that were not fitted.
@@ -39,7 +39,7 @@ pub struct Row {
     pub seconds: f64,
     /// Assumptions of the method.
     pub assumes: &'static str,
-    /// What it found.
+    /// Result of the method.
     pub found: Option<Outcome>,
     /// Reason why the method failed.
     pub refused: Option<String>,
@@ -68,7 +68,7 @@ pub struct Outcome {
     pub yic: Option<f64>,
     /// p-value of the Ljung-Box test of the simulation error.
     pub whiteness_p: f64,
-    /// p-value of the test that the simulation error holds nothing of the input.
+    /// p-value of the test that the simulation error does not depend on the input.
     pub input_p: f64,
     /// Assumptions that the record violates, in words.
     pub violated: Vec<String>,

@@ -24,7 +24,7 @@ pub(crate) struct Doubted<'a> {
     pub confirmed: Node<'a>,
     /// The believed model with a noise model fitted to its own residual.
     pub own_base: Fit,
-    /// The jump that explains more than what was confirmed.
+    /// The level shift that explains more than the confirmed set.
     pub jumped: Option<Jump>,
 }
 
@@ -59,7 +59,7 @@ pub(crate) fn doubt<'a>(
     if jumped.is_some() {
         confirmed = found.base.clone();
     }
-    // Noise that drifts bends to gains and saturations too, as their inputs are slow.
+    // Slow noise also biases gains and saturations, because their inputs are slow.
     let beyond_small_walk = |node: &Node| {
         Ok::<_, Error>(
             node.added.is_empty() || beyond_random_walk(node, base, Walk::SMALL_FROM_ZERO)?,

@@ -11,7 +11,7 @@ use crate::{
     search::exchange::{NEAR, exchanges},
 };
 
-/// The mean square that an alternative of an effect that follows time alone may leave, over what that leaves.
+/// Largest ratio of the mean squared residual of an alternative to that of an effect that is a function of time.
 pub(crate) const NEARLY: f64 = 1.05;
 
 /// An effect, what cannot be distinguished from it, and where it may act.
@@ -47,7 +47,7 @@ pub(crate) fn groups<'a>(
                 })
                 .into_iter()
                 .collect();
-            // In the white metric a coloured residual counts each sample for less than one.
+            // With white-noise weighting, each sample of a coloured residual counts for less than one.
             let behind = |node: &Node| (node.fit.bic() - last.fit.bic()) / per_sample;
             // A size at its edge speaks against an alternative, but where the final model has it too.
             let possible = |node: &Node| {

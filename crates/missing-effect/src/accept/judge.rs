@@ -181,7 +181,7 @@ impl<'a> Judge<'_, 'a> {
         let in_noise = if self.by_simulation || self.stopped {
             last.clone()
         } else {
-            // The trail is shorter where an effect could not be simulated beside the others.
+            // The series of models is shorter if an effect could not be simulated together with the others.
             let whole = last.added.len() == set.added.len();
             let ends: Vec<_> = whole.then(|| last.fit.x.clone()).into_iter().collect();
             refine(set, self.noise, &ends)?
@@ -189,7 +189,7 @@ impl<'a> Judge<'_, 'a> {
         self.ending(nodes, last, in_noise.fit)
     }
 
-    /// The course of these models and one more, which is fitted.
+    /// Adds one more model to the series, and fits it.
     pub fn longer(&self, nodes: Vec<Node<'a>>, last: Node<'a>) -> Result<Course<'a>, Error> {
         let fit = last.fit.clone();
         self.ending(nodes, last, fit)
@@ -235,7 +235,7 @@ impl Judged<'_> {
 
 /// The models from the believed one to the last, and the residual structure of the last one.
 pub(crate) struct Course<'a> {
-    /// At least the believed one.
+    /// The models, at least the believed one.
     pub nodes: Vec<Node<'a>>,
     /// The last model with the noise model of its own residual.
     pub own: Fit,
@@ -305,7 +305,8 @@ mod tests {
         simulated,
     };
 
-    /// A pump that saturates beside a oscillation of the reading that has no name; what stays of the saturation and a drift of the sensor.
+    /// A saturating pump together with an oscillation of the reading that has no name; returns the estimate of the saturation and a drift
+    /// of the sensor.
     fn judged(swing: f64) -> (bool, Vec<&'static str>, Vec<&'static str>) {
         let read = |t: f64, level: f64| level + swing * (t / 150.0).sin();
         let problem = simulated::tank(|u| u.min(4.2), read, 0.0, 1);

@@ -1,4 +1,4 @@
-//! The simplest course of time that no effect describes: from one sample to the next the reading is another.
+//! Level shift: the simplest function of time that no effect describes. From one sample to the next the reading changes by a constant.
 //!
 //! A recalibration, a sensor that was moved, a cable that was changed. An outlet that opens at that instant imitates it
 //! in part, and beside it a wide play of the sensor or a leak the rest: down to the noise, with three sizes or four for
@@ -20,19 +20,19 @@ use crate::{
 
 /// Instants that are tried, those where the whitened residual is largest.
 const INSTANTS: usize = 4;
-/// The jump's first size is that of the residual's means over so many samples before and after.
+/// The first size of the level shift is the difference of the residual's means over this number of samples before and after.
 const AROUND: usize = 8;
-/// A jump has a size and an instant; the fit counts the size.
+/// A level shift has a size and an instant; the fit counts the size.
 const INSTANT: f64 = 1.0;
 
 /// A model with a jump of the reading, fitted.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Jump {
-    /// Its criterion.
+    /// Criterion of the model with the level shift.
     pub bic: f64,
     /// The last sample before it.
     before: usize,
-    /// The output that jumps.
+    /// The output with the level shift.
     output: usize,
 }
 
@@ -47,8 +47,8 @@ impl Jump {
     }
 }
 
-/// A node with a jump of the reading where that helps most, in the metric of a noise; `None` where the record is too short, no
-/// fit succeeds, or there are several records.
+/// A model with a level shift of the reading at the best instant, weighted by a noise model; `None` if the record is too short, no fit
+/// succeeds, or there are several records.
 pub(crate) fn jump(node: &Node, noise: &Noise) -> Result<Option<Jump>, Error> {
     let [record] = node.setup.records else {
         return Ok(None);
@@ -97,7 +97,7 @@ pub(crate) fn jump(node: &Node, noise: &Noise) -> Result<Option<Jump>, Error> {
         .min_by(|a, b| a.bic.total_cmp(&b.bic)))
 }
 
-/// The mean of the samples that are there; zero where none is.
+/// The mean of the present samples; zero if there is none.
 fn mean(series: &[f64]) -> f64 {
     let present = || series.iter().filter(|value| !value.is_nan());
     present().sum::<f64>() / present().count().max(1) as f64

@@ -1,4 +1,4 @@
-//! The largest part of the error that effects explain, where none explains all of it.
+//! Partial explanation: the largest part of the error that effects explain, if no set explains all of it.
 //!
 //! Measured records often hold several causes, and noise that is nearly integrated. That no set of effects leaves noise does not mean
 //! that nothing was found: a set is a partial answer where
@@ -122,7 +122,7 @@ pub(crate) fn largest_part<'a>(
                 if in_loop && tested.node.narrow_stiction().is_some() {
                     tested.reasons.push(NARROW_BAND.to_string());
                 }
-                // The shape says more than an error that cannot fall far.
+                // The characteristic shape is stronger evidence than the limited fall of the error.
                 let alone = tested
                     .node
                     .added
@@ -170,8 +170,8 @@ pub(crate) fn largest_part<'a>(
     Ok(best)
 }
 
-/// The part of the mean squared error that a set explains on one half of a record when it was fitted to the other, both ways
-/// (two-fold cross-validation); initial states as on held-out records. Negative where it does harm; of several records the longest.
+/// The part of the mean squared error that a set explains on one half of a record after a fit to the other half, both ways (two-fold
+/// cross-validation); initial states as on held-out records. Negative if the error rises; of several records the longest is used.
 ///
 /// A noise model that is nearly integrated looks at changes from sample to sample alone, and takes any slow effect for noise. Physics
 /// that is real helps on data that were not fitted; what imitates a slow disturbance does not.
@@ -209,7 +209,7 @@ fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
         .collect();
     let mean = |half: &[f64]| -> f64 {
         let outputs = half.iter().zip(&scales);
-        // An output that one half lacks says nothing.
+        // An output without readings in one half is left out.
         let outputs = outputs.filter(|(_, scale)| **scale > 0.0);
         outputs.map(|(rms, scale)| (rms / scale).powi(2)).sum()
     };
@@ -217,7 +217,7 @@ fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
     Ok(1.0 - of_both(&of_node) / of_both(&of_base))
 }
 
-/// Whether a set leaves at most [`LEFT`] of what each smaller one of its effects leaves, accepted or refused.
+/// Whether a set leaves at most [`LEFT`] of the residual of each of its subsets, accepted or rejected.
 fn says_more(one: &Tested, smaller: &[(Vec<Placed>, f64)]) -> bool {
     let added = &one.node.added;
     smaller.iter().all(|(subset, share)| {
@@ -227,7 +227,7 @@ fn says_more(one: &Tested, smaller: &[(Vec<Placed>, f64)]) -> bool {
     })
 }
 
-/// Accepted sets before refused ones, those that the shape of the record shows before others, then by what they explain.
+/// Sort key: accepted sets before rejected ones, those with the characteristic shape before others, then by the explained part.
 fn key(tested: &Tested) -> (bool, bool, f64) {
     (tested.reasons.is_empty(), tested.shape, tested.share)
 }
@@ -291,7 +291,7 @@ fn test<'a>(
     if !node.plausible() {
         reasons.push("a size is at a bound, or a state is not physical".to_string());
     }
-    // A jump at a free instant imitates much where set points step: it has to explain clearly more.
+    // A level shift at a free instant explains much if set points change in steps: it has to explain clearly more.
     let clearly = JUMP_CLEARLY * node.setup.samples() as f64;
     if jump + clearly < node.fit.bic() {
         reasons.push("a single level shift of the reading explains more".to_string());

@@ -47,7 +47,7 @@ pub(crate) struct Walk {
     pub anywhere: bool,
     /// Standard deviation at the end of a record over that of the noise, at most.
     pub largest: f64,
-    /// Whether the parameters are fitted again beside it.
+    /// Whether the parameters are fitted again together with the walk.
     pub fitted_again: bool,
 }
 
@@ -93,7 +93,7 @@ impl Whitened {
                 1.0
             };
             for row in rows.chunks_exact_mut(columns) {
-                // The row of a missing sample stays one without a residual.
+                // The row of a missing sample has no residual.
                 if row[columns - 1].is_nan() {
                     whitener.skip();
                 } else {
@@ -131,7 +131,7 @@ impl Whitened {
             let mut rows = rows.chunks_exact(self.columns);
             let mut variance = 0.0;
             level.fill(0.0);
-            // The first sample tells where it begins.
+            // The first sample determines the start.
             if anywhere {
                 let Some(first) = rows.find(|row| !row[last].is_nan()) else {
                     continue;
@@ -158,7 +158,7 @@ impl Whitened {
             }
         }
         let count = triangle.rows() as f64;
-        // A walk bends the parameters by no more than what moves the output, slowly, as far as the walk goes.
+        // A walk changes the parameters by no more than slow parameter changes would change the output.
         let bend = ((self.slow * BENDING).powi(2) * count / last.max(1) as f64).sqrt();
         for row in self
             .series
@@ -278,7 +278,7 @@ mod tests {
             let walks = [0.5, 3.0].map(|walk| named(correlation, walk, 0.0));
             assert!(walks.iter().all(|count| *count <= 1), "{walks:?}");
         }
-        // A drift whose rms is as large as the noise; three times as large beside coloured noise.
+        // A drift with an rms as large as the noise; three times as large for coloured noise.
         let drifts = (named(0.0, 0.0, 3.5), named(0.8, 0.0, 10.0));
         assert!(drifts.0 >= 97 && drifts.1 >= 90, "{drifts:?}");
     }
@@ -325,7 +325,7 @@ mod tests {
             };
             of(&offset) - of(&white)
         };
-        // A jump of one standard deviation in the first sample is what a walk would need.
+        // A step of one standard deviation in the first sample would need a walk.
         assert!(fall(false) > 20.0, "{}", fall(false));
         assert!(fall(true).abs() < 1e-6);
     }

@@ -1,4 +1,4 @@
-//! The shape that a valve which sticks leaves in a loop: the output is constant while the command moves on, then jumps.
+//! Signature of valve stiction in a loop: the output is constant while the command changes, then it jumps.
 //!
 //! An integrating controller drives the command across the band of the valve, which follows in one slip: a triangle of the command
 //! beside a rectangle of the output. The instants of the slips hang on the noise, so that no simulation from the command meets all of them
@@ -11,7 +11,7 @@ use crate::fit::series::series;
 use ct_signals::Record;
 use statrs::statistics::{Data, OrderStatistics};
 
-/// A jump is a change of the output by more than this part of its range (95 %) within so many samples.
+/// A jump is a change of the output by more than this share of its range (95 %) within this number of samples.
 const JUMP: (f64, usize) = (0.4, 4);
 /// Between two jumps the output is constant where it varies (80 %) by less than this part of its range ...
 const STILL: f64 = 0.35;

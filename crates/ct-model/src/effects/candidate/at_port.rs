@@ -1,4 +1,4 @@
-//! An effect at a port: its text, with the names, units and starting values that it has there.
+//! An effect at a port: its text with the names, units and start values for this port.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! `natural_convection(T,Ta)`: heat lost to air that moves by itself.
+//! `natural_convection(T,Ta)`: heat loss to air by natural convection.
 
 use crate::effects::{Effect, Place, Role, Starts};
 

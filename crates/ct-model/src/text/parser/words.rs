@@ -1,4 +1,4 @@
-//! Words of Modelica that are no names, and those that stand outside the subset.
+//! Reserved words of Modelica, and words outside the subset.
 
 /// Words of Modelica that are no names.
 pub(super) const KEYWORDS: [&str; 58] = [

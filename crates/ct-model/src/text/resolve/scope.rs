@@ -1,4 +1,4 @@
-//! Expressions that stand outside a text, in the words of a model.
+//! Parses expressions outside a model text with the names of a model.
 
 use std::collections::BTreeSet;
 

@@ -18,7 +18,7 @@ impl Identify {
         }
     }
 
-    /// A record as `--columns` says: without a reference that it does not name.
+    /// The record without a reference that `--columns` does not name.
     pub(super) fn without_unnamed(&self, mut record: Record) -> Record {
         let named = self
             .columns

@@ -79,7 +79,7 @@ impl Source<'_> {
         })
     }
 
-    /// The areas of three tanks, as they stand: one for all, or each its own.
+    /// The areas of three tanks, as given: one for all, or one for each.
     fn areas_of_three(&self, raw: &RawKnown) -> Result<[Option<f64>; MAX_VESSELS], Error> {
         let each = [
             ("area_1", &raw.area_1),

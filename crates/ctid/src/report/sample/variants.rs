@@ -43,7 +43,7 @@ pub(crate) fn partial() -> Diagnosis {
     partial_of(two_tanks())
 }
 
-/// A part of the answer of a diagnosis that has found the overflow first.
+/// The diagnosis of a partial explanation, with the overflow as the first effect.
 pub(crate) fn partial_of(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis.verdict = Verdict::Partial;
     for list in [&mut diagnosis.effects, &mut diagnosis.ranked] {

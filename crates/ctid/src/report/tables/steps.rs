@@ -137,7 +137,7 @@ fn names(steps: &[Step]) -> Vec<(&str, &str)> {
     names
 }
 
-/// The last model first, so that it is seen however many there are; then the others in their order.
+/// The last model first, so that it is visible with any number of models; then the others in their order.
 fn last_first(steps: &[Step]) -> impl Iterator<Item = (usize, &Step)> {
     let all = || steps.iter().enumerate();
     let before = steps.len().saturating_sub(1);

@@ -38,7 +38,7 @@ impl Work {
         Self::of(session, own)
     }
 
-    /// The model that was diagnosed with what was found beside a group: two of the group are to be distinguished there.
+    /// The diagnosed model with the accepted effects outside a group: a design distinguishes two effects of the group in addition to these.
     ///
     /// # Errors
     /// Where nothing was diagnosed, or the records are others since.
@@ -125,7 +125,7 @@ impl Work {
         })
     }
 
-    /// The experiment within these limits that tells two effects apart, until the flag is set.
+    /// Designs the experiment within these limits that distinguishes two effects, until the flag is set.
     pub(crate) fn design(
         &self,
         between: &[String; 2],

@@ -1,4 +1,4 @@
-//! The fits that a session keeps, and which of them belong together.
+//! Fits of a session, and which of them belong together.
 
 use axum::body::Bytes;
 use missing_effect::PerOutput;

@@ -1,4 +1,4 @@
-//! The comparison: the believed model, fitted, and where it fails.
+//! Comparison: the fitted believed model, and where it fails.
 
 use std::time::Instant;
 
@@ -32,7 +32,7 @@ const SHARE: f64 = 0.2;
 const FITTED: f64 = 0.6;
 const TRIED: f64 = 0.8;
 
-/// Fits the believed model and says where it fails: a diagnosis of one step without a search of sets.
+/// Fits the believed model and locates its errors: a diagnosis of one step without a search of sets.
 ///
 /// # Errors
 /// Where the records, the plant or the fit do not allow it.
@@ -81,8 +81,8 @@ pub(crate) fn believed<'a>(
     let (base, control_loop) = base(problem, options, FITTED)?;
     allow(&base, TRIED);
     let own = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
-    // The model lacks something where its residual is not noise, or where some effect would lower the error by more than
-    // chance does: the one needs no catalogue, the other sees what is small.
+    // The model is incomplete if its residual is not noise, or if some effect lowers the error significantly: the first test needs no
+    // catalogue, the second one detects small effects.
     let in_noise = Node {
         fit: own.clone(),
         ..base.clone()

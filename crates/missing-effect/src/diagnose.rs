@@ -67,7 +67,7 @@ pub fn diagnose(
     Ok(diagnosis)
 }
 
-/// The same of records without gaps.
+/// Diagnosis of records without gaps.
 fn diagnose_whole(
     problem: &Problem,
     options: &Options,

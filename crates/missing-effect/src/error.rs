@@ -1,6 +1,6 @@
 //! Errors of a diagnosis.
 
-/// What can go wrong in a diagnosis.
+/// Error of a diagnosis.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -36,14 +36,14 @@ pub enum Error {
         record: String,
         /// Number of the output, from one.
         output: usize,
-        /// The column there, or that it is missing.
+        /// The record's column, or that it is missing.
         column: String,
         /// The first record.
         first: String,
-        /// The column that the first record has there, or that it is missing.
+        /// The first record's column, or that it is missing.
         needed: String,
     },
-    /// The controller reads an output that there is not.
+    /// The controller reads an output that does not exist.
     #[error("controller: it reads output {output}, but the model has {outputs}: name one of these")]
     ControlledOutput {
         /// Number of the output, from one.
@@ -64,7 +64,7 @@ pub enum Error {
     },
 }
 
-/// A growth from one sample to the next, in words that stay short.
+/// Growth from one sample to the next, in short words.
 fn growth(radius: f64) -> String {
     if radius < 2.0 {
         format!("by {:.2} %", 100.0 * (radius - 1.0))

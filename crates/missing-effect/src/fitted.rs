@@ -1,4 +1,4 @@
-//! The fitted model for those who go on with it: simulate it on other inputs, write its curves.
+//! The fitted model for further use: simulation on other inputs, and its curves.
 
 use greybox::{Fit, FitUncertainty, Setup};
 
@@ -18,7 +18,7 @@ pub struct Fitted<'f, 'a> {
     pub fit: &'f Fit,
     /// Uncertainty of its parameters; `None` if the records do not determine them.
     pub uncertainty: Option<&'f FitUncertainty>,
-    /// The model lacks something: its residual is more than noise.
+    /// The model is incomplete: its residual is more than noise.
     pub lacking: bool,
 }
 

@@ -2,7 +2,7 @@
 
 pub use ct_signals::duration;
 
-/// A number with this many significant digits, `-` where there is none.
+/// A number with this many significant digits, `-` if there is none.
 #[must_use]
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
@@ -52,8 +52,7 @@ pub fn whole(value: f64) -> String {
     }
 }
 
-/// Numbers that stand under each other: all with the decimals that give the smallest of them two
-/// significant digits; `-` where there is none.
+/// Numbers of a column: all with the number of decimals that gives the smallest one two significant digits; `-` if there is none.
 #[must_use]
 pub fn column(values: &[Option<f64>]) -> Vec<String> {
     let finite = || values.iter().flatten().filter(|value| value.is_finite());

@@ -115,7 +115,7 @@ fn through(
     }
 }
 
-/// A plant without effects that is believed of the records.
+/// A believed plant without effects for the records.
 pub(crate) fn problem(plant: Plant, known: Known, records: Vec<Record>) -> Problem {
     Problem::builder(plant, known, records).build().unwrap()
 }

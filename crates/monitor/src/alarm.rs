@@ -50,7 +50,7 @@ pub struct Alarm {
     pub effects: Vec<String>,
     /// Fall of the Bayesian information criterion with the best of them.
     pub evidence: Option<f64>,
-    /// The next effect, whether in the group or after it, and its evidence.
+    /// The next effect, in the group or after it, and its fall of the criterion.
     pub next: Option<Other>,
     /// The size of the best effect.
     pub size: Option<Size>,
@@ -65,7 +65,7 @@ pub struct Alarm {
     pub sentence: String,
 }
 
-/// An effect and its evidence.
+/// An effect and its fall of the criterion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Other {
     /// The effect.

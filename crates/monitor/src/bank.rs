@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 const WINDOWS: [f64; 4] = [0.25, 0.75, 2.0, 6.0];
 /// The unit of the windows is at least so many rows.
 const FEWEST: f64 = 16.0;
-/// Innovations count up to this many standard deviations.
+/// Innovations are clipped at this many standard deviations.
 const CUT: f64 = 4.0;
 
 /// The lengths of the windows \[rows\], for a time constant in rows.

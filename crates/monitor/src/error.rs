@@ -41,11 +41,11 @@ pub enum Error {
     /// A setting is outside its range.
     #[error("{setting} is {value}, but has to be {range}")]
     Setting {
-        /// Which setting.
+        /// Name of the setting.
         setting: &'static str,
         /// Its value.
         value: f64,
-        /// What is allowed.
+        /// Allowed range.
         range: &'static str,
     },
     /// A state that another version wrote.
@@ -94,7 +94,7 @@ pub enum Refused {
     TooLarge {
         /// `time`, `input` or `output`.
         column: &'static str,
-        /// Which of the inputs or outputs, counted from zero.
+        /// Index of the input or output, from zero.
         at: usize,
         /// The value.
         value: f64,

@@ -25,9 +25,9 @@ const OTHER: usize = 20;
 const BACK: usize = 100;
 /// A gap of more than so many usual steps begins a new stretch.
 const BRIDGED: f64 = 5.0;
-/// Values beyond this cannot be raised to the powers that a fit takes.
+/// Larger values would overflow in the powers that a fit computes.
 const LARGEST: f64 = 1e15;
-/// Rows that a monitor counts; at a million rows a second it comes to so many after 285 years.
+/// Largest count of rows; at a million rows a second it is reached after 285 years.
 const MOST_ROWS: u64 = 1 << 53;
 /// Rows in a block.
 pub(crate) const LONGEST_BLOCK: usize = 1 << 24;
@@ -164,7 +164,7 @@ impl Intake {
         }
     }
 
-    /// Takes in a row with those of its `readings` that can be used.
+    /// Processes a row with its usable `readings`.
     pub(crate) fn take(&mut self, row: &Row, readings: &Readings) -> Result<Taken, Refused> {
         let time = usable("time", 0, row.time)?;
         for at in 0..self.inputs.len() {
@@ -230,7 +230,7 @@ impl Intake {
         self.begin();
     }
 
-    /// A row that goes back is refused, but not for ever: one wrong time that lies ahead would make the monitor deaf.
+    /// A row with an earlier time is rejected, but not for ever: after a single wrong future time the monitor would reject all rows.
     fn set_back(&mut self, previous: f64, time: f64) -> Result<Notice, Refused> {
         let count = match self.back {
             Some((last, count)) if time >= last => count + usize::from(time > last),

@@ -46,7 +46,7 @@ const ONSETS: [f64; 13] = [
 const AFRESH: usize = 4;
 /// An onset has at least so many rows after it.
 pub(crate) const FEWEST: usize = 8;
-/// A drift of the pump is even where its settling takes as long as it may.
+/// A drift of the pump is linear if its settling time is at its upper bound.
 const EVEN: (&str, &str) = ("pump_gain_drift", "time_constant");
 pub(crate) const ROUGH: Stopping = Stopping {
     evaluations: 8,
@@ -93,7 +93,7 @@ pub(crate) struct Suspect {
     pub since: f64,
     /// Size of the effect: name, value, unit.
     pub size: (&'static str, f64, Unit),
-    /// The size lies inside its plausible range.
+    /// Whether the size is inside its plausible range.
     pub plausible: bool,
     pub(crate) left: Left,
 }
@@ -124,9 +124,7 @@ impl Suspect {
     }
 }
 
-/// Every effect that may have begun, best first: an implausible size comes after every plausible one. The noise of each output is `growth`
-/// times as large as it was learned. Residuals of lost readings are taken on straight lines between those beside them, for each effect alike;
-/// they count as readings. An output that has no reading in all the rows is left out.
+/// Every effect that may have begun, best first: implausible sizes come last.
 pub(crate) fn isolate(
     structure: &Structure,
     learned: &Learned,

@@ -1,4 +1,4 @@
-//! The learning phase: the believed model fitted to the first rows of all outputs, and the noise that it leaves at each.
+//! Learning phase: the believed model is fitted to the first rows of all outputs, and a noise model to the residual of each output.
 
 mod learned;
 
@@ -27,7 +27,7 @@ const NO_NOISE: &str =
 const MOST_SUBSTEPS: usize = 1024;
 const MOST_COEFFICIENTS: usize = 64;
 
-/// Whether an input of this range has not moved.
+/// Whether an input with this range is constant.
 pub(crate) fn stands_still(low: f64, high: f64) -> bool {
     high - low <= STILL * high.abs().max(low.abs())
 }

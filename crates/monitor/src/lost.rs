@@ -5,7 +5,7 @@ use ct_signals::ArModel;
 /// Sweeps over the lost values; one is enough where no two lie within the noise's order.
 const SWEEPS: usize = 30;
 
-/// Values that are missing on straight lines between their neighbours, at an end as the nearest one; `None` where there is none at all.
+/// Linear interpolation of missing values, at an end with the nearest value; `None` if there is no value.
 pub(crate) fn interpolated(values: &[Option<f64>]) -> Option<Vec<f64>> {
     let first = values.iter().position(Option::is_some)?;
     let mut before = values[first]?;
@@ -25,7 +25,7 @@ pub(crate) fn interpolated(values: &[Option<f64>]) -> Option<Vec<f64>> {
     Some(filled)
 }
 
-/// Gives the `lost` values of a noise what is expected of them beside the others: the least squares of the innovations.
+/// Sets the `lost` values of a noise to their conditional mean given the others: least squares of the innovations.
 pub(crate) fn expect(noise: &ArModel, values: &mut [f64], lost: &[usize]) {
     let filter: Vec<f64> = std::iter::once(1.0)
         .chain(noise.coefficients().iter().map(|a| -a))

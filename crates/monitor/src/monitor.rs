@@ -55,10 +55,10 @@ impl Row {
     }
 }
 
-/// What a row says.
+/// Result of a row.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Step {
-    /// The learned model beside the reading of each output; `None` while learning, within a block of rows, and without a reading.
+    /// The innovation of each output; `None` while learning, within a block of rows, and without a reading.
     pub innovations: Each<Option<Innovation>>,
     /// For each output the reason why its reading is not used, if so; the inputs are used.
     pub lost: Each<Option<Refused>>,
@@ -94,7 +94,7 @@ pub enum Notice {
         /// The command is taken to have been held; else what is not known of the levels is waited for.
         bridged: bool,
     },
-    /// The clock was set back, as 100 rows in a row say: they are followed from here on, as after a long gap.
+    /// The clock was set back, as 100 consecutive rows show: these rows are used from here on, as after a long gap.
     ClockSetBack {
         /// The latest time before \[s\].
         from: f64,
@@ -263,7 +263,7 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// Takes in a row.
+    /// Processes a row.
     ///
     /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command, and
     /// nothing is judged by what is lost.
@@ -322,7 +322,7 @@ impl<'a> Monitor<'a> {
         self.model.0.outputs()
     }
 
-    /// The parameters as they are tracked, with their band; empty while learning. Allocates.
+    /// The tracked parameters with their bands; empty while learning. Allocates.
     #[must_use]
     pub fn estimates(&self) -> Vec<Estimate> {
         self.core.estimates()
@@ -345,7 +345,7 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// The slowest time constant that was learned \[s\].
+    /// The slowest learned time constant \[s\].
     #[must_use]
     pub fn time_constant(&self) -> Option<f64> {
         Some(self.core.learned()?.time_constant)

@@ -28,7 +28,7 @@ impl<'a> From<Model> for Watched<'a> {
 }
 
 impl Model {
-    /// The structure that was learned.
+    /// The learned structure.
     fn learned_structure(&self, learned: &Learned, units: &Units) -> Result<Structure, String> {
         let scales = learned.scales.clone().ok_or("a plant has scales")?;
         let mut structure = self.structure(scales).map_err(|error| error.to_string())?;

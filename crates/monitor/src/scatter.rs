@@ -14,11 +14,11 @@
 use serde::{Deserialize, Serialize};
 use statrs::function::{beta::ln_beta, factorial::ln_binomial};
 
-/// The share of the false alarms that is promised for the scatter; the scores have the rest.
+/// Share of the false alarm rate for the noise monitor; the scores have the rest.
 pub(crate) const SHARE: f64 = 0.1;
-/// Pairs in a block: the short ones see a large growth soon, the long ones a small one at all.
+/// Pairs in a block: short blocks detect a large increase early, long blocks detect a small increase.
 const BLOCKS: [usize; 3] = [16, 64, 256];
-/// The limit is passed by one learned pair in so many.
+/// In learning, one pair of this number exceeds the limit.
 const BEYOND: usize = 10;
 /// While the noise is increased, its variance is computed from blocks of this length ...
 const SIZED: usize = 1;
@@ -27,12 +27,12 @@ const BACK: usize = 2;
 /// This number of the latest eight pairs beyond the limit is suspicious: usually there is one.
 const SUSPICIOUS: u32 = 3;
 
-/// The limit that was learned.
+/// The learned limit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Limit {
     /// Limit of the difference of two neighbours, in standard deviations of the innovations.
     difference: f64,
-    /// Learned pairs, and how many of them lie at it or beyond.
+    /// Number of learned pairs, and of those at or beyond the limit.
     pairs: usize,
     beyond: usize,
     /// Root mean square of the learned innovations.
@@ -213,7 +213,7 @@ impl Scatter {
     }
 }
 
-/// The scatter of the readings about the learned model has grown, or has come back. Its serialised form is one line of the program's output.
+/// The noise of the readings has increased, or has returned to normal. Its serialised form is one line of the program's output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScatterAlarm {
     /// [`SCHEMA`](crate::SCHEMA).
@@ -225,13 +225,13 @@ pub struct ScatterAlarm {
     /// The vessel whose level is read, of several outputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<String>,
-    /// Standard deviation of the noise as it was learned \[output unit\].
+    /// Learned standard deviation of the noise \[output unit\].
     pub learned: f64,
     /// Standard deviation of the noise now \[output unit\].
     pub now: f64,
     /// The output unit.
     pub unit: String,
-    /// All of it in words.
+    /// The alarm in words.
     pub sentence: String,
 }
 
@@ -246,7 +246,7 @@ pub enum ScatterEvent {
 }
 
 impl ScatterAlarm {
-    /// `output`: its name, of several, and what it is in words; `noise`: as it was learned, with its unit.
+    /// `output`: its name, if there are several, and its description; `noise`: the learned noise, with its unit.
     pub(crate) fn new(
         moved: Moved,
         time: f64,

@@ -14,7 +14,7 @@ const MOST: f64 = 1e4;
 /// After a step change, standard errors are multiplied by this factor.
 const JUMP: f64 = 30.0;
 
-/// A tracker in its serialisable form: the deviations and their covariance, both in learned standard errors.
+/// Serialisable form of a tracker: the deviations and their covariance, both in learned standard errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct TrackerState {
     pub deviation: Vec<f64>,
@@ -45,7 +45,7 @@ impl TrackerState {
         }
     }
 
-    /// The parameters have jumped: what was known of them counts for little from now on.
+    /// The parameters have changed abruptly: earlier information gets a small weight.
     pub(crate) fn open(&mut self) {
         for entry in &mut self.covariance {
             *entry *= JUMP * JUMP;

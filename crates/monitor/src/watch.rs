@@ -1,4 +1,4 @@
-//! The learned model beside the plant: innovations, scores and the tracked parameters, a row at a time.
+//! The learned model run in parallel with the plant: innovations, scores and the tracked parameters, row by row.
 
 use ct_signals::{Hold, Whitener};
 
@@ -13,7 +13,7 @@ use crate::{
     watched::Watched,
 };
 
-/// The running model; what it holds is rebuilt from rows, and never saved.
+/// The running model; it is rebuilt from rows, and never saved.
 pub(crate) struct Watch<'a> {
     model: Box<dyn Model + 'a>,
     /// The noise of each output: what whitens it, and one over its standard deviation.
@@ -33,7 +33,7 @@ pub(crate) struct Watch<'a> {
 /// Output of the learned model for a row.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Said {
-    /// Its states.
+    /// States of the model.
     pub states: Each<f64>,
     /// State of the actuator \[input unit\].
     pub stands: f64,
@@ -140,7 +140,7 @@ impl<'a> Watch<'a> {
         said
     }
 
-    /// Lets the scores and the tracker see the readings that were followed last, each `growth` times as noisy as was learned.
+    /// Updates the scores and the tracker with the latest readings, with the noise of each output `growth` times the learned one.
     pub(crate) fn judge(
         &mut self,
         bank: &mut Bank,
@@ -170,7 +170,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// The tracker as it was learned.
+/// The tracker after learning.
 pub(crate) fn as_learned(learned: &Learned, lanes: usize) -> TrackerState {
     let positions: Vec<usize> = tracked(learned, lanes).iter().map(|(i, _)| *i).collect();
     TrackerState::learned(&learned.covariance_of(&positions))

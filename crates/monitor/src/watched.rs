@@ -23,12 +23,12 @@ pub(crate) struct Raised {
     pub stage: Stage,
     /// Now \[s\].
     pub time: f64,
-    /// When it was raised \[s\].
+    /// Time of the alarm \[s\].
     pub since: f64,
     /// The score that exceeded its threshold, and the threshold.
     pub score: f64,
     pub threshold: f64,
-    /// The output at which it shows most.
+    /// The output with the largest deviation.
     pub output: usize,
 }
 
@@ -49,12 +49,12 @@ pub(crate) trait Believed<'a>: Send + Sync {
     fn fingerprint(&self) -> Fingerprint;
     /// The model fitted to rows, and the states at the first of them; in words why it cannot be.
     fn learn(&self, samples: &[Sample], hold: Hold) -> Result<(Learned, Vec<f64>), String>;
-    /// Name and unit of each parameter, in the order of [`Learned::theta`]; in words why there are none.
+    /// Name and unit of each parameter, in the order of [`Learned::theta`]; or the reason in words why there are none.
     fn parameters(&self, learned: &Learned, units: &Units)
     -> Result<Vec<(String, String)>, String>;
     /// Number of the first parameters for which derivatives are computed.
     fn lanes(&self, parameters: usize) -> usize;
-    /// The learned model from these states on; `at_rest`: the first input before.
+    /// The learned model from these states on; `at_rest`: the input before the first row.
     fn run(&self, learned: &Learned, states: &[f64], at_rest: f64)
     -> Option<Box<dyn Running + 'a>>;
     /// Puts the states that are read where they are read.

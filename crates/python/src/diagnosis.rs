@@ -128,8 +128,8 @@ impl Diagnosis {
         })))
     }
 
-    /// The experiment that tells two effects apart best; what `ctid design --json` writes, without its mark, and the unit of the model's time
-    /// \[s\].
+    /// The experiment that distinguishes two effects best; the output of `ctid design --json` without its mark, and the unit of the model's
+    /// time \[s\].
     #[pyo3(signature = (between, *, ranges, slews, inputs, duration, seed, effort, time_limit, progress=None))]
     #[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
     fn design(
@@ -174,7 +174,7 @@ impl Diagnosis {
         Ok((json(&found)?, self.records.time_unit))
     }
 
-    /// The unit of each output; empty where no record says it.
+    /// The unit of each output; empty if no record has it.
     #[getter]
     fn output_units(&self) -> Vec<String> {
         crate::fit::units_of(&self.records.records)

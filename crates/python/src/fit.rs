@@ -106,7 +106,7 @@ impl Fit {
         .collect()
     }
 
-    /// Half the width of the interval that holds each of them with probability `level`.
+    /// Half the width of the interval that contains each of them with probability `level`.
     fn half_widths(&self, level: f64) -> PyResult<Vec<Option<f64>>> {
         if !(level > 0.0 && level < 1.0) {
             return Err(error::of_model(format!(
@@ -308,7 +308,7 @@ impl Fit {
         ))
     }
 
-    /// As bytes, to be pickled.
+    /// As bytes, for pickle.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = bytes::of(&KeptFit {
             model: self.model.kept(),

@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::error;
 
-/// A record before a model says what of it is what.
+/// A record before a model assigns its columns.
 #[pyclass(frozen, module = "ctid._ctid")]
 #[derive(Debug)]
 pub struct Frame(pub Content);
 
-/// What is in it.
+/// Columns of a frame.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Content {
     pub name: String,

@@ -21,7 +21,7 @@ use crate::{bytes, error, work};
 #[pyclass(frozen, module = "ctid._ctid")]
 pub struct Model(pub Arc<Inner>);
 
-/// A model and, where it comes from a fit, its values.
+/// A model and, after a fit, its values.
 pub struct Inner {
     /// Text for the user.
     pub text: String,
@@ -30,7 +30,7 @@ pub struct Inner {
     pub values: BTreeMap<String, f64>,
 }
 
-/// The same as it is pickled.
+/// The model in its pickled form.
 #[derive(Serialize, Deserialize)]
 pub struct Kept {
     name: String,
@@ -61,7 +61,7 @@ impl Inner {
         Ok(Self { text, file, values })
     }
 
-    /// Frames as the model takes them, of which so many come first that are fitted.
+    /// Frames as records of the model; the fitted ones come first, and `fitted` is their number.
     pub fn records(&self, frames: &[Content], fitted: usize) -> Result<Records, ctid::Error> {
         records(&self.file, frames, fitted)
     }
@@ -79,7 +79,7 @@ pub fn records(
     file.gathered(all, fitted, time_unit(frames))
 }
 
-/// Seconds in one unit of the time of frames, of which there is at least one.
+/// Seconds in one unit of the time of at least one frame.
 fn time_unit(frames: &[Content]) -> f64 {
     let time = frames.first().map(|frame| frame.time.clone());
     let columns = Columns {
@@ -196,7 +196,7 @@ impl Model {
         })
     }
 
-    /// The model with its effects in it as text, its values the fitted ones where it comes from a fit.
+    /// The model with its effects as text, with the fitted values after a fit.
     fn to_modelica(&self) -> PyResult<String> {
         let spec = self.0.valued().map_err(|error| error::of(&error))?;
         Ok(spec.to_string())

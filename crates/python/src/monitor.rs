@@ -20,7 +20,8 @@ struct Models {
     candidates: Vec<CandidateModel>,
 }
 
-/// Models that are watched live as long as the interpreter: a monitor borrows its own. Each text is kept once with the same candidates.
+/// Monitored models live as long as the interpreter, because a monitor borrows its model. Each text is stored once with the same
+/// candidates.
 static MODELS: Mutex<Option<HashMap<String, &'static Models>>> = Mutex::new(None);
 
 fn kept(spec: ModelSpec, settings: &OwnSettings) -> PyResult<&'static Models> {
@@ -185,7 +186,7 @@ type Innovation = Option<(f64, f64)>;
 
 #[pymethods]
 impl Monitor {
-    /// Takes in a row: innovations, the alarm and those of the scatter as JSON, notices, why readings are lost.
+    /// Processes a row: innovations, the alarm and those of the noise as JSON, notices, reasons for missing readings.
     #[allow(clippy::type_complexity)]
     fn update<'py>(
         &self,

@@ -166,7 +166,7 @@ impl StabilizedOe {
         self.0.update(u, y, dt)
     }
 
-    /// Takes in many samples, one `dt` in s for all. Returns the estimates after each, a row for each sample.
+    /// Processes many samples, one `dt` in s for all. Returns the estimates after each, a row for each sample.
     fn run<'py>(
         &mut self,
         py: Python<'py>,
@@ -223,7 +223,7 @@ impl StabilizedOe {
     }
 }
 
-/// Where zero of the signals is.
+/// Operating point of the signals.
 fn offsets(levels: &str) -> PyResult<Offsets> {
     match levels {
         "estimated" => Ok(Offsets::Estimated),

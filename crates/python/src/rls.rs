@@ -27,7 +27,7 @@ trait Online: Send + Sync {
 
 impl<const P: usize> Online for Fixed<P> {
     fn update(&mut self, phi: &[f64], y: f64, dt: f64) -> Innovation {
-        // Whoever calls this has counted them.
+        // The caller has checked the length.
         let phi = phi.first_chunk::<P>().copied().unwrap_or([f64::NAN; P]);
         RecursiveEstimator::update(self, &Sample::new(phi, y), dt)
     }
@@ -213,7 +213,7 @@ impl ContinuousRls {
         } else {
             let other =
                 || error::of_data("phi is a list of numbers, or an array of floats with one axis");
-            // Numpy makes a number of an array that holds one.
+            // Numpy converts an array with one entry to a number.
             if phi
                 .cast::<PyUntypedArray>()
                 .is_ok_and(|phi| phi.ndim() != 1)

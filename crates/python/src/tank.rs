@@ -163,7 +163,7 @@ impl TankFit {
             .collect()
     }
 
-    /// Half the width of the interval that holds each of them with probability `level`; none of the initial states.
+    /// Half the width of the interval that contains each of them with probability `level`; none for the initial states.
     fn half_widths(&self, level: f64) -> PyResult<Vec<Option<f64>>> {
         if !(level > 0.0 && level < 1.0) {
             return Err(error::of_model(format!(

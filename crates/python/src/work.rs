@@ -1,4 +1,4 @@
-//! Long work beside the interpreter: its lock is released, and Ctrl-C is heard.
+//! Long computations: the interpreter's lock is released, and Ctrl-C is checked.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -71,7 +71,7 @@ pub fn run<T: Send>(
                     stop.store(true, Ordering::Relaxed);
                 }
             };
-            // A panic is a mistake of ctid's; it has said its line.
+            // A panic is an internal error of ctid; its message is already printed.
             let ended = worker.join();
             if let Some(raised) = raised {
                 return Err(raised);

@@ -34,7 +34,7 @@ impl Bank {
         })
     }
 
-    /// Moves the states of a signal over one stretch. N is n.
+    /// Advances the states of a signal over one interval. N is n.
     #[inline]
     pub(crate) fn advance<const N: usize>(&self, state: &mut [f64; N], stretch: &Stretch) {
         let table = &self.tables[stretch.length * N * (N + 2)..][..N * (N + 2)];

@@ -1,4 +1,4 @@
-//! Records as the estimators see them: any number of inputs, one output, times that may be uneven.
+//! Records for the estimators: any number of inputs, one output, times that may be uneven.
 
 use ct_lti::Hold;
 
@@ -162,7 +162,7 @@ impl Data {
         }
     }
 
-    /// Refuses times that are not nearly even, for what counts in samples.
+    /// Rejects times that are not nearly even, for methods that count samples.
     pub(crate) fn require_even(&self, what: &'static str) -> Result<(), Error> {
         match self.off_grid(NEARLY_EVEN) {
             Some(index) => Err(Error::Uneven {

@@ -15,7 +15,7 @@ use crate::start::{ROUGH, Start};
 
 /// Points of the first grid of delays.
 const POINTS: usize = 16;
-/// A delay moves by this share of a step at least in one iteration, if it has to.
+/// A delay changes by at least this share of a step in one iteration, if its update is larger.
 const REACH: f64 = 0.25;
 /// Grids that are finer by this factor.
 const FINER: f64 = 4.0;
@@ -50,7 +50,7 @@ pub(crate) fn beginnings(records: &[Prepared]) -> Option<Vec<Prepared>> {
 }
 
 impl Problem<'_> {
-    /// Delays to start from, the best first, and by how much a delay may move in one iteration from there. `delays` holds the known ones.
+    /// Start values of the delays, the best first, and the largest change of a delay in one iteration. `delays` contains the known ones.
     ///
     /// # Errors
     /// As [`Problem::at_delays`].

@@ -4,7 +4,7 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A polynomial or a step that is no such thing.
+    /// An invalid polynomial or step.
     #[error(transparent)]
     Lti(#[from] ct_lti::Error),
     /// A series that `ct-signals` refuses.
@@ -48,7 +48,7 @@ pub enum Error {
     NotFinite {
         /// Name of the record.
         record: String,
-        /// Which signal.
+        /// The signal in question.
         what: String,
         /// Index of the sample, from 0.
         index: usize,
@@ -68,7 +68,7 @@ pub enum Error {
     Time {
         /// Name of the record.
         record: String,
-        /// Which sample, from 0.
+        /// Index of the sample, from 0.
         index: usize,
         /// The time before.
         before: f64,
@@ -85,7 +85,7 @@ pub enum Error {
         /// Allowed range.
         range: &'static str,
     },
-    /// A delay that leaves too little of a record.
+    /// A delay that leaves too few samples of a record.
     #[error(
         "{record}: a delay of up to {delay:?} leaves {left} of {samples} samples whose input is known, and {needed} are needed for {parameters} parameters; give a longer record, or a smaller largest delay"
     )]
@@ -121,7 +121,7 @@ pub enum Error {
     /// A B without coefficients.
     #[error("B of input {input} has no coefficient; give at least b_0")]
     NoNumerator {
-        /// Which input, from 1.
+        /// Number of the input, from 1.
         input: usize,
     },
     /// Too few samples.
@@ -161,7 +161,7 @@ pub enum Error {
         /// Constant value of the signal.
         value: f64,
     },
-    /// Steps that differ, where the method counts in samples.
+    /// Unequal steps for a method that counts samples.
     #[error(
         "{record}: the times leave an even grid at sample {index}, with a step of {step} where the mean is {expected}; {what} counts in samples: resample the record, or take SRIVC in open loop"
     )]
@@ -177,7 +177,7 @@ pub enum Error {
         /// Method that needs even steps.
         what: &'static str,
     },
-    /// A record in a loop beside one that is not.
+    /// A record in a loop together with one that is not.
     #[error(
         "{record}: this record has {found} that changes, and the first one has {first}; give all records of a loop their reference, or none"
     )]
@@ -217,12 +217,12 @@ pub enum Error {
         /// Name of the record.
         record: String,
     },
-    /// No start led anywhere.
+    /// No start gave a stable plant.
     #[error(
         "none of {tried} bandwidths of the first filter led to a stable plant; lower the orders, move the inputs more, or give another bandwidth"
     )]
     NoStart {
-        /// How many were tried.
+        /// Number of starts.
         tried: usize,
     },
 }

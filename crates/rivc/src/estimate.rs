@@ -47,7 +47,7 @@ use crate::{Data, Delay, Error, Structure};
 const STARTS: usize = 3;
 /// Number of repetitions of the search for neighbouring delays with the coloured noise model.
 const MOVES: usize = 4;
-/// Largest order of the noise that stands after the standard errors of SRIVC.
+/// Largest order of the noise model for the standard errors of SRIVC.
 const NOISE_ORDER: usize = 8;
 
 /// Assumed noise model.
@@ -63,7 +63,7 @@ pub enum Noise {
 /// Settings of an estimation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// What is taken for the noise.
+    /// Assumed noise model.
     pub noise: Noise,
     /// Largest order of autoregressive noise.
     pub noise_order: usize,
@@ -85,7 +85,7 @@ impl Settings {
     }
 }
 
-/// Which parameter.
+/// Kind of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -103,7 +103,7 @@ pub enum Kind {
     },
     /// Delay of an input \[time\].
     Delay {
-        /// Which input, from 0.
+        /// Index of the input, from 0.
         input: usize,
     },
     /// Offset of a record: output unit, with an integrator output unit/time.
@@ -113,12 +113,12 @@ pub enum Kind {
     },
 }
 
-/// One parameter.
+/// An estimated parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Which one.
+    /// Kind of the parameter.
     pub kind: Kind,
-    /// Its estimate.
+    /// Estimate of the parameter.
     pub value: f64,
     /// Standard error; none for a delay at the end of its range.
     pub std_error: Option<f64>,
@@ -133,7 +133,7 @@ pub struct Estimate {
     /// SRIVC, RIVC, CLSRIVC or CLRIVC.
     #[serde(deserialize_with = "method")]
     pub method: Name,
-    /// All a that are estimated, all b, input by input, the estimated delays, and the offset of each record.
+    /// Parameters in this order: estimated a, all b input by input, estimated delays, offset of each record.
     pub parameters: Vec<Parameter>,
     /// Covariance of [`Estimate::parameters`], row by row; 0 for a delay at the end of its range.
     pub covariance: Vec<f64>,
@@ -146,11 +146,12 @@ pub struct Estimate {
     pub noise: Vec<ArModel>,
     /// Root mean square of measured less simulated output over the readings that are there, on the measured inputs; output unit.
     pub residual_rms: f64,
-    /// Samples whose residual counts: those without a reading do not.
+    /// Number of samples with a residual; samples without a reading are not counted.
     pub samples: usize,
     /// Iterations from the last start.
     pub iterations: usize,
-    /// Whether the estimates have converged; else they are those with the least output error on the way, and their standard errors mean little.
+    /// Whether the estimates have converged; otherwise they are those with the least output error among the iterates, and their standard
+    /// errors are not reliable.
     pub converged: bool,
     /// For each record, the first sample that is used: for earlier samples the delayed inputs are not known.
     pub first: Vec<usize>,

@@ -66,7 +66,7 @@ impl Lengths {
     }
 }
 
-/// A signal with its hold, on times; `step` where they are even.
+/// A signal with its hold, and its times; `step` if they are even.
 pub(crate) struct Held<'a> {
     pub(crate) time: &'a [f64],
     pub(crate) step: Option<f64>,

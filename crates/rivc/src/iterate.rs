@@ -18,8 +18,8 @@ const SHARE_OF_SQUARE: f64 = 1e-5;
 /// A delay is known where steps forth and back leave less than this share of its standard error between them: where a whole number of
 /// samples fits best the criterion has a kink, and no step is small.
 const SHARE_OF_DELAY: f64 = 0.02;
-/// The output error may be larger than the least on the way by this share, in open loop and in a loop: its minimum is not quite where the
-/// equations hold beside coloured noise, and less so where the input answers to the noise.
+/// Largest relative increase of the output error over the least one among the iterates, in open loop and in a loop: with coloured noise,
+/// the solution of the equations is not exactly the minimum of the output error, in particular with feedback.
 const GROWTH: [f64; 2] = [0.02, 1.0];
 /// The models of the noise are estimated again while an estimate moves by more than this share of its standard error, or a standard deviation
 /// of the noise by more than that share, so many times at most.
@@ -47,7 +47,7 @@ pub(crate) struct Refined {
 /// Equations at a model.
 struct Asked {
     next: Model,
-    /// Whether no estimate would move by more than this share of its standard error.
+    /// Whether no estimate would change by more than this share of its standard error.
     within: [bool; 2],
     at_limit: Vec<usize>,
 }
@@ -70,8 +70,8 @@ impl Problem<'_> {
         structure.n - structure.lowest() + structure.numerators()
     }
 
-    /// Solves the equations at a model. A delay that would move too far, or beyond its limits, moves as far as it may, and the others are
-    /// solved for beside that.
+    /// Solves the equations at a model. A delay whose change exceeds its limit is set to the limit, and the others are solved for with this
+    /// value.
     fn ask(
         &self,
         model: &Model,
@@ -191,7 +191,7 @@ impl Problem<'_> {
             let asked = match asked {
                 Ok(asked) if iterations < most => asked,
                 Ok(_) => break,
-                // The first equations say what is wrong; later ones only that it diverged.
+                // The first equations show the actual error; later ones show only that the iteration diverged.
                 Err(error) if iterations == 0 => return Err(error),
                 Err(_) => break,
             };
@@ -215,7 +215,7 @@ impl Problem<'_> {
             for _ in 0..HALVINGS {
                 if next.is_stable(structure) {
                     if with_delays {
-                        // A first sample that came and went with a delay would keep the estimates from converging.
+                        // A first sample that changes with a delay would prevent convergence.
                         largest = next.delays.iter().copied().fold(largest, f64::max);
                         delayed = Arc::new(self.delayed(&next.delays, largest));
                     }

@@ -79,7 +79,7 @@ impl Model {
         Ok(self)
     }
 
-    /// Half way from another one to this one.
+    /// The mean of this model and another one.
     pub(crate) fn half_way_from(&self, other: &Self) -> Self {
         let half = |new: &[f64], old: &[f64]| -> Vec<f64> {
             new.iter().zip(old).map(|(a, b)| 0.5 * (a + b)).collect()

@@ -37,7 +37,7 @@ pub(crate) struct Row<'a> {
     pub(crate) target: f64,
     /// Simulated output for [`Instruments::Model`].
     pub(crate) simulated: f64,
-    /// The measured output, or what stands for it.
+    /// The measured output, or its replacement.
     pub(crate) y: f64,
     /// The reading is missing: the row does not count.
     pub(crate) missing: bool,

@@ -8,7 +8,7 @@ use crate::pass::{Instruments, Pass};
 use crate::prepared::{Means, Prepared};
 use crate::{Data, Delay, Error, Structure};
 
-/// Singular values below this share of the largest belong to nothing that the record shows.
+/// Singular values below this share of the largest belong to directions without influence on the record.
 const UNSEEN: f64 = 1e-9;
 
 /// `A(p) y = sum_j B_j(p) u_j(t - d_j)`.

@@ -107,7 +107,7 @@ impl Prepared {
         !self.missing.is_empty()
     }
 
-    /// Readings from a sample on that are there.
+    /// Number of present readings from a sample on.
     pub(crate) fn readings_from(&self, first: usize) -> usize {
         (first..self.len()).filter(|k| !self.is_missing(*k)).count()
     }

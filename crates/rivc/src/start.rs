@@ -17,7 +17,7 @@ pub(crate) const ROUGH: Effort = Effort {
     instruments: 1,
     iterations: 3,
 };
-/// A pole that is added lies at this over the step.
+/// An added pole has this value divided by the step.
 const FAST: f64 = 2.0;
 
 /// Number of passes for a start.

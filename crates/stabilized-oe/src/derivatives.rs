@@ -131,7 +131,7 @@ pub struct KnownSample<const N: usize, const U: usize> {
     pub derivatives: [f64; N],
 }
 
-/// Derivatives that the caller knows: from sensors of their own, from other filters, or in a simulation.
+/// Derivatives that the caller knows: from other sensors, from other filters, or in a simulation.
 #[derive(Clone, Copy, Debug)]
 pub struct Known<const N: usize, const U: usize> {
     derivatives: [f64; N],

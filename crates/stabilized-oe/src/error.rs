@@ -1,4 +1,4 @@
-//! What can be wrong with a setting or a run: each message carries the numbers that disagree and the correction.
+//! Errors of settings and runs: each message contains the numbers that disagree and the correction.
 
 /// Everything this crate can refuse, and why a run has stopped.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -103,7 +103,7 @@ pub struct Bounded {
 }
 
 impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> StabilizedOe<N, P, G, D> {
-    /// An estimator with the start that its gain holds, a model at rest, and no bounds on `c^`.
+    /// An estimator with the start values of its gain, a model at rest, and no bounds on `c^`.
     ///
     /// `theta^` is kept where `A^` is Hurwitz, with `a_i` above a thousandth of `dt^i` and `a_n` above `dt^n` or `0.05 dt a_{n-1}(0)`,
     /// whichever is less, for the shortest step so far. A lag below that cannot be seen; but the model's highest derivative is divided
@@ -209,7 +209,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         }
     }
 
-    /// S_theta: bounds on `theta^`, instead of the default ones. `A^` is kept Hurwitz besides.
+    /// S_theta: bounds on `theta^` that replace the default ones. `A^` is kept Hurwitz in addition.
     ///
     /// # Errors
     /// [`Error::StartOutside`].

@@ -21,7 +21,7 @@ impl Integrator for Euler {}
 
 pub(crate) mod sealed {
     pub trait ModelRule {
-        /// Whether a model that is stable stays so over any step. Otherwise its poles may not be faster than the step.
+        /// Whether a stable model stays stable for any step. Otherwise its poles may not be faster than the step.
         const ANY_STEP: bool;
 
         /// One step of `dt` seconds of the model with the coefficients `a = (a_1, .., a_n)` and an input that changes from `w0` to `w1`.
@@ -141,7 +141,7 @@ fn functions<const N: usize>(z: &Matrix<N>) -> (Matrix<N>, Matrix<N>) {
     for (i, row) in phi1.iter_mut().enumerate() {
         row[i] += 1.0;
     }
-    // e^Z - 1, which keeps the digits of slow modes beside fast ones
+    // e^Z - 1, without cancellation for slow modes next to fast ones
     let mut e = product(&z, &phi1);
     for _ in 0..doublings {
         let square = product(&phi1, &phi1);

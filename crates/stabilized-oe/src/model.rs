@@ -34,7 +34,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
         self.held.map_or(0.0, |held| held.dt)
     }
 
-    /// Brings the states to the end of the step under way; `inputs` are those there, in the places of `b`.
+    /// Advances the states to the end of the current step; `inputs` are the inputs at the end, in the order of `b`.
     #[inline]
     pub fn advance<I: Integrator>(&mut self, inputs: &[f64; P], smooth: bool) {
         let Some(held) = &self.held else { return };

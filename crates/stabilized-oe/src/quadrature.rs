@@ -36,7 +36,7 @@ const POINTS: [(f64, f64); 4] = [
     (0.408_282_678_752_175_1, 0.181_341_891_689_181),
 ];
 
-/// Beyond this exponent nothing is left of the error.
+/// Beyond this exponent the error is negligible.
 const GONE: f64 = 45.0;
 
 /// Pieces for each `e`-fold of `1 + (rates) t`: with 2 the integrals are right to 1e-9.

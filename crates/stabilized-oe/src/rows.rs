@@ -87,7 +87,7 @@ impl<const N: usize, const P: usize> CoupledRow<N, P> {
         self.theta.weight()
     }
 
-    /// What the row says.
+    /// Equality or inequality.
     pub fn relation(&self) -> Relation {
         self.theta.relation()
     }

@@ -38,10 +38,10 @@ use crate::gain::{is_silent, windows};
 use crate::quadrature::{Block, shares};
 use crate::{BlockDiagonal, CoupledRow, Error, Gain};
 
-/// The largest `c_lambda lambda_i`: as that of `c`, it keeps every number in range.
+/// The largest `c_lambda lambda_i`: like the limit of `c`, it avoids overflow.
 const MAX_LAMBDA: f64 = 1e40;
 
-/// A row with more information counts as one with this.
+/// Upper limit of a row's information; larger values are replaced by it.
 const MAX_INFORMATION: f64 = 1e60;
 
 /// `c_p P~ + c_lambda Lambda`, an adaptive block-diagonal gain and a constant diagonal one; the paper's (4.11a), (4.18a,b).
@@ -152,7 +152,7 @@ struct Step {
     dt: f64,
 }
 
-/// The weights that a step takes place with: without forgetting where the block's guard finds its regressor silent.
+/// The actual weights of a step: without forgetting if the block's guard finds no excitation in its regressor.
 fn in_force<const K: usize>(rls: &ContinuousRls<K>, f: &SVector<f64, K>) -> Option<Weights> {
     let weights = rls.weights();
     if is_silent(rls, f) {

@@ -13,13 +13,14 @@ use statrs::statistics::{Data, OrderStatistics};
 
 /// A jump is a change of the output by more than this share of its range (95 %) within this number of samples.
 const JUMP: (f64, usize) = (0.4, 4);
-/// Between two jumps the output is constant where it varies (80 %) by less than this part of its range ...
+/// Between two jumps the output is constant if its spread (80 %) is below this share of its range ...
 const STILL: f64 = 0.35;
 /// ... while the command moves over more than this share of its own range, and relatively more than the output by this factor.
 const MOVED: (f64, f64) = (0.25, 1.2);
 /// Fewest samples of a plateau.
 const SHORTEST: usize = 6;
-/// The valve sticks where so many plateaus are seen, in this part of the jumps, over this part of the record.
+/// The valve sticks if there are this many plateaus, this share of the jumps leads to plateaus, and the plateaus cover this share of the
+/// record.
 const PLATEAUS: usize = 3;
 const OF_JUMPS: f64 = 0.5;
 const OF_RECORD: f64 = 0.35;
@@ -43,7 +44,7 @@ pub(crate) fn sticks(records: &[Record]) -> bool {
     })
 }
 
-/// The width of the middle part of values that holds this share of them.
+/// The width of the central interval that contains this share of the values.
 fn spread(values: &[f64], share: f64) -> f64 {
     let mut data = Data::new(values.to_vec());
     data.quantile(0.5 + 0.5 * share) - data.quantile(0.5 - 0.5 * share)
@@ -64,7 +65,7 @@ fn shape(command: &[f64], output: &[f64]) -> Shape {
     if !(moves > 0.0 && range > 0.0) {
         return none;
     }
-    // Instants of the jumps, each in the middle of its steepest change.
+    // Instants of the jumps, each at its steepest change.
     let change = |k: usize| (output[k + within] - output[k]).abs();
     let mut edges = vec![0];
     let mut k = 0;

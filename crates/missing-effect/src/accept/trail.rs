@@ -1,4 +1,4 @@
-//! The trail: the believed model, then one effect after the other, so that the error can be watched falling.
+//! Error ladder: the believed model, then one effect after the other, so that the fall of the error is visible.
 
 use greybox::Noise;
 use plants::Placed;
@@ -19,7 +19,7 @@ const STARTS_AROUND: usize = 6;
 /// The model that names the effects has to meet the same condition as the believed one.
 const ROUNDS: (u64, u64) = (2, 4);
 
-/// The believed model, then one effect after the other, first what lowers the error most.
+/// The believed model, then one effect after the other, each time the one that lowers the error most.
 pub(crate) fn trail<'a>(
     base: &Node<'a>,
     last: &Node<'a>,

@@ -18,11 +18,11 @@ use crate::{
 
 /// Share of the time limit in which the best fit follows changed ranges.
 const FOLLOW: f64 = 0.1;
-/// Random starts of the plant alone, before its effects are put on.
+/// Random starts of the plant alone, before its effects are added.
 const BARE_STARTS: usize = 12;
 
-/// The believed model, fitted to simulation error; its best minimum is found at least twice, or 96 starts were tried. In a
-/// loop that is known it is then fitted there. After this share of the time limit it has no further starts.
+/// The believed model, fitted to simulation error; its best minimum is found at least twice, or 96 starts were tried. If the loop is known,
+/// the model is then fitted in the loop. After this share of the time limit no further start is used.
 pub(crate) fn base<'a>(
     problem: &'a Problem,
     options: &Options<'a>,
@@ -57,8 +57,8 @@ pub(crate) fn base<'a>(
     let mut starts = options.starts.max(10);
     let one_by_one = one_by_one(&setup, options.seed)?;
     let fit = loop {
-        // The start of one effect after the other comes first: out of time no other is followed. What the user guesses of some
-        // parameters goes with it.
+        // The start with effects added one by one comes first: if the time is over, no other start is used. It includes the user's guesses
+        // of parameters.
         let mut all: Vec<Vec<f64>> = one_by_one.iter().cloned().collect();
         all.extend(random_starts(&setup, starts, options.seed));
         if !problem.start.is_empty() {

@@ -1,5 +1,4 @@
-//! Records from a closed loop: the loop simulated from its reference where its controller is known, and what is said where
-//! it cannot be.
+//! Records from a closed loop: the loop is simulated from its reference if its controller is known; otherwise a warning is given.
 //!
 //! The noise comes back through the command. A model that runs on the measured command is then wrong in a way that depends on the spectrum
 //! of the noise (`greybox`, `feedback.rs`); one whose loop runs on the reference is not.
@@ -25,7 +24,7 @@ const OTHER_CONTROLLER: f64 = 0.05;
 /// Consequence of running a model on the measured command of a loop.
 const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and scores are biased; the standard errors are enlarged for this.";
 
-/// Closes the loop around a fitted node where that is possible, and says what is known of the loop.
+/// Closes the loop around a fitted model if possible, and describes the loop.
 pub(crate) fn enclose<'a>(
     problem: &Problem,
     options: &Options,

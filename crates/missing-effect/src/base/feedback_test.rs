@@ -29,18 +29,18 @@ use statrs::statistics::{Data, OrderStatistics};
 const OWN: usize = 12;
 /// The residuals that are tested: the present one and those before it.
 pub(crate) const LAGS: usize = 7;
-/// The input moves at this part of the samples at least.
+/// The input has to change at this share of the samples at least.
 const MOVES: f64 = 0.5;
 /// Past residuals explain this part at least of what the input's own past does not: less biases no estimate.
 const EXPLAINED: f64 = 0.02;
 /// A response is significant from so many standard errors on.
 const SIGNIFICANT: f64 = 4.0;
-/// The input's own past leaves this part at least of its changes.
+/// Least share of the input's changes that its own past does not predict.
 const PREDICTABLE: f64 = 1e-6;
 /// Changes are clipped at so many robust standard deviations.
 const CLIPPED: f64 = 5.0;
 
-/// The probability that an input without feedback looks so; 1 where the test says nothing.
+/// p-value of the hypothesis that the input is without feedback; 1 if the test is not possible.
 ///
 /// `input` and `residual`: one value for each sample of one record; `gain`: a number of the sign of the plant's gain, `None` where it
 /// is not to be relied on.
@@ -113,7 +113,7 @@ pub(crate) fn feedback_p(input: &[f64], residual: &[f64], gain: Option<f64>) -> 
 
 /// A regression of the last column on the first ones.
 struct Regression {
-    /// Sum of squares that is left.
+    /// Residual sum of squares.
     left: f64,
     coefficients: Vec<f64>,
     /// Variances of the coefficients for a residual of unit variance.

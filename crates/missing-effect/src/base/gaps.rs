@@ -93,7 +93,7 @@ impl Mended {
         }))
     }
 
-    /// Joins what is shown of parts to the records that they are of, and says what was done.
+    /// Joins the results of the parts of a record, and reports the handling of gaps.
     pub fn report(&self, diagnosis: &mut Diagnosis) {
         diagnosis.records = self.joined(&diagnosis.records, |whole: &mut Shown, part| {
             whole.time.extend(part.time);

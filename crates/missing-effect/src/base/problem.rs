@@ -23,13 +23,13 @@ pub struct Problem {
     pub start: BTreeMap<String, f64>,
     /// Names in `start` that are not fitted.
     pub fixed: Vec<String>,
-    /// What is known of parameters beside the records, by the same names.
+    /// Priors of parameters, by the same names.
     pub priors: BTreeMap<String, PriorValue>,
     /// The records that are fitted together.
     pub records: Vec<Record>,
-    /// The controller of the loop, where there is one: it must make the fitted plant stable.
+    /// The controller of the loop, if there is one: it must stabilise the fitted plant.
     pub controller: Option<Controller>,
-    /// Records that take no part in any fit or choice and are only scored.
+    /// Held-out records, which are scored but not used for fits or selection.
     pub test: Vec<Record>,
 }
 
@@ -47,8 +47,8 @@ pub struct Options<'a> {
     pub simulate_loop: bool,
     /// Cancellation flag: when set, the computation ends soon with [`greybox::Error::Stopped`].
     pub stop: Option<&'a AtomicBool>,
-    /// Limit on the time of the search: what it does not allow is left out, and [`crate::Effort`] says what. `None`: no limit. A
-    /// result depends on the speed of the machine only where the limit is reached.
+    /// Time limit of the search: steps beyond it are left out, and [`crate::Effort`] lists them. `None`: no limit. A result depends on the
+    /// speed of the computer only if the limit is reached.
     pub time_limit: Option<Duration>,
     /// Interruption flag: when set, the search ends soon with the best that was found so far.
     pub interrupt: Option<&'a AtomicBool>,

@@ -16,7 +16,7 @@ pub struct ProblemBuilder {
 }
 
 impl Problem {
-    /// The believed plant, what is known of it, and the records that are fitted together.
+    /// The believed plant, its known constants, and the records that are fitted together.
     pub fn builder(plant: Plant, known: Known, records: impl Into<Vec<Record>>) -> ProblemBuilder {
         ProblemBuilder {
             problem: Self {
@@ -61,7 +61,7 @@ impl ProblemBuilder {
         self.start(parameter, value)
     }
 
-    /// What is known of a parameter beside the records.
+    /// Prior of a parameter.
     pub fn prior(mut self, parameter: impl Into<String>, prior: PriorValue) -> Self {
         self.problem.priors.insert(parameter.into(), prior);
         self

@@ -10,7 +10,7 @@ use super::{
 use crate::Error;
 use effect_search::design::{Kind, Power, Prospect, Sequence, power, prospect, times_as_long};
 
-/// Nobody repeats an experiment more often.
+/// Largest useful number of repetitions of an experiment.
 const MOST_TIMES: f64 = 20.0;
 
 impl Search<'_, '_> {

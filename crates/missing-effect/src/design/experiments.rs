@@ -275,7 +275,8 @@ impl Search<'_, '_> {
         Ok((tried, [overfull, limited]))
     }
 
-    /// Refits in rounds until a refit leads, so that no promise is above what a refit has shown; as far as the time suffices.
+    /// Refits in rounds until the best experiment is a refitted one, so that no predicted power exceeds a confirmed one, as far as the time
+    /// suffices.
     pub fn refit(&self, tried: &mut Vec<Tried>, bounds: &Bounds, before: &Before) {
         let mut done = 0;
         while done < MOST_REFITS
@@ -305,7 +306,7 @@ impl Search<'_, '_> {
                 total: MOST_REFITS,
             });
         }
-        // After so many rounds the best of those that were refitted.
+        // After this number of rounds, the best refitted experiment is used.
         tried.sort_by_key(|(candidate, _)| !candidate.refitted);
     }
 

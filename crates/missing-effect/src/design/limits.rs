@@ -21,7 +21,7 @@ fn at_least(value: f64) -> String {
 pub struct Limits {
     /// Smallest and largest value of what is applied: the command, or in a loop the reference. Without it what the records visited.
     pub range: Option<(f64, f64)>,
-    /// Largest change of what is applied in a second. Without it there is none.
+    /// Largest change of the applied signal per second; none by default.
     pub slew: Option<f64>,
     /// Length \[s\]. Without it that of the longest record.
     pub duration: Option<f64>,
@@ -33,7 +33,7 @@ pub struct Limits {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refused {
-    /// One effect twice.
+    /// The two effects are the same.
     #[error("--between {effect} {effect}: an effect cannot be told from itself; name two")]
     SameEffect {
         /// The effect.
@@ -103,7 +103,7 @@ pub enum Refused {
         /// Name of the bound.
         what: &'static str,
     },
-    /// What is applied never moved, and nobody says how far it may.
+    /// The applied signal is constant in the records, and no range is given.
     #[error(
         "the records hold one {what} of {} alone, so its permitted range is not known; give --range",
         shown(*value)
@@ -184,7 +184,7 @@ pub enum Refused {
 /// The most samples of an experiment: a week at one a second is too many to search among.
 const MOST_SAMPLES: usize = 200_000;
 
-/// The limits as they hold, in seconds and the units of what is applied.
+/// The checked limits, in seconds and the units of the applied signal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bounds {
     /// Smallest value.
@@ -337,7 +337,7 @@ impl Bounds {
         })
     }
 
-    /// A wider range that the user might allow: all that is possible, or half as far again either way.
+    /// A wider range that the user might allow: the largest possible one, or half as much again in each direction.
     pub(crate) fn wider(&self, problem: &Problem, looped: bool) -> Option<Self> {
         let (low, high) = match possible(problem, looped) {
             Some((from, to, _)) if !looped => (from, to),

@@ -1,4 +1,4 @@
-//! The next experiment: the one that tells two effects apart which the records leave undecided.
+//! Design of the next experiment, which distinguishes two effects that the records do not distinguish.
 //!
 //! Each of the two is fitted to the records. Sequences within the user's limits are then applied to either fit, and it is
 //! reckoned how far the other stays behind what they show (`separation.rs`). The most promising are confirmed by refits.
@@ -114,7 +114,7 @@ pub fn design(
     for Candidacy { effect, .. } in between {
         Domain::check(effect, problem.plant, unit.map_or("", |unit| unit))?;
     }
-    // What is wrong with the limits is said before anything is computed, as far as it can be.
+    // Errors in the limits are reported before the computation as far as possible.
     let looped = problem.controller.is_some() && options.simulate_loop;
     let has_reference = problem.records.iter().all(|r| !r.references.is_empty());
     Bounds::new(problem, limits, looped && has_reference, 0)?;

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::limits::Bounds;
 use crate::{Effort, Parameter, result::domain_of};
 
-/// One of the two effects that are to be distinguished.
+/// One of the two effects to be distinguished.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alternative {
     /// The effect.
@@ -20,7 +20,7 @@ pub struct Alternative {
     pub at_the_edge: bool,
     /// Root mean square of the simulation error with it on the records, in the output's unit.
     pub rmse: f64,
-    /// By how much it lowers the criterion of the believed model.
+    /// Fall of the criterion from the believed model.
     pub bic_gain: f64,
     /// How to confirm the effect at the plant; empty outside hydraulics.
     pub confirm: String,
@@ -67,7 +67,7 @@ pub struct Candidate {
     pub at_limit: bool,
 }
 
-/// What a wider range would give.
+/// Result of a wider range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Wider {
     /// Lower end.
@@ -83,15 +83,15 @@ pub struct Wider {
 pub struct SecondSensor {
     /// The level that is not measured.
     pub level: String,
-    /// In records like those that there are, the one level measured that is.
+    /// For records like the existing ones, with one measured level.
     pub existing_without: Power,
-    /// In records like those that there are, both levels measured.
+    /// For records like the existing ones, with both levels measured.
     pub existing_with: Power,
     /// In the best experiment, both levels measured there.
     pub best_with: Power,
 }
 
-/// What a person applies to the plant.
+/// The sequence to apply to the plant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sequence {
     /// Name of what is applied: that of the command, or in a loop that of the reference.
@@ -111,15 +111,15 @@ pub struct Design {
     pub schema: u32,
     /// The two effects.
     pub between: [Alternative; 2],
-    /// By how much the criterion of the second is above that of the first on the existing records.
+    /// Criterion of the second model minus that of the first on the existing records.
     pub bic_ahead: f64,
-    /// What the best experiment can be expected to do.
+    /// Expected result of the best experiment.
     pub prospect: Prospect,
     /// The reference of the loop is applied, not the command.
     pub in_loop: bool,
-    /// The limits that hold.
+    /// The limits in force.
     pub limits: Bounds,
-    /// The experiments, the best first: of those that have power in plenty the one that stays nearest to what the records visited.
+    /// The experiments, the best first: among those with ample power, the one closest to the range of the records.
     pub candidates: Vec<Candidate>,
     /// Experiments that were left out because they would overfill a tank.
     pub overfull: usize,
@@ -127,7 +127,7 @@ pub struct Design {
     pub limited: usize,
     /// What the longest record had, once more.
     pub again: Option<Candidate>,
-    /// The best of a wider range, where there is one to be had.
+    /// The best experiment of a wider range, if a wider range is possible.
     pub wider: Option<Wider>,
     /// Repeated so many times, the best experiment would decide; `None` where it does already, or would not.
     pub times_as_long: Option<usize>,
@@ -156,7 +156,7 @@ impl Design {
         domain_of(&self.plant, &self.output_unit)
     }
 
-    /// No experiment tells the two apart: none is worth making.
+    /// Whether no experiment distinguishes the two.
     #[must_use]
     pub fn twins(&self) -> bool {
         self.prospect == Prospect::Twins

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{Error, fit::node::Node};
 
-/// The vessel that it would stand in: the first one that is not measured; `None` where all are.
+/// The vessel of the additional sensor: the first one that is not measured; `None` if all are measured.
 pub(crate) fn place(structure: &Structure) -> Option<usize> {
     let measured = |vessel| {
         let mut outputs = structure.scales.outputs.iter();
@@ -52,7 +52,7 @@ fn setup<'a>(node: &Node, records: &'a [Record]) -> Option<Setup<'a>> {
     Some(setup)
 }
 
-/// Records as one model shows them, with that sensor; `x`: its vector for these records.
+/// Records simulated by one model, with the additional sensor; `x`: the model's parameter vector for these records.
 fn shown(truth: &Node, records: &[Record], x: &[f64]) -> Option<Vec<Record>> {
     let mut records = with_output(records);
     let mut series = setup(truth, &records)?.simulate(x).ok()?.output.into_iter();
@@ -106,7 +106,7 @@ pub(crate) fn in_existing(truth: &Node, stand_in: &Node, metric: &Metric) -> Opt
     for (name, prior) in priors_of_truth(truth, stand_in) {
         let setup = &stand_in.setup;
         let column = |free: &usize| setup.names()[*free] == name;
-        // The parameters that are fitted come first, here as there.
+        // The fitted parameters come first in both vectors.
         if let Some(column) = setup.free().iter().position(column) {
             let scale = metric.scales[0] / prior.std_error;
             let mut row = vec![0.0; last + 1];

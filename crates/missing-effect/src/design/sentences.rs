@@ -13,7 +13,7 @@ use crate::{
 /// Criteria that differ by less are equal, in words.
 const TWIN: f64 = 0.01;
 
-/// An effect, with the tank where there are two, and its size.
+/// An effect, with its tank if there are two, and its size.
 fn sized(alternative: &Alternative, domain: Domain) -> String {
     let size = alternative.size.as_ref().map_or(String::new(), |size| {
         let name = size.name.rsplit('.').next().unwrap_or_default();

@@ -50,7 +50,8 @@ impl Metric {
         noise.stationary_std() / noise.sigma() * self.scales[0]
     }
 
-    /// A setup with other records in which outputs count by this noise, and not by what a model without noise leaves of them.
+    /// A setup with other records, in which outputs are weighted by this noise and not by their residuals (a noise-free simulation has
+    /// none).
     pub fn with_records<'a, 'b>(
         &self,
         setup: &Setup<'a>,
@@ -65,10 +66,10 @@ impl Metric {
     }
 }
 
-/// A model's information on its free parameters from the records that are there: rows `[R | 0]`, the initial states eliminated.
+/// A model's information on its free parameters from the existing records: rows `[R | 0]`, the initial states eliminated.
 pub(crate) fn information(node: &Node, metric: &Metric) -> Triangle {
     let setup = &node.setup;
-    // A fit weighs its outputs by their own residuals; here they count as in the metric.
+    // A fit weights its outputs by their own residuals; here the weights are those of the noise model.
     let weighed = || {
         let mut setup = setup.clone();
         setup.known_scales = Some(metric.scales.clone());

@@ -14,7 +14,7 @@ pub(crate) enum Loop<'a> {
     Closed(&'a Controller),
 }
 
-/// What came out.
+/// Result of a simulated experiment.
 #[derive(Debug, Clone)]
 pub(crate) struct SimulatedExperiment {
     /// The record that the experiment would give, free of noise.
@@ -27,7 +27,7 @@ pub(crate) struct SimulatedExperiment {
     pub levels: Vec<(f64, f64)>,
 }
 
-/// Time constants for which the plant is left to settle, and the most samples that this takes in a loop.
+/// Time constants for the plant to settle, and the largest number of samples for this in a loop.
 const SETTLE: f64 = 12.0;
 const MOST_SETTLING: usize = 20_000;
 /// Parts of a time constant in which a plant without a loop settles.
@@ -105,7 +105,7 @@ fn rest(node: &Node, into: &Loop, first: f64, interval: f64, time_constant: f64)
     }
 }
 
-/// Simulates a sequence; `None` where the simulation does not stay finite, or nobody waits any more.
+/// Simulates a sequence; `None` if the simulation diverges, or if the search was cancelled.
 pub(crate) fn simulate_experiment(
     node: &Node,
     into: &Loop,

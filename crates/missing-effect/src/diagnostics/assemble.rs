@@ -7,7 +7,7 @@ use crate::{
     Diagnosis, Effort, NoiseFloor, Problem, Rankings, Shown, Step, Verdict, result::Floors,
 };
 
-/// The noise floors that a noise model stands for.
+/// The noise floors of a noise model.
 pub(crate) fn floors(problem: &Problem, noise: &Noise, source: &str) -> Floors {
     let outputs = problem.records[0].outputs.iter().zip(noise.iter());
     let floors = outputs.map(|(output, noise)| NoiseFloor {

@@ -1,4 +1,4 @@
-//! Records that take part in no fit and no choice: their initial states are fitted on the first samples, the rest is scored.
+//! Held-out records: their initial states are fitted on the first samples, the rest is scored.
 
 use ct_signals::{Channel, Record};
 use greybox::{Stopping, fit_initial_levels};
@@ -92,8 +92,8 @@ pub(crate) fn held_out_rmse(node: &Node, test: &[Record]) -> Result<Vec<f64>, Er
     Ok(held_out.into_iter().map(|(_, rmse, _)| rmse).collect())
 }
 
-/// Sums of squares of measured minus model: all of it, what its mean explains, what a factor on the model's deviations from
-/// their mean explains beside it, and what is left.
+/// Sums of squares of measured minus model: the total, the part of its mean, the part of a factor on the model's deviations from their
+/// mean, and the rest.
 fn error_parts(pairs: &[(f64, f64)]) -> [f64; 4] {
     let n = pairs.len().max(1) as f64;
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;

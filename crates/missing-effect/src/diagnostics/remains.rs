@@ -10,7 +10,7 @@
 //! - **an instant**: windows of 1, 2, 4, ... samples of `w`, whose sums over the root of their length are standard normal.
 //! - **the level**: `w` against functions of what the model read a sample before. A term that is missing from a balance leaves a
 //!   residual that drifts with the level, and is no noise however slow it is. As `w` is white and independent of the past, its   regression
-//! on any past is chi-square, whatever the colour of the regressors.
+//!   on any past is chi-square, whatever the colour of the regressors.
 //! - **slowness**: the integral of the noise's autocorrelation over positive lags is longer than the slowest time constant
 //!   of the process. Such a noise can stand for anything that the process lacks, so it is no answer.
 //!
@@ -131,7 +131,7 @@ fn least_p(
     signals: impl Fn(&[f64]) -> Vec<Vec<f64>>,
 ) -> Result<(f64, Option<usize>), Error> {
     let residuals = node.setup.disturbance(&node.fit.x)?;
-    // In a loop the command holds the noise that came back; what moves it from outside is the reference.
+    // In a loop the command contains fed-back noise; the reference is the external signal.
     let in_loop = !node.setup.replays().is_empty();
     let (mut least, mut at, mut count) = (1.0, None, 0.0);
     let outputs = node.setup.outputs();

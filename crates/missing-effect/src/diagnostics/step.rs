@@ -22,7 +22,7 @@ pub(crate) fn of_one(outputs: &[f64]) -> f64 {
     }
 }
 
-/// Standard errors under the colour of the node's own residual, whatever metric it was fitted in.
+/// Standard errors with the noise model of the model's own residual, whatever the weighting of its fit.
 fn std_errors(node: &Node) -> Result<Vec<Option<f64>>, Error> {
     Ok(if node.fit.noise.order() > 0 {
         node.fit.std_errors()

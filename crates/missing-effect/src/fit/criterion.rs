@@ -19,7 +19,7 @@ pub const GROUP_MARGIN: f64 = 6.0;
 pub(crate) fn beyond_chance(gained: &Node, lacking: &Node) -> bool {
     let free = |node: &Node| node.setup.free().len();
     let freedom = free(gained).saturating_sub(free(lacking)).max(1);
-    // A noise of its own may have more coefficients, which lower the deviance too.
+    // The noise model of the larger set may have more coefficients, which lower the deviance too.
     let freedom = freedom.max(gained.fit.parameters.saturating_sub(lacking.fit.parameters));
     let fall = lacking.fit.deviance - gained.fit.deviance;
     let chance = ChiSquared::new(freedom as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));

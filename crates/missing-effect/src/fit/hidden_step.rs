@@ -33,8 +33,8 @@ pub(crate) fn step_of(setup: &Setup) -> Option<usize> {
     setup.names().iter().position(|name| name == STEP)
 }
 
-/// The step of an output's sensor that takes most out of what a node does not explain, the model run on the measured command: there
-/// the level is known best.
+/// The quantisation step of an output that explains most of a model's residual, with the model simulated on the measured command, where the
+/// level is most accurate.
 pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, Error> {
     let outputs = node.setup.outputs();
     let of_output = |series: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
@@ -90,7 +90,7 @@ pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, 
 
 /// Residual without the sawtooth error of a quantisation step, with this number of periods per unit of the level.
 fn without_sawtooth(model: &[f64], residual: &[f64], turns: f64) -> Vec<f64> {
-    // Added and taken off again, it leaves the nearest whole number; `f64::round` is a call for every sample.
+    // Adding and subtracting this number rounds to the nearest integer; `f64::round` would be a call for every sample.
     const WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
     let step = 1.0 / turns;
     model
@@ -145,8 +145,8 @@ mod tests {
             let problem = problem(step, colour, seed as u64);
             let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
             let found = hidden_step(&node, 0).unwrap().unwrap();
-            // Over the range of the readings, of 8 at most, it counts right to less than one. What is below that range is not
-            // seen: at half the noise the whole count may be one off.
+            // Over the range of the readings, at most 8, the number of steps is exact to less than one. Smaller ranges are not detected:
+            // with noise of half a step the number may be wrong by one.
             let counted = |step: f64| 8.0 / step;
             assert!(
                 (counted(found.value) - counted(step)).abs() < 0.75,

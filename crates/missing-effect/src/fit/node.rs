@@ -47,7 +47,7 @@ impl Node<'_> {
         other.fit.bic() - self.fit.bic()
     }
 
-    /// The leading parameter of an added effect, its size, and where that stands in the vector.
+    /// The leading parameter of an added effect (its size), and its position in the vector.
     pub fn size_of(&self, placed: Placed) -> Option<(ParameterInfo, usize)> {
         let parameters = self.setup.structure.effect_parameters(placed);
         let leading = parameters.into_iter().next()?;
@@ -55,7 +55,7 @@ impl Node<'_> {
         Some((leading, at))
     }
 
-    /// The added stiction, where its band is narrower than [`NARROW`] of what the command moves over.
+    /// The added stiction, if its band is narrower than [`NARROW`] of the range of the command.
     ///
     /// In a loop that is not simulated, a disturbance comes back through the command with a delay, as if the valve had play: the model
     /// that runs on that command takes such a phase for a narrow band. A band that holds the valve over a wide part of the command's
@@ -151,7 +151,7 @@ pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'
     Ok(node)
 }
 
-/// By the criterion.
+/// Sorted by the criterion.
 pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     nodes

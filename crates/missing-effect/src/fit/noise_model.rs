@@ -11,7 +11,7 @@ use crate::{
 /// Largest order of the noise model.
 pub(crate) const NOISE_ORDER: usize = 6;
 
-/// The noise model of a node's residual, without the bias that fitting leaves in it.
+/// The noise model of a model's residual, corrected for the bias that fitting causes.
 pub(crate) fn colour(node: &Node) -> Result<Noise, Error> {
     Ok(noise_of(&node.setup, &node.fit, NOISE_ORDER)?)
 }
@@ -28,7 +28,7 @@ pub(crate) fn longest_memory(setup: &Setup) -> f64 {
     LONGEST_MEMORY * lengths.max().unwrap_or(1) as f64
 }
 
-/// A node fitted with the noise model of its own residual, whose memory is limited.
+/// The model fitted with the noise model of its own residual, with limited memory.
 pub(crate) fn in_own_noise<'a>(node: &Node<'a>) -> Result<Node<'a>, Error> {
     let memory = Some(longest_memory(&node.setup));
     Ok(Node {

@@ -44,7 +44,8 @@ pub(crate) fn keep_shown_periods(
         return;
     };
     let shown = most_shown(periods, setup.records, noise.whiten(&residuals));
-    // The strongest line stands out of its neighbours, and may yet be lower than what drifts; its choice is paid for.
+    // The strongest line exceeds its neighbours, and may be lower than a drift; its selection is included in the multiple-testing
+    // correction.
     let strongest = setup.structure.scales.period;
     starts.retain(|start| {
         let of = |period: f64| period == start[at];
@@ -52,7 +53,7 @@ pub(crate) fn keep_shown_periods(
     });
 }
 
-/// The periods that show most in whitened residuals, outputs by their noise.
+/// The periods with the largest lines in the whitened residuals, outputs weighted by their noise.
 fn most_shown(periods: Vec<f64>, records: &[Record], whitened: Vec<Vec<f64>>) -> Vec<f64> {
     let outputs = whitened.len() / records.len().max(1);
     let whitened = standardised(whitened, outputs);
@@ -88,7 +89,7 @@ pub(crate) fn period_of(setup: &Setup) -> Option<usize> {
     setup.names().iter().position(|name| name == PERIOD)
 }
 
-/// The period that shows most in what a node does not explain \[s\].
+/// The period with the largest line in a model's residual \[s\].
 // A cell is filled by it: it must not wait for other threads, for the reason that is given at the hidden step.
 pub(crate) fn strongest_period(node: &Node) -> Option<f64> {
     let residuals = node.setup.disturbance(&node.fit.x).ok()?;

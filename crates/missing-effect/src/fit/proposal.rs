@@ -21,11 +21,11 @@ const FOLLOWED: usize = 2;
 /// Starts of an effect beside two others or more.
 const COARSE: usize = 10;
 
-/// Effects of a set that follow the clock alone. Two of them whose signs oppose each other (the outlet opens while the pump
-/// gains) leave a difference that bends as it likes: with a third they fit any slow course of time, whatever made it.
+/// Largest number of functions of time in a set. Two of them with opposite signs (the outlet opens while the pump gains) have a flexible
+/// difference: with a third one they fit any slow disturbance.
 const BY_CLOCK: usize = 1;
 
-/// The cost after one step from a start, as the linearised model there predicts it.
+/// The cost after one step from a start, as its linearised model predicts.
 ///
 /// The step is hardly damped: an effect that the other parameters nearly imitate takes long steps in both, and a damped one would
 /// leave the start's own error in the promise.
@@ -54,7 +54,7 @@ pub(crate) struct Proposal<'a> {
     pub promise: f64,
 }
 
-/// A node that is extended, and the period that shows most in what it does not explain, once it was asked for.
+/// A model that is extended, and the dominant period of its residual, computed on demand.
 pub(crate) struct Parent<'n, 'a> {
     pub node: &'n Node<'a>,
     period: OnceLock<Option<f64>>,
@@ -222,7 +222,7 @@ pub(crate) fn candidates(parent: &Node) -> Vec<Placed> {
     candidates
 }
 
-/// Whether some effect more makes a promise that is `worth` it.
+/// Whether some further effect has a predicted reduction that is `worth` it.
 pub(crate) fn any_promise(
     parent: &Node,
     noise: &Noise,

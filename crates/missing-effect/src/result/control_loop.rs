@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub struct ControlLoop {
     /// The loop was simulated from its reference; otherwise the model ran on the measured command.
     pub simulated: bool,
-    /// p-value of the test that the noise does not show in the command; `None` where a controller is known.
+    /// p-value of the hypothesis that the command does not depend on the noise; `None` if a controller is known.
     pub feedback_p: Option<f64>,
     /// Measured command less the one that the controller gives on the measured reading, root mean square, in the input's
     /// unit; `None` where that was not looked at.

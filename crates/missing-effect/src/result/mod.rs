@@ -96,7 +96,7 @@ pub struct Diagnosis {
     pub scores: Vec<Score>,
     /// The unexplained error, if the catalogue does not explain it.
     pub unknown: Option<Unknown>,
-    /// The loop that the records come from, where there is one.
+    /// The control loop of the records, if there is one.
     pub control_loop: Option<ControlLoop>,
     /// The findings in words.
     pub sentences: Vec<String>,
@@ -122,7 +122,7 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// The domain of the model, which says what things are called.
+    /// Physical domain of the model, which determines the words.
     #[must_use]
     pub fn domain(&self) -> Domain {
         domain_of(&self.plant, &self.output_unit)
@@ -134,7 +134,7 @@ impl Diagnosis {
         self.output_units.get(output).unwrap_or(&self.output_unit)
     }
 
-    /// Adds what is known of the loop, and what there is to say of it.
+    /// Adds the description of the loop, and remarks on it.
     pub(crate) fn speak_of_the_loop(&mut self, known: Option<ControlLoop>) {
         if let Some(known) = &known {
             self.sentences.extend_from_slice(&known.said);

@@ -23,8 +23,7 @@ pub struct NoiseFloor {
 }
 
 impl NoiseFloor {
-    /// The noise that a residual is judged against: that of the floor's level and, where that is the noise's own, of its
-    /// colour.
+    /// Noise model for residual tests: the level of the noise floor and, if the floor is that of the noise, its spectrum.
     fn model(&self) -> Result<ArModel, ct_signals::Error> {
         if self.level > self.innovation {
             ArModel::from_coefficients(&self.coefficients, self.innovation)
@@ -38,7 +37,7 @@ impl NoiseFloor {
 #[derive(Debug, Clone)]
 pub(crate) struct Floors(pub Vec<NoiseFloor>);
 impl Floors {
-    /// The noise that residuals are judged against.
+    /// Noise model for residual tests.
     pub fn noise(&self) -> Result<Noise, ct_signals::Error> {
         let models: Result<_, _> = self.0.iter().map(NoiseFloor::model).collect();
         Ok(Noise::of(models?))

@@ -31,7 +31,7 @@ impl Parameter {
     pub fn prior_words(&self) -> Option<String> {
         let prior = self.prior?;
         let (value, error) = value_and_error(prior.value, Some(prior.std_error));
-        // The estimate has the prior in it: their difference is the less uncertain the better the prior is beside the records.
+        // The estimate includes the prior: the more precise the prior relative to the records, the less uncertain is their difference.
         let own = self.std_error.map_or(0.0, |error| error * error);
         let variance = prior.std_error * prior.std_error - own;
         let scale = if variance > 0.0 {

@@ -1,4 +1,4 @@
-//! Numbers that may not be finite: JSON writes them as `null`, or leaves them out.
+//! Numbers that may not be finite: JSON has `null` for them, or omits them.
 
 use serde::{Deserialize, Deserializer};
 

@@ -1,4 +1,4 @@
-//! A record as the report shows it.
+//! A record for the report.
 
 use ct_signals::Record;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,7 @@ pub struct Shown {
     pub outputs: Vec<Vec<f64>>,
 }
 
-/// An input of a record as the report shows it.
+/// An input of a record for the report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShownInput {
     /// Name of the signal: `input`, `input 2`, or its own name.
@@ -32,7 +32,7 @@ pub struct ShownInput {
 }
 
 impl Shown {
-    /// A record; `held_out`: it takes no part in any fit or choice.
+    /// A record; `held_out`: not used for fits or selection.
     #[must_use]
     pub fn of(record: &Record, held_out: bool) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl Shown {
         }
     }
 
-    /// Readings that are there, of all outputs.
+    /// Number of present readings of all outputs.
     #[must_use]
     pub fn samples(&self) -> usize {
         let readings = self.outputs.iter().flatten();

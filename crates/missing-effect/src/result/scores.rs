@@ -24,18 +24,17 @@ pub struct Score {
     /// Error of all outputs together, each divided by the noise floor of its output.
     #[serde(deserialize_with = "crate::result::number")]
     pub weighted_rmse: f64,
-    /// `|p|/|j|`: the part of the effect's signature that the fitted parameters cannot imitate.
+    /// `|p|/|j|`: the share of the effect's signature that the fitted parameters cannot compensate for.
     #[serde(deserialize_with = "crate::result::number")]
     pub visibility: f64,
     /// The size that was found: the effect's leading parameter.
     pub size: Option<Parameter>,
-    /// The smallest size that these data would show, in the unit of `size`; `None` where the effect has no signature while it is absent, or
-    /// the fitted parameters imitate all of it.
+    /// Minimum detectable size in the unit of `size`; `None` if the effect has no signature at its absent value, or if the fitted
+    /// parameters compensate for all of it.
     pub smallest_visible: Option<f64>,
 }
 
-/// The acceptance test of the effects that are reported or, where none is, of the best that were refused: one test for all
-/// verdicts.
+/// Acceptance test of the reported effects or, if there is none, of the best rejected ones: the same test for all verdicts.
 ///
 /// An effect is the answer (`effect`, `undecided`) where it leaves noise, or explains `required` of the excess error; it is a
 /// part of the answer (`partial`) where it explains `required_partial`; else nothing explains the record.
@@ -82,6 +81,6 @@ pub struct Rankings {
     pub white: Vec<String>,
     /// Prewhitened by the noise model (GLS), best first; empty where the noise is white.
     pub prewhitened: Vec<String>,
-    /// The best effects differ beyond what data of this kind tell apart.
+    /// The best effects of the two rankings differ by more than the margin of a group.
     pub disagree: bool,
 }

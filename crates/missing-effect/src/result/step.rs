@@ -27,10 +27,10 @@ pub struct ResidualTests {
     pub input_p: f64,
 }
 
-/// The residual in one bin of something: a time window, a range of level, of flow, ...
+/// The residual in one bin: a time window, a range of level, of flow, ...
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Bin {
-    /// Position of the record that a window lies in, fitted ones first; `None` where all fitted records are counted.
+    /// Position of the record of a window, fitted ones first; `None` for all fitted records together.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub record: Option<usize>,
     /// Lower edge.
@@ -93,12 +93,12 @@ pub struct Step {
     pub weighted_rmse: f64,
     /// Weighted error on the held-out record.
     pub weighted_rmse_test: Option<f64>,
-    /// Bayesian information criterion with this model's own noise colour; smaller is better.
+    /// Bayesian information criterion with the noise model of this model's residual; smaller is better.
     #[serde(deserialize_with = "crate::result::number")]
     pub bic: f64,
     /// Parameters in chain order, initial states last.
     pub parameters: Vec<Parameter>,
-    /// How many starts were tried.
+    /// Number of starts.
     pub starts: usize,
     /// How many of them ended in the best minimum.
     pub starts_agree: usize,
@@ -117,7 +117,7 @@ pub struct OutputStep {
     /// Root mean square of the simulation error on the fitted records, in the output's unit.
     #[serde(deserialize_with = "crate::result::number")]
     pub rmse: f64,
-    /// The same on the held-out records.
+    /// Simulation error on the held-out records.
     pub rmse_test: Option<f64>,
     /// The parts of `rmse_test`; `None` without held-out records.
     pub held_out_error: Option<HeldOutError>,

@@ -1,9 +1,9 @@
-//! What is missing where the catalogue does not explain it.
+//! The unexplained error, if the catalogue does not explain it.
 
 use plants::{EffectInfo, Variable};
 use serde::{Deserialize, Serialize};
 
-/// A name that the program has: of a type of its own, as serde would borrow a plain reference from what is read.
+/// A name in the program: a separate type, because serde would borrow a plain reference from the input.
 pub(crate) type Name = &'static str;
 
 /// The names of simple shapes.
@@ -83,24 +83,24 @@ pub struct Unknown {
     pub unit: String,
     /// Every place, the most likely first.
     pub places: Vec<PlaceLikelihood>,
-    /// The first record's time, in its own count \[s\].
+    /// The first record's time, by its own clock \[s\].
     #[serde(deserialize_with = "crate::result::numbers")]
     pub time: Vec<f64>,
     /// The missing term beside the fitted model.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub value: Vec<f64>,
-    /// Its standard error.
+    /// Standard errors.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub std_error: Vec<f64>,
     /// The random walk's standard deviation after one second, in the term's unit.
     #[serde(deserialize_with = "crate::result::number")]
     pub intensity: f64,
-    /// Standard deviation of the measurement noise beside it, in the output's unit; of several outputs relative to the weighted mean.
+    /// Standard deviation of the measurement noise, in the output's unit; with several outputs relative to the weighted mean.
     #[serde(deserialize_with = "crate::result::number")]
     pub noise: f64,
     /// Windows in which the term differs clearly from zero, the strongest first.
     pub windows: Vec<Window>,
-    /// Root mean square of the residual that it leaves, in the output's unit.
+    /// Root mean square of the residual after subtraction of the term, in the output's unit.
     #[serde(deserialize_with = "crate::result::number")]
     pub rmse: f64,
     /// Every variable, the best first.
@@ -119,7 +119,7 @@ pub struct Unknown {
     /// Standard errors of the ordinates.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub ordinate_errors: Vec<f64>,
-    /// The nearest simple shape, where one comes near.
+    /// The closest simple function, if one is close.
     pub primitive: Option<Primitive>,
 }
 

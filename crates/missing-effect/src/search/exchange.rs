@@ -14,7 +14,7 @@ use crate::{
 
 /// A rough fit this near in the criterion may come within a group's margin.
 pub(crate) const NEAR: f64 = 25.0;
-/// Stand-ins that are refitted for each effect: so many that a promise favours, and so many that a few steps favour.
+/// Number of alternatives that are refitted for each effect: this many by predicted reduction, and this many after a few iterations.
 const EXCHANGED: usize = 12;
 /// In a set of more than so many effects half as many, and a few steps for so many: a fit costs several times as much.
 const LARGE: usize = 2;

@@ -20,7 +20,7 @@ pub(crate) enum Rest {
     Structure,
     /// Coloured noise; the noise model may have absorbed an effect.
     Coloured,
-    /// Noise that hides no effect: it is white, or was searched before.
+    /// Noise that hides no effect: it is white, or this noise model was already used for a search.
     Noise,
 }
 

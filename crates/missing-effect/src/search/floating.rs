@@ -100,7 +100,7 @@ impl<'a> Floating<'_, 'a> {
         Ok(node)
     }
 
-    /// Exchanges an effect of a set for another, and goes on one at a time, as long as the criterion falls.
+    /// Swaps one effect of a set for another, one at a time, as long as the criterion falls.
     fn exchanged(&self, mut node: Node<'a>) -> Result<Node<'a>, Error> {
         while !node.setup.leaves_out("exchanges within sets of effects") {
             let others = (0..node.added.len())
@@ -132,7 +132,7 @@ impl<'a> Floating<'_, 'a> {
     }
 }
 
-/// The best of the sets, where its criterion lies clearly below a node's.
+/// The best of the sets, if its criterion is clearly below that of the model.
 fn better_than<'a>(node: &Node, sets: Vec<Node<'a>>) -> Option<Node<'a>> {
     let best = best_first(sets).into_iter().next();
     best.filter(|best| best.gain_over(node) > BIC_MARGIN)

@@ -30,10 +30,10 @@ pub(crate) struct Breadth {
     pub most: usize,
 }
 
-/// Up to so many effects a set may hold one that follows time alone and be extended.
+/// Largest size of a set that contains a function of time and may be extended.
 pub(crate) const PAIR: usize = 2;
 
-/// Pairs that are refitted for their joint score, beside those that grow from the best single effects.
+/// Number of pairs that are refitted because of their joint score, in addition to extensions of the best single effects.
 const JOINT_PAIRS: usize = 12;
 
 fn key(added: &[Placed]) -> Vec<(&'static str, usize)> {
@@ -45,7 +45,7 @@ fn key(added: &[Placed]) -> Vec<(&'static str, usize)> {
     key
 }
 
-/// The best sets that say different things, best first.
+/// The best distinct sets, best first.
 ///
 /// Two sets that take nearly the same out of the base's residual are one under two names (a dead zone and a leak, say), and
 /// what is added to the one makes what is added to the other. Grown side by side they would fill the beam.
@@ -110,7 +110,7 @@ impl<'a> Grown<'a> {
         self.sizes.len() > size && self.exhausted.is_none() && self.paid
     }
 
-    /// Takes in a set that was found otherwise.
+    /// Adds a set from another search.
     pub fn take_in(&mut self, node: Node<'a>) {
         let size = node.added.len();
         while self.sizes.len() <= size {
@@ -133,7 +133,7 @@ impl<'a> Grown<'a> {
     }
 }
 
-/// Grows sets of effects from a base.
+/// Forward search: grows sets of effects from a base.
 ///
 /// The growth ends after two sizes that are not `worth` it beside the best set so far, and at once where the best set leaves noise. Where
 /// an only effect leaves coloured noise, which may hold a second one, it goes on if some pair is worth it.
@@ -218,7 +218,7 @@ pub(crate) fn grow<'a>(
             grown.exhausted = may_end;
             break;
         }
-        // A pair is looked at even where no single effect pays; after two sizes that do not pay there is no more.
+        // Pairs are tried even if no single effect lowers the criterion enough; after two sizes without success the search ends.
         idle = if pays { 0 } else { idle + 1 };
         sizes.push(nodes);
         grown.paid = idle == 0;

@@ -25,7 +25,7 @@ use crate::fit::{
 const POINTS: usize = 3;
 /// For sets with more samples times columns than this, the inner products are not computed.
 const LARGEST: usize = 40_000_000;
-/// Ridge of the normal equations, against columns that imitate each other.
+/// Ridge of the normal equations, against collinear columns.
 const RIDGE: f64 = 1e-9;
 
 /// A candidate at a point.
@@ -233,7 +233,7 @@ fn predicted(gram: &DMatrix<f64>, own: usize, pair: [(usize, &Linearised); 2]) -
     cost.is_finite().then_some(cost)
 }
 
-/// The pair's proposal: each effect where it was linearised, the other parameters as beside either of them.
+/// The pair's proposal: each effect at its point of linearisation, the other parameters as with either of them.
 fn joined<'a>(
     base: &Node<'a>,
     first: &Linearised<'a>,

@@ -25,7 +25,7 @@ pub(crate) fn rankings(found: &Found, base: &Node) -> Rankings {
         };
     };
     let prewhitened = grown.promising_singles();
-    // A best effect of the one weighting that is far after in the other, or does not pay there.
+    // A best effect of one weighting that is far from the best of the other weighting, or does not lower its criterion enough.
     let behind = |best: &[Node], others: &[Node], base: &Node| {
         let (Some(best), Some(first)) = (best.first(), others.first()) else {
             return false;

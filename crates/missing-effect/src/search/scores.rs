@@ -12,7 +12,7 @@ use crate::{
 
 /// Shown at 1 % false alarm with 90 % power, in standard errors.
 const VISIBLE: f64 = 2.576 + 1.282;
-/// An effect whose signature is left with less than this part by the fitted parameters is not visible at all.
+/// An effect is not detectable if less than this share of its signature is independent of the fitted parameters.
 const ABSORBED: f64 = 1e-6;
 
 /// The scores, in the order of `single`; `noise` is the metric in which both were fitted, `floors` the standard
@@ -64,8 +64,8 @@ pub(crate) fn price_of_colour(base: &Node, single: &[Node], noise: &Noise) -> Op
     ratios.get(ratios.len() / 2).copied()
 }
 
-/// The length of the signature of an effect at its absent value, beside what the base's own parameters can imitate and as
-/// a whole, in standard deviations of the innovations (`scales`, of each output); `None` where it has no derivative there.
+/// Length of the signature of an effect at its absent value, with and without the part that the base's own parameters compensate for, in
+/// standard deviations of the innovations (`scales`, of each output); `None` if there is no derivative.
 ///
 /// The scales are those of the fit: at the absent value the residuals hold the effect, and would make an output that it acts on count less.
 fn signature(base: &Node, node: &Node, noise: &Noise, scales: &[f64]) -> Option<(f64, f64)> {
@@ -96,7 +96,7 @@ fn signature(base: &Node, node: &Node, noise: &Noise, scales: &[f64]) -> Option<
     order.push(column);
     let chosen = triangle.select(&order);
     let last = order.len() - 1;
-    // Outputs count in units of the first one's noise.
+    // Outputs are weighted relative to the first one's noise.
     let lengths = [chosen.at(last, last).abs(), chosen.column_norm(last)];
     let [own, all] = lengths.map(|length| length / scales[0]);
     Some((own, all))

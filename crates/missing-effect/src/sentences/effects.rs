@@ -11,7 +11,7 @@ pub(super) fn in_general(effect: &str, domain: Domain) -> Option<&'static str> {
     effect.general
 }
 
-/// A sentence for each effect of the answer: its group, its place and its size.
+/// A sentence for each accepted effect: its group, its place and its size.
 pub(super) fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
     let domain = diagnosis.domain();
     let added = diagnosis.effects.iter().zip(&diagnosis.groups);
@@ -65,7 +65,7 @@ pub(super) fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
         .collect()
 }
 
-/// Another place is said to be possible from this relative likelihood on.
+/// Another place is reported as possible from this relative likelihood on.
 pub(super) const SAME_PLACE_LIKELIHOOD: f64 = 0.05;
 
 /// The parameters of an effect with their standard errors, in brackets.
@@ -101,7 +101,7 @@ pub(super) fn of_acceptance(acceptance: &Acceptance) -> Option<String> {
     ))
 }
 
-/// The command that proposes what would tell the first two of a group apart.
+/// The command that designs an experiment to distinguish the first two effects of a group.
 pub(super) fn next_experiment(group: &[String], added: usize) -> String {
     let [a, b, ..] = group else {
         return String::new();

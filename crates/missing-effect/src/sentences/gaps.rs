@@ -12,7 +12,7 @@ impl MendedGaps {
     }
 }
 
-/// What was done about rows and samples of inputs that are missing.
+/// Handling of missing rows and samples of inputs.
 pub(crate) fn of_gaps(mended: &MendedGaps) -> Option<String> {
     let Gaps {
         rows,

@@ -17,7 +17,7 @@ pub(crate) fn of_a_stop(most: usize, needed: usize) -> String {
     )
 }
 
-/// The best that the catalogue has where it is not the answer.
+/// The best effects of the catalogue, if they are not accepted.
 pub(crate) fn of_a_part(last: &Node) -> String {
     let outputs = &last.setup.records[0].outputs;
     let names: Vec<String> = last
@@ -63,7 +63,7 @@ pub(crate) fn of_rankings(rankings: &Rankings) -> Option<String> {
     })
 }
 
-/// The effects that were taken out because any course of time would do in their place; `None` where there are none.
+/// The effects that were removed because a function of time explains the same; `None` if there are none.
 pub(crate) fn of_courses(dropped: &[Placed]) -> Option<String> {
     let names: Vec<String> = dropped
         .iter()

@@ -85,7 +85,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
             }
         }
         Verdict::Unexplained => match left {
-            // A right model under a slow disturbance leaves this too.
+            // A correct model under a slow disturbance has such a residual too.
             Some(left) if matches!(left.what, Remains::Slow(..)) => {
                 said.push(format!(
                     "No effect of the catalogue is significant, but the residual is not noise: {}.",

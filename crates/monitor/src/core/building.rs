@@ -66,7 +66,7 @@ impl<'a> Core<'a> {
         let outputs = &learned.outputs;
         let most =
             |output: &OutputNoise, samples| Most::new(&output.scatter, samples, outputs.len());
-        // The promise is in rows; scores and blocks count means of so many.
+        // The false alarm rate refers to rows; scores and blocks use means of several rows.
         let samples = self.settings.rows_between_false_alarms / self.now.every as f64;
         let threshold = threshold(
             &windows(learned.rows_per_time_constant()),

@@ -157,7 +157,7 @@ impl Core<'_> {
     }
 }
 
-/// The first input of a sample, of which the simulation of a plant says where what it moves stands.
+/// The first input of a sample, with the actuator at rest.
 pub(super) fn at_rest(sample: &Sample) -> f64 {
     sample.inputs.first().copied().unwrap_or(0.0)
 }

@@ -1,4 +1,4 @@
-//! The phases of watching, and how it is saved: learn, watch, alarm, look again, wait until it fits again.
+//! Phases of the monitor, and how it is saved: learn, monitor, alarm, evaluate again, wait until the model fits again.
 //!
 //! **Checkpoints.** Every [`STRETCH`] rows, and whenever the phase changes, all that is not plain numbers (the simulation, the
 //! whitening filter, the tracker's factors) is built again from plain numbers and the rows that are kept. A saved
@@ -24,11 +24,11 @@ use crate::{
     watch::{Said, Watch, tracked},
 };
 
-/// Rows that are kept.
+/// Number of stored rows.
 pub(crate) const KEPT: usize = 2048;
 /// Rows between checkpoints.
 const STRETCH: usize = 2048;
-/// Half the width of the interval that holds a Gaussian value with a probability of 95 %.
+/// Half the width of the interval that contains a Gaussian value with a probability of 95 %.
 const BAND: f64 = 1.96;
 
 const OTHER_NUMBERS: &str = "its numbers do not belong to this model";

@@ -13,10 +13,10 @@ use crate::{
 const SETTLING: f64 = 6.0;
 /// After an alarm the rows are evaluated again after these numbers of slowest time constants.
 const LOOKS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 12.0];
-/// At so many of them the tracker is let go again: the derivatives are those of parameters that stay, and while the change works its way
-/// through the plant they mislead it.
+/// At the evaluation with this number the tracker is released again: its derivatives are those of constant parameters, and are misleading
+/// while the effect of the change propagates through the plant.
 const LET_GO: usize = 3;
-/// A look comes at least so many rows after the alarm, and each later one twice as many.
+/// Least number of rows from the alarm to the first evaluation; each later one needs twice as many.
 const FEWEST: usize = 8;
 /// The model fits again where every score has stayed below this share of the threshold ...
 const QUIET: f64 = 0.75;
@@ -70,7 +70,7 @@ impl Core<'_> {
         let mut fed = Fed::default();
         let finite = |said: &Innovation| said.standardised.is_finite();
         if !said.innovations.iter().flatten().all(finite) {
-            // A level that left all bounds: what was learned is of no use any more.
+            // A level has diverged: the learned model cannot be used any more.
             let every = self.now.every;
             self.begin(every);
             fed.notice = Some(Notice::LearnsAnew {
@@ -120,7 +120,7 @@ impl Core<'_> {
         self.now.scatter.iter().map(Scatter::growth).collect()
     }
 
-    /// Whether the scatter of an output has moved. Where an effect explains an alarm, its residual is no noise.
+    /// Whether the noise of an output has changed. If an effect explains an alarm, its residual is not noise.
     fn scatter(&mut self, output: usize, innovation: f64, time: f64) -> Option<ScatterAlarm> {
         let (learned, running) = (self.now.learned.as_ref()?, self.running.as_ref()?);
         let scatter = self.now.scatter.get_mut(output)?;

@@ -1,4 +1,4 @@
-//! Fits of one suspect after the other to the rows that are kept.
+//! Fits of one candidate after the other to the stored rows.
 
 use ct_signals::{Hold, Record};
 use greybox::{Noise, Setup, Stopping, fit_from};
@@ -16,7 +16,7 @@ pub(super) struct Search<'a> {
     pub(super) noise: Noise,
     pub(super) hold: Hold,
     pub(super) rows: &'a [Kept],
-    /// Of each output.
+    /// Series of each output.
     pub(super) series: Vec<Series>,
     /// Outputs that have readings.
     pub(super) read: usize,
@@ -92,8 +92,8 @@ impl Search<'_> {
         Some(fine.map_or(rough, |(fine, _)| fine))
     }
 
-    /// A fit begins with play, lags and dead time at rest at its first command. What the learned model, begun in the same way, misses of the
-    /// one that ran on is taken from the readings.
+    /// A fit begins with backlash, lags and dead time at rest at its first command. The difference between the learned model with this
+    /// beginning and the continuous simulation is subtracted from the readings.
     fn put_right(&self, record: &mut Record, from: usize) -> Option<()> {
         if self.structure.effects().is_empty() && self.structure.terms().is_empty() {
             return Some(());

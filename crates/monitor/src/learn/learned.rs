@@ -16,7 +16,7 @@ use crate::threshold::relative_error;
 pub struct Model {
     /// The plant.
     pub plant: Plant,
-    /// What is known of it.
+    /// Known constants of the plant.
     pub known: Known,
     /// The effects that are on.
     pub effects: Vec<Placed>,
@@ -33,7 +33,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// The plant alone, with nothing said of its parameters, under a command that is held between rows.
+    /// The plant with default settings of its parameters, under a command that is held between rows.
     #[must_use]
     pub fn new(plant: Plant, known: Known) -> Self {
         Self {
@@ -92,7 +92,7 @@ pub(crate) struct OutputNoise {
     /// Coefficients and innovations' standard deviation \[output unit\].
     pub coefficients: Vec<f64>,
     pub sigma: f64,
-    /// Readings from which it was learned.
+    /// Number of readings in the learning phase.
     pub readings: usize,
     /// Limit of the differences between neighbouring innovations.
     pub scatter: Limit,
@@ -119,7 +119,7 @@ impl Learned {
         models.map(Noise::of)
     }
 
-    /// Rows from which it was learned.
+    /// Number of rows in the learning phase.
     pub(crate) fn rows(&self) -> usize {
         let readings = self.outputs.iter().map(|output| output.readings);
         readings.max().unwrap_or(0)

@@ -57,9 +57,9 @@ pub(super) struct Suspect {
     pub evidence: f64,
     /// \[s\]
     pub since: f64,
-    /// Its size: name, value, unit.
+    /// Size of the effect: name, value, unit.
     pub size: (String, f64, String),
-    /// The size lies inside its bounds.
+    /// Whether the size is inside its bounds.
     pub plausible: bool,
     pub left: Left,
 }
@@ -72,8 +72,8 @@ fn begins(candidate: &Candidate) -> bool {
     BEGIN.contains(&effect.id) || effect.id == STEP && effect.place == Place::Parameter
 }
 
-/// Every effect that may have begun, best first: an implausible size comes after every plausible one. `since`: the onset that is found first
-/// \[s\]; the noise of each output is `growth` times as large as it was learned.
+/// Every effect that may have begun, best first: implausible sizes come last. `since`: the onset that was found first \[s\]; the noise of
+/// each output is `growth` times the learned noise.
 pub(super) fn isolate(
     own: &OwnModel,
     learned: &Learned,
@@ -135,7 +135,7 @@ struct Window {
     since: f64,
     records: [Record; 1],
     states: Vec<f64>,
-    /// What the learned model leaves.
+    /// Sum of squares of the learned model.
     without: f64,
     candidates: Vec<Candidate>,
 }
@@ -148,7 +148,7 @@ struct Search<'s, 'a> {
     pub(super) noise: Noise,
     /// Standard deviation of each output's innovations.
     pub(super) sigmas: Vec<f64>,
-    /// Rows that are kept times outputs.
+    /// Number of stored rows times outputs.
     samples: f64,
 }
 
@@ -189,7 +189,7 @@ impl Search<'_, '_> {
         })
     }
 
-    /// A model in which nothing is fitted but what it has beside the learned one, without what is `known` of that.
+    /// A model in which only the entries that the learned model lacks are fitted, except those that are `known`.
     fn setup<'b>(
         &self,
         model: &'b Model,
@@ -252,7 +252,7 @@ impl Search<'_, '_> {
         found.chain(others).collect()
     }
 
-    /// A candidate fitted after an onset; `model`: the learned one with the candidate in it.
+    /// A candidate fitted after an onset; `model`: the learned model with the candidate inserted.
     fn suspect(&self, window: &Window, candidate: &Candidate, model: &Model) -> Option<Suspect> {
         let is_step = candidate.effect.is_some_and(|effect| effect.id == STEP);
         // The onset of this candidate is the first row.

@@ -42,7 +42,7 @@ pub struct OwnModel<'a> {
     pub hold: Hold,
     /// Seconds in one unit of the model's time, above zero.
     pub time_unit: f64,
-    /// Candidates of the user's own, which take part in the isolation beside the catalogue's effects.
+    /// Candidates of the user's own, for the isolation in addition to the catalogue's effects.
     pub candidates: &'a [CandidateModel],
 }
 
@@ -51,12 +51,12 @@ pub struct OwnModel<'a> {
 pub struct CandidateModel {
     /// The candidate.
     pub candidate: Candidate,
-    /// The watched model with the candidate in it: what both have goes by the same names.
+    /// The monitored model with the candidate inserted: common variables have the same names.
     pub model: Model,
 }
 
 impl<'a> OwnModel<'a> {
-    /// The model with nothing said of its parameters, its time in seconds, under inputs that are held between rows.
+    /// The model with default settings: time in seconds, inputs held between rows.
     #[must_use]
     pub fn new(model: &'a Model) -> Self {
         Self {

@@ -90,7 +90,7 @@ fn gain(
     let mut whiteners = Vec::with_capacity(growth.len());
     for noise in &learned.outputs {
         let mut whitener = noise.model()?.whitener(lanes + 1);
-        // Before the change there was nothing of it.
+        // Before the change its influence is zero.
         for _ in 0..=noise.coefficients.len() {
             row.fill(0.0);
             whitener.push(&mut row);

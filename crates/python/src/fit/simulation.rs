@@ -44,7 +44,7 @@ pub fn check_simulation(level: f64, first: usize) -> PyResult<()> {
     )))
 }
 
-/// A simulation as Python takes it.
+/// A simulation as a Python object.
 pub fn simulation<'py>(py: Python<'py>, found: &Simulated) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     let outputs = PyDict::new(py);

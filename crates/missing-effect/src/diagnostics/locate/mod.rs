@@ -1,4 +1,4 @@
-//! Where a model fails: the residual by time window, level, flow, direction of change and frequency.
+//! Location of model errors: the residual by time window, level, flow, direction of change and frequency.
 //!
 //!
 //! A bin fails where its mean square is clearly above what the noise would show there (`expected.rs`).

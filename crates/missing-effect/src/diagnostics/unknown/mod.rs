@@ -24,7 +24,7 @@ use crate::{Error, PlaceLikelihood, Share, Unknown, Window, fit::node::Node};
 
 /// Half-width of a 95 % band in standard errors.
 const BAND: f64 = 1.96;
-/// A path is shown where its log-likelihood exceeds that of none that moves by this.
+/// A path is shown if its log-likelihood exceeds that of a constant by this.
 const MOVES: f64 = 5.0;
 /// Places with log-likelihoods within this distance of the best are not distinguished.
 pub(crate) const SAME_PLACE: f64 = 10.0;
@@ -47,7 +47,7 @@ fn place_name(structure: &Structure, spot: Spot) -> String {
     }
 }
 
-/// What is left out where the time limit has passed.
+/// Step that is left out if the time limit has passed.
 pub(crate) const PART: &str = "the shape of the unexplained error";
 
 /// The missing term beside a fitted node; `None` where nothing moves, and where the time limit of its setup passes: what was looked at by
@@ -123,7 +123,7 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
         .into_iter()
         .next()
         .filter(|s| s.share - CLEARLY * s.share_error > NAMED);
-    // The pump and the first vessel are one balance, as far as the likelihood goes: then it is said to be the vessel's.
+    // If the likelihood does not distinguish the pump and the first vessel, the vessel is reported.
     let equal = |s: &&Smoothed| most - s.log_likelihood < SAME_PLACE;
     let Some(chosen) = (match &named {
         Some(shape) => smoothed.iter().find(|s| s.spot == shape.spot),

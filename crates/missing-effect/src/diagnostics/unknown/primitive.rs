@@ -1,4 +1,4 @@
-//! The simple shape that comes nearest to a polyline, and the effects of the catalogue that leave such a shape.
+//! The simple function closest to a polyline, and the effects of the catalogue with such a shape.
 
 use nalgebra::{DMatrix, DVector};
 use plants::{Domain, EffectInfo, Place, Variable};
@@ -63,8 +63,8 @@ const FAMILIES: [Family; SHAPES.len()] = [
     },
 ];
 
-/// The nearest simple shape in the metric of the information, which does not see what the plant's own parameters imitate;
-/// `None` where none comes near.
+/// The closest simple function, weighted by the information, in which directions that the plant's own parameters explain have no weight;
+/// `None` if none is close.
 pub(super) fn nearest(
     domain: Domain,
     (place, variable): (Place, Variable),
@@ -166,7 +166,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// The nearest shape to a function at 13 knots that are known to 0.05 each.
+    /// The closest simple function to a function at 13 knots with standard errors of 0.05.
     fn of(variable: Variable, range: (f64, f64), f: impl Fn(f64) -> f64) -> Option<Primitive> {
         let knots: Vec<f64> = (0..13)
             .map(|i| range.0 + (range.1 - range.0) * f64::from(i) / 12.0)
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn what_the_plant_imitates_is_not_seen() {
-        // Any line is imitated: what is left of a parabola with a line on it is the parabola.
+        // The plant's parameters explain any straight line: only the parabola of a parabola with a line is left.
         let knots: Vec<f64> = (0..13).map(f64::from).collect();
         let lines = DMatrix::from_fn(13, 2, |i, j| if j == 0 { 1.0 } else { i as f64 });
         let project = DMatrix::identity(13, 13)

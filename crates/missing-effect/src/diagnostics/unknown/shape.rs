@@ -27,7 +27,7 @@ use crate::{
 
 /// Parts of the data that are left out in turn, each without a gap.
 const PARTS: usize = 10;
-/// Directions of the ordinates that hold less of the information than this share are the plant's own.
+/// Directions of the ordinates with less than this share of the information are explained by the plant's parameters.
 const DETERMINED: f64 = 1e-4;
 /// Before the fit an ordinate is as large as its neighbour to within the smoothed term's root mean square, and zero to within
 /// so many times that ...
@@ -296,7 +296,7 @@ pub(super) fn fit(
     })
 }
 
-/// The share of the missing term that is predicted on parts that are left out in turn, and its standard error.
+/// The predicted share of the missing term on parts that are left out in turn, and its standard error.
 ///
 /// The model is linear about its fit. An ordinate that only the left-out part has visited is near its neighbours'; initial
 /// states stay. A part counts for nothing at worst: what no other part has visited is no evidence against a variable.

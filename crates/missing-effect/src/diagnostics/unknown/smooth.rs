@@ -51,7 +51,7 @@ pub(super) struct Path {
     pub covariance: DMatrix<f64>,
     /// Initial states with the path.
     pub states: Vec<f64>,
-    /// Measured minus model with the path, samples that are there in the order of time, times the weight of their output.
+    /// Measured minus model with the path: present samples in the order of time, times the weight of their output.
     pub residual: Vec<f64>,
 }
 
@@ -225,7 +225,7 @@ fn block(
     let mut target = j.column(columns).into_owned();
     j = j.remove_column(columns);
     target += &j * DVector::from_vec(free);
-    // A step moves the path from its instant on.
+    // A step changes the path from its instant on.
     for i in (0..m - 1).rev() {
         let after = j.column(i + 1).into_owned();
         j.column_mut(i).zip_apply(&after, |a, b| *a += b);
@@ -250,7 +250,7 @@ fn at(blocks: &[Block], lambda: f64) -> Option<Solution> {
             normal[(i, i)] += weight;
             determinant -= weight.ln();
         }
-        // Rounding alone keeps a column apart that nothing determines.
+        // A column that nothing determines is independent only by rounding.
         let trace = block.normal.diagonal().max();
         for i in 0..normal.nrows() {
             normal[(i, i)] += 1e-13 * trace;

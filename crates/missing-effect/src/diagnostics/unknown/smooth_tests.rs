@@ -204,8 +204,8 @@ fn it_is_the_kalman_smoother() {
 #[test]
 fn the_band_holds_the_truth_as_often_as_it_says() {
     use rayon::prelude::*;
-    // A forcing that is a random walk, and two that are not: for what is smoother the band is wide, for a jump it is short of
-    // it at the jump alone.
+    // A forcing that is a random walk, and two that are not: for a smoother forcing the band is too wide; for a step it is too narrow only
+    // at the step.
     let forcings: [(&str, RangeInclusive<f64>, Forcing); 3] = [
         ("random walk", 0.92..=0.98, |rng| walk(0.002, rng)),
         ("swing", 0.92..=1.0, |_| {
@@ -297,8 +297,8 @@ fn the_band_of_a_shape_holds_the_truth_as_often_as_it_says() {
     assert!(named >= 22, "{named}");
 }
 
-/// A side measurement counts in the fit of a polyline too: an ordinate of an unknown in the balance imitates the offset, which only the side
-/// measurement tells.
+/// A side measurement is included in the fit of a polyline too: an ordinate of an unknown term in the balance has the same effect as the
+/// offset, and only the side measurement distinguishes them.
 #[test]
 fn a_side_measurement_holds_its_parameter_in_the_fit_of_a_shape() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);

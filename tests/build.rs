@@ -38,7 +38,7 @@ fn main() {
             }
             println!("cargo::rustc-cfg={name}");
         } else {
-            // A file that is not there: the script runs again at the next build, when there may be more.
+            // A missing file: the script runs again at the next build, when the file may exist.
             println!("cargo::rerun-if-changed={name} is missing");
         }
     }

@@ -140,7 +140,7 @@ fn plants_both_ways(criterion: &mut Criterion) {
     }
 }
 
-/// Time constants of 1 ms and 1000 s; a oscillation of twenty samples a period; a limit that is met twice in each; an arm that friction
+/// Time constants of 1 ms and 1000 s; an oscillation of twenty samples a period; a limit that is met twice in each; an arm that friction
 /// holds; delays of both kinds.
 const OTHERS: [(&str, f64, &str); 5] = [
     (

@@ -21,7 +21,7 @@ use serde_json::Value;
 /// Diagnoses records with hidden effects.
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// These cases alone.
+    /// Names of the cases to run.
     cases: Vec<String>,
     /// Fits the believed models alone, from starts of so many seeds each.
     #[arg(long, value_name = "N")]

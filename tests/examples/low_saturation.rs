@@ -18,7 +18,7 @@ struct Arguments {
     /// Rows of a record, one a second.
     #[arg(default_value_t = 3700)]
     rows: usize,
-    /// Records, each from a seed of its own.
+    /// Number of records, each with a separate seed.
     #[arg(long, default_value_t = 2)]
     records: u64,
     /// Writes every record's outcome.

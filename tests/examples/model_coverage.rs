@@ -11,7 +11,7 @@ use ctid_examples::model_records::driven_models;
 use ctid_tests::coverage::{count, of_record};
 use rayon::prelude::*;
 
-/// Coverage of the intervals that `ctid compare` says.
+/// Coverage of the intervals of `ctid compare`.
 #[derive(Debug, Parser)]
 struct Arguments {
     /// Records of each model.

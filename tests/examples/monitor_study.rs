@@ -1,4 +1,4 @@
-//! How surely the monitor sees an effect that begins, and how seldom it alarms where none does.
+//! Detection rate and false alarm rate of the monitor.
 //!
 //! `cargo run --release -p ctid-tests --example monitor_study -- [LOOPS] [--ratio R] [--quiet-rows N]`: 30 loops drawn at
 //! random in which an effect of five kinds begins half-way, 1500 rows before and 1500 after, and 30 in which
@@ -42,7 +42,7 @@ struct Arguments {
     /// Share of the readings that are lost
     #[arg(long)]
     lost: Option<f64>,
-    /// They are lost in bursts that begin at steps
+    /// Missing readings occur in bursts that begin at steps
     #[arg(long, requires = "lost")]
     at_steps: bool,
     /// The loops in which nothing begins are open
@@ -110,7 +110,7 @@ fn main() {
         let delay = of_it.first().map(|alarm| (alarm.time - begun) / tau);
         let since_visible = of_it.first().map(|alarm| (alarm.time - visible) / tau);
         let holds = |alarm: &&&Alarm| alarm.effects.iter().any(|e| e == placed.effect.id);
-        // The looks after the first alarm, up to the last one, before it is learned again.
+        // Evaluations after the first alarm, up to the last one before learning restarts.
         let last = of_it
             .iter()
             .position(|alarm| alarm.event == monitor::Stage::Final)

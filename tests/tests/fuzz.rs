@@ -14,7 +14,7 @@ fn main() -> ExitCode {
     if let Some(code) = as_program() {
         return code;
     }
-    // As the usual harness understands them: a list, or a part of a name.
+    // Arguments as in the standard test harness: a list, or a part of a name.
     let words: Vec<String> = env::args().skip(1).collect();
     let wanted = |kind: &Kind| {
         let mut names = words

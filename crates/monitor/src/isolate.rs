@@ -124,7 +124,9 @@ impl Suspect {
     }
 }
 
-/// Every effect that may have begun, best first: implausible sizes come last.
+/// Every effect that may have begun, best first: implausible sizes come last. The noise of each output is `growth` times the learned noise.
+/// Residuals of missing readings are interpolated linearly, in the same way for each effect; they count as readings. An output without any
+/// reading in all rows is left out.
 pub(crate) fn isolate(
     structure: &Structure,
     learned: &Learned,

@@ -1,4 +1,4 @@
-//! What the computation of the tables can refuse: each message names the argument, the numbers that disagree and what to do, in one line.
+//! Errors of the computation of the tables: each message names the argument, the numbers that disagree and the correction, in one line.
 
 /// Everything this crate can refuse.
 #[derive(Debug, thiserror::Error)]

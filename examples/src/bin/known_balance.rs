@@ -58,7 +58,7 @@ fn record(seed: u64) -> Vec<Sample<3>> {
     samples
 }
 
-/// What the estimator is told.
+/// Knowledge given to the estimator.
 #[derive(Clone, Copy)]
 enum Known {
     Nothing,

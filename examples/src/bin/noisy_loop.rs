@@ -53,7 +53,7 @@ fn main() -> Result<(), Error> {
     let r = excitation::prbs(3000, 300, -1.0, 1.0, 6)?;
     let (mut alone, mut whole) = (Score::default(), Score::default());
     for seed in 0..RUNS {
-        // It lasts for some 20 samples.
+        // Its correlation lasts about 20 samples.
         let w = noise::ar1(r.len(), 0.4, 0.95, &mut ChaCha8Rng::seed_from_u64(seed));
         let disturbed = Noise::InLoop(&w);
         let data = continuous_loop(&plant, &controller, 1.0, &r, Hold::Zero, disturbed)?;

@@ -28,19 +28,19 @@ struct Arguments {
     /// Records in a cell.
     #[arg(long, default_value_t = 1)]
     records: u64,
-    /// So many of all records, drawn at random.
+    /// Number of records, drawn at random.
     #[arg(long)]
     sample: Option<usize>,
-    /// Of these kinds: single, own, pair, clean, outside.
+    /// Kinds of records: single, own, pair, clean, outside.
     #[arg(long, value_delimiter = ',', default_values = ["single", "own", "pair", "clean", "outside"])]
     kinds: Vec<String>,
-    /// Of these models, all where none is given.
+    /// Names of the models; all if none is given.
     #[arg(long, value_delimiter = ',')]
     models: Vec<String>,
     /// Structural errors over the noise.
     #[arg(long, value_delimiter = ',', default_values_t = [1.0, 3.0])]
     ratios: Vec<f64>,
-    /// Only records whose name holds this.
+    /// Only records whose name contains this.
     #[arg(long, default_value = "")]
     only: String,
     /// Seed of everything.
@@ -70,7 +70,7 @@ fn main() {
             && job.name(&models).contains(&arguments.only)
     });
     if let Some(sample) = arguments.sample {
-        // As many of each kind.
+        // The same number of each kind.
         jobs.shuffle(&mut rng);
         let share = sample.div_ceil(arguments.kinds.len());
         let mut taken: BTreeMap<&str, usize> = BTreeMap::new();

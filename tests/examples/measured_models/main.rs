@@ -23,9 +23,9 @@ use serde_json::Value;
 /// Diagnoses measured records with models of their own.
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// Only cases whose name holds one of these, as `tclab` or `ball_drops/golf`.
+    /// Only cases whose name contains one of these, as `tclab` or `ball_drops/golf`.
     parts: Vec<String>,
-    /// Of the search, as `ctid diagnose --effort` has it.
+    /// Effort of the search, as for `ctid diagnose --effort`.
     #[arg(long)]
     effort: Option<String>,
 }
@@ -77,7 +77,7 @@ fn main() {
     println!("{}", row("all", &all));
 }
 
-/// What `ctid diagnose` finds; its message where it refuses.
+/// Result of `ctid diagnose`, or its error message.
 fn diagnosed(
     program: &Path,
     arguments: &Arguments,

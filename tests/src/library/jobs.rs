@@ -37,7 +37,7 @@ pub fn jobs(
         let both: Vec<&String> = effects.iter().chain(&own).collect();
         for _ in 0..both.len() {
             let a = both[rng.random_range(0..both.len())];
-            // As often as not one of them is of the user's own.
+            // In about half of the cases one of the two is a user's own candidate.
             let b = if rng.random::<f64>() < 0.4 && !own.is_empty() {
                 &own[rng.random_range(0..own.len())]
             } else {

@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector};
 
 const THETA: [f64; 2] = [2.0, -0.7];
 
-/// The slow regressors, and a fast ripple that reaches the first of them and the output, but not by way of `theta`.
+/// The slow regressors, and a fast ripple that affects the first regressor and the output, but not through `theta`.
 fn sample(t: f64, ripple: f64) -> Sample<2> {
     let fast = ripple * (25.0 * t).sin();
     let phi = [(0.3 * t).sin() + fast, (0.5 * t + 1.0).cos()];
@@ -61,7 +61,7 @@ fn a_low_pass_keeps_a_fast_disturbance_out() {
     assert!(heavy < 0.03 * alone, "{heavy}");
 }
 
-/// Both filters against their closed responses to a step of 1, for steps of any length.
+/// Both filters against their analytic step responses, for steps of any length.
 #[test]
 fn filters_are_exact_for_held_signals() {
     let mut low = FilteredRow::<1>::new(Filter::LowPass { time: 2.0 }, 1.0).unwrap();

@@ -75,7 +75,7 @@ fn nearest_on<const P: usize>(
     Some(nearest)
 }
 
-/// Of the nearest points on all choices of bounds, the nearest that obeys every row.
+/// Among the nearest points for all sets of active bounds, the nearest one that satisfies every row.
 fn oracle<const P: usize>(
     theta: &SVector<f64, P>,
     p: &SMatrix<f64, P, P>,
@@ -203,7 +203,7 @@ fn agrees<const P: usize>(
     (found - wanted).norm() <= 1e-9 * (1.0 + start.norm() + wanted.norm())
 }
 
-/// How many feasible problems were refused, and how many led to another point.
+/// Number of feasible problems that were rejected, and number of those with another result.
 fn with_rows<const P: usize>(problems: usize) -> (usize, usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(17);
     let (mut refused, mut other) = (0, 0);

@@ -170,7 +170,7 @@ fn check_derivatives(driven: &Driven, candidate: &Candidate, at: &[f64], toleran
             .collect();
         let exact = driven.run(&model, &duals);
         let typical = own.starts.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        // Of a limit a row may be near: a short step.
+        // Near a limit, a short step.
         let share = if own.role == Role::Threshold {
             1e-5
         } else {
@@ -335,7 +335,7 @@ fn every_number_of_a_record_that_a_text_is_written_in_is_known() {
         let expected: Vec<&str> = names.into_iter().filter(written).collect();
         assert_eq!(effect.record_numbers(), expected, "{}", effect.id);
     }
-    // By its begin an effect is known to follow time.
+    // The start of the record among its numbers marks an effect as a function of time.
     let spec = ModelSpec::parse(BLOCK).unwrap();
     let all = candidates(&spec, &Visited::nominal(&spec));
     for (id, follows) in [
@@ -369,7 +369,7 @@ fn an_effect_keeps_the_numbers_of_the_record_that_it_was_written_in() {
         find(all.clone(), "drift(y)").record_numbers["duration"],
         250.0
     );
-    // Half the kept duration after the kept begin it has moved by half of its change, whatever this record visits.
+    // At the kept start plus half of the kept duration, half of the change is reached, whatever range this record visits.
     let reading = |candidate: &Candidate| {
         let mut mended = apply(&spec, &[candidate]).unwrap();
         let change = mended

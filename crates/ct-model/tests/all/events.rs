@@ -1,4 +1,4 @@
-//! What changes its branch: outputs against an adaptive solver or a fine reference, derivatives against central differences.
+//! Models with branches: outputs against an adaptive solver or a fine reference, derivatives against central differences.
 
 use ct_model::{Dual, Method, Scalar};
 
@@ -76,7 +76,7 @@ end Behind;"#;
 fn late_reference(inputs: &[f64], parts: usize, (d, e): (usize, usize)) -> Vec<f64> {
     let h = 1.0 / parts as f64;
     let (k, tau) = (2.0, 7.0);
-    // Half steps, so that the middle of a step is there.
+    // Half steps, so that the middle of a step is available.
     let (mut x, mut w) = (vec![1.0_f64], 1.0_f64);
     let input = |half: isize| {
         let row = half.div_euclid(2 * parts as isize).max(0) as usize;
@@ -270,7 +270,8 @@ fn an_arm_that_friction_holds() {
     case.check_derivatives(1e-5);
 }
 
-/// What slides along a guard of any kind: at rest from the start, along an input that moves, along a curve, after a delay, on two at once.
+/// Sliding modes along guards of any kind: at rest from the start, along an input that changes, along a curve, after a delay, on two guards
+/// at once.
 #[test]
 fn states_that_slide() {
     let frame = |more: &str, equations: &str, outputs: &str| {
@@ -324,7 +325,7 @@ fn states_that_slide() {
         ),
     ] {
         println!("{name}");
-        // By differences of a longer step where the model is stiff.
+        // With differences of a longer step if the model is stiff.
         let share = if name == "a fast sensor" { 2e-4 } else { 1e-5 };
         let text = frame(more, equations, plain);
         for lines in [false, true] {

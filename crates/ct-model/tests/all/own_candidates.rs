@@ -130,7 +130,7 @@ fn the_size_is_found_where_it_is_hidden() {
         &[("loss", "u*T/(2 + T + ki*T^2) - u*T/(2 + T)")],
     );
     assert_eq!(sizes(&inhibited), ["ki"]);
-    // ... several terms with one each, ...
+    // ... several terms with one size each, ...
     let two = own(
         &[("a", 1.0), ("b", 2.0), ("p", 3.0)],
         &[("T", "a*u*p + b*(T - Ta)")],
@@ -257,7 +257,7 @@ fn a_candidate_whose_absence_is_a_limit_is_scored_with_a_factor() {
     let text = apply(&block, &[&candidate]).unwrap().to_string();
     assert!(text.contains("y = y_true - pair_v1;"), "{text}");
     assert!(!text.contains("factor"), "{text}");
-    // What its own parameters take out of the model needs none.
+    // A parameter that removes a part of the model needs no size.
     let size = own(&[("e", 1.0)], &[("T", "-e*T")]);
     let size = own_candidate(&block, "radiation", &size).unwrap();
     assert_eq!(size.with_factor(&block), None);

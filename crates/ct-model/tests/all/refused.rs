@@ -1,4 +1,4 @@
-//! What is refused: one line with place, words and mend.
+//! Rejected texts: one line with position, words and correction.
 
 use ct_model::ModelSpec;
 

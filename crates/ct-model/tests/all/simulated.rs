@@ -200,7 +200,7 @@ fn functions_of_held_inputs_and_readings_of_any_kind_are_exact() {
     let (exact, method) = case.plain();
     assert_eq!(method, Method::Exact);
     case.check_derivatives(1e-6);
-    // The same in steps, with a state that is not linear and plays no part.
+    // The same with held inputs, and an additional nonlinear state without influence.
     let steps = text.replace(
         "equation",
         "Real z(start=0.1); equation der(z) = -z^2 - k*z; ",
@@ -210,7 +210,7 @@ fn functions_of_held_inputs_and_readings_of_any_kind_are_exact() {
     for (own, other) in exact.iter().zip(&rows) {
         assert!((own[0] - other[0]).abs() < 1e-8, "{own:?} {other:?}");
     }
-    // In straight lines they are not, and steps go on.
+    // With linear inputs they are not exact, and the simulation takes steps.
     case.lines = true;
     let (_, method) = case.plain();
     assert_eq!(method, Method::Explicit);
@@ -327,7 +327,7 @@ fn a_delay_lets_jumps_through_when_they_are_due() {
         let expected = if k > 12 { -1.0 } else { 0.0 };
         assert!((row[0].eps[0] - expected).abs() < 1e-12, "row {k}");
     }
-    // No delay at all has the same derivative.
+    // A delay of zero has the same derivative.
     let (rows, _) = case.run(&[Dual::<1>::variable(0.0, 0)], &[Dual::constant(0.0)]);
     assert!((rows[20][0].re - 10.0).abs() < 1e-12 && (rows[20][0].eps[0] + 1.0).abs() < 1e-12);
 }

@@ -59,8 +59,8 @@ impl Case {
         self.check_derivatives_by(1e-5, tolerance);
     }
 
-    /// The same by differences of another share of each entry: the outputs of a stiff model are good to 1e-10, and a shorter step shows
-    /// their error; through events a longer one moves one across a row.
+    /// Checks derivatives with differences of another share of each entry: the outputs of a stiff model are accurate to 1e-10, and a
+    /// shorter step would show their error; a longer step would move an event across a row.
     pub fn check_derivatives_by(&self, share: f64, tolerance: f64) {
         const LANES: usize = 16;
         let parameters = self.model.parameters();
@@ -92,7 +92,7 @@ impl Case {
                     (8.0 * (p[k][output] - m[k][output]) - (p2[k][output] - m2[k][output]))
                         / (12.0 * step)
                 };
-                // What acts by less than a tenth when it doubles shows the error of the outputs alone.
+                // If doubling an entry changes the output by less than a tenth, the difference shows only the error of the outputs.
                 let visited = exact.iter().map(|y| y[output].re.abs()).fold(0.0, f64::max);
                 let largest = (0..exact.len())
                     .map(|k| difference(k).abs())
@@ -177,7 +177,7 @@ fn outside(case: &Case) -> Vec<Vec<f64>> {
         } else {
             held
         };
-        // Its test for stiffness takes corners for it: it is switched off.
+        // The solver's stiffness test reacts to corners: it is switched off.
         let (h, most) = ((end - begin) / 20.0, 200_000);
         let mut solver = Dopri5::from_param(
             system(rise),

@@ -5,7 +5,7 @@ use ct_rls::{ContinuousRls, Error, Guards, RecursiveEstimator, Sample, UdFactor,
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
-/// One step: `V` before, after, and as it is predicted; and what rounding can do to it.
+/// One step: `V` before, after, and as predicted; and the influence of rounding.
 struct Fall {
     before: f64,
     after: f64,

@@ -123,7 +123,7 @@ fn nearly_collinear_from_the_start() {
     }
 }
 
-/// What a short test does not see: unit Gaussian regressors, no noise, nothing ill about the data.
+/// Failure that a short test does not show: unit Gaussian regressors, no noise, well-conditioned data.
 #[test]
 fn the_textbook_dies_on_healthy_data() {
     fn died<const P: usize>(seed: u64) -> u32 {

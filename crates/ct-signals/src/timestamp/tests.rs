@@ -292,7 +292,7 @@ fn a_bound_has_one_meaning() {
         zone.bound("2026-02-30"),
         Err(TimestampError::NoSuchTime { .. })
     ));
-    // As the column is written, where that is known.
+    // With the known format of the column.
     let reader = TimestampReader::new(None, Some("Europe/Berlin"), ["01/31/2026 14:25"]).unwrap();
     assert_eq!(
         reader.bound("03/04/2026 1:00").unwrap(),

@@ -249,7 +249,7 @@ fn segments_are_independent_records() {
         "{:?}",
         model.coefficients()
     );
-    // Their order does not matter.
+    // The result does not depend on their order.
     let reversed: Vec<&[f64]> = views.iter().rev().copied().collect();
     let other = ArModel::fit(&reversed, 5).unwrap();
     assert_relative_eq!(

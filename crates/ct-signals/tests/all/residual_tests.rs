@@ -99,7 +99,7 @@ fn ljung_box_counts_fitted_coefficients() {
 #[test]
 fn input_test_is_even_where_nothing_is_left() {
     type Input = fn(&mut ChaCha8Rng) -> Vec<f64>;
-    // The moves of an input that steps every twelve samples.
+    // Changes of an input with a step every twelve samples.
     let moves = |rng: &mut ChaCha8Rng| {
         let sizes = noise::white(N, 1.0, rng);
         (0..N)

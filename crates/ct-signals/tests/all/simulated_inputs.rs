@@ -44,7 +44,7 @@ fn outputs_that_are_not_there_have_no_sample_and_keep_their_place() {
     // An input may rest at zero.
     assert_eq!(record.inputs[0].values, [0.0; 3]);
     assert!(fit.unwrap_err().to_string().contains("y1 [cm]"));
-    // Nobody names the outputs, and none is there.
+    // No output is named, and none exists.
     let unnamed = Columns {
         outputs: Vec::new(),
         ..columns()

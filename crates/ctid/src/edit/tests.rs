@@ -80,7 +80,7 @@ fn the_place_is_written_where_there_is_a_choice() {
         "{}",
         done.done
     );
-    // The table has waited: nobody need say again where.
+    // The table was kept: the place need not be given again.
     let again = with_effect("tank.toml", &done.text, "overflow", None).unwrap();
     assert_eq!(
         model_file::parse("", &again.text).unwrap().effects[0].vessel,
@@ -127,7 +127,7 @@ fn a_refused_change_leaves_the_file_as_it_was() {
         std::fs::read(&path).unwrap(),
         b"plant = \"single-tank\"\r\neffects = [\"overflow\"]\r\n"
     );
-    // Nothing is left beside it.
+    // No temporary file is left in the folder.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 

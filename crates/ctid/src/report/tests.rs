@@ -1,6 +1,6 @@
 use super::*;
 
-/// What a browser would fetch: `src`, `href`, `url(` and the like that do not point into the file.
+/// Addresses that a browser would load: `src`, `href`, `url(` and the like that point outside the file.
 fn loads(page: &str) -> Vec<&str> {
     [
         " src=",
@@ -265,7 +265,7 @@ fn several_outputs_are_told_by_name_and_as_multiples_of_their_noise() {
     ] {
         assert!(words.contains(part), "{part}");
     }
-    // A number that there is not must not show as a dash.
+    // A missing number must not be shown as a dash.
     assert!(!words.contains("<span class=\"number\">– "));
     let alone = html(&sample::two_tanks());
     for part in ["shown-output", "times the noise", "All outputs", "readings"] {

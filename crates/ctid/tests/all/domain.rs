@@ -73,7 +73,7 @@ fn a_heated_block_is_offered_general_effects_only() {
         let offered = Domain::General.offers(effect);
         assert!(offered || named.iter().all(|id| id != effect.id), "{text}");
     }
-    // What there is to offer is scored.
+    // The available effects are scored.
     for id in ["sensor_saturation", "pump_saturation", "const_leak"] {
         assert!(named.iter().any(|known| known == id), "{named:?}");
     }

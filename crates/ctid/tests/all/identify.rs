@@ -218,7 +218,7 @@ fn steps_longer_than_the_time_constant_do_not_become_it() {
             .any(|w| w.contains("below the longest step"));
         (found.parameters[0].value, told)
     };
-    // What is left is the output's way between samples, which is not a line: said where it is the larger error.
+    // The remaining error comes from the output between samples, which is not linear: a warning is given if it is the larger error.
     let (short, told) = time_constant(|k| if k % 2 == 0 { 0.5 } else { 1.5 });
     assert!((short - 20.0).abs() < 0.2 && !told, "{short}");
     let (turns, told) = time_constant(|k| if k % 2 == 0 { 5.0 } else { 25.0 });
@@ -350,7 +350,7 @@ fn drift_with_the_level_is_told_of_a_tank_and_not_of_a_linear_process() {
     assert!(tank.gain.difference > 3.0, "{tank:?}");
     assert!(tank.gain.moves());
     assert!(tank.level.is_sorted());
-    // By the law the gain goes with the root of the level, here by 1.9; the recursion's memory flattens that.
+    // By Torricelli's law the gain is proportional to the root of the level, here a ratio of 1.9; the recursion's memory reduces the ratio.
     let [low, high] = [0, tank.level.len() - 1].map(|i| tank.gain.values[i]);
     assert!((1.3..2.2).contains(&(high / low)), "{tank:?}");
 

@@ -25,7 +25,7 @@ fn first_order() -> PlantModel {
     PlantModel::first_order(6.0, 110.0).unwrap()
 }
 
-/// A loop that rests for a minute, then moves; levels of a tank. Noise circulates, in dB, or there is none.
+/// A loop that rests for a minute and then changes; levels of a tank. Noise is fed back, in dB, or there is none.
 fn record(plant: &PlantModel, controller: &Controller, snr: Option<f64>, seed: u64) -> Record {
     with_bits(30, plant, controller, snr, seed)
 }
@@ -203,7 +203,7 @@ fn a_slow_transient_is_no_rest() {
                 assert!((tau / 110.0 - 1.0).abs() < near, "{rows} {method:?}: {tau}");
             }
         }
-        // Without a controller too, where nothing says at which output the input is at rest.
+        // Also without a controller, where the output for a resting input is unknown.
         let whole = self::record(&first_order(), &Controller::none(), None, 1);
         for rows in [0, 75, 400, 1000] {
             let found = found(&cut(&whole, rows), Method::Iv, order, LevelChoice::Auto);
@@ -287,7 +287,7 @@ fn a_recursion_follows_a_drift() {
     }
 }
 
-/// Where one model of the whole record simulates it much better than the one of its end.
+/// If one model of the whole record simulates it much better than the final model.
 #[test]
 fn no_condition_is_told_of_estimates_that_are_not_the_record_s() {
     let request = Request {
@@ -307,7 +307,7 @@ fn no_condition_is_told_of_estimates_that_are_not_the_record_s() {
     assert!(found.in_loop.unwrap().convergence.is_none());
 }
 
-/// No verdict on the estimates of a recursion that diverged: here it rests by order where nothing is at rest.
+/// No verdict on the estimates of a recursion that diverged: here the option declares rest although the loop is not at rest.
 #[test]
 fn no_condition_is_told_of_estimates_that_are_wrong() {
     let order = Order { n: 1, m: 0 };

@@ -39,7 +39,7 @@ fn without_some(mut record: Record, seed: u64) -> Record {
     record
 }
 
-/// How sure the estimates of a_1, a_2 and b_0 are, over many records.
+/// Bias and spread of the estimates of a_1, a_2 and b_0 over many records.
 struct Sure {
     /// Shares of the 95 % intervals that contain the true value.
     covered: Vec<f64>,
@@ -60,7 +60,7 @@ fn sure(method: Method, missing: bool) -> Sure {
                 false => record,
             };
             let mut request = Request::new(method, Order { n: 2, m: 0 });
-            // Their standard errors take the levels for exact.
+            // Their standard errors assume exact levels.
             if matches!(method, Method::Iv | Method::RecursiveFcloe) {
                 request.levels = LevelChoice::Zero;
             }

@@ -199,7 +199,7 @@ fn withstands(written: &Written) {
             assert!(left.is_empty(), "{what}: {left:?} is left");
         }
     }
-    // Else no call that failed was one that matters.
+    // Otherwise none of the failed calls mattered.
     assert!(
         refused >= 4,
         "{words}: {refused} of {} failures were errors",

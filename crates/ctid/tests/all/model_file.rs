@@ -1,4 +1,4 @@
-//! The model file: what it says, and one message for each mistake.
+//! The model file: its content, and one message for each error.
 
 #![allow(clippy::unwrap_used)]
 
@@ -25,7 +25,7 @@ fn message(text: &str) -> String {
     message
 }
 
-/// The message begins so, and says this further on.
+/// The message has this start, and contains this text later.
 fn refuses(text: &str, start: &str, mend: &str) {
     let message = message(text);
     assert!(

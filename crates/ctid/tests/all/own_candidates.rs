@@ -68,7 +68,7 @@ fn a_candidate_is_found_with_its_place_added_and_removed() {
     ] {
         assert!(said.contains(part), "{said}");
     }
-    // One bound is no bound to sit at.
+    // A parameter with one bound is not reported at a bound.
     let last = place.json("found.json")["steps"][1].clone();
     let own = last["parameters"].as_array().unwrap().iter();
     let own = own.clone().find(|one| one["name"] == "vent_q").unwrap();
@@ -134,7 +134,7 @@ fn alarms(place: &Place, rows: &str) -> Vec<Value> {
     let events = text
         .lines()
         .map(|line| serde_json::from_str::<Value>(line).unwrap());
-    // An alarm, and what is said of it as evidence grows.
+    // Alarms, with growing evidence.
     events
         .filter(|event| event["verdict"].is_string())
         .collect()
@@ -151,11 +151,11 @@ fn the_monitor_names_a_candidate_that_begins() {
         (last["size"]["value"].as_f64().unwrap() - 0.3).abs() < 0.1,
         "{last}"
     );
-    // Without it another effect is named, or none.
+    // Without the candidate another effect is named, or none.
     let alarms_without = alarms(&place(""), &rows);
     let last = alarms_without.last().unwrap();
     assert_ne!(last["effects"][0], "vent", "{last}");
-    // One that is in the model already is no suspect, and the rows are then those of the model.
+    // A candidate in the model is not tested, and the rows agree with the model.
     let text = declared
         .read("m.toml")
         .replace("effects = []", "effects = [\"vent\"]");

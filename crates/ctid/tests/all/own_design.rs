@@ -21,7 +21,7 @@ end Pair;
 "#;
 const FILE: &str = "model = \"pair.mo\"\n[columns]\ntime = \"t [min]\"\nu = \"heater [W]\"\nw = \"other [W]\"\ny1 = \"first [degC]\"\ny2 = \"second [degC]\"\n";
 
-/// Both temperatures every 10 s, the first heater late by 5 s.
+/// Both temperatures every 10 s, the first heater with a delay of 5 s.
 fn heated() -> String {
     let mut text = String::from("t [min],heater [W],other [W],first [degC],second [degC]\n");
     let mut draw = Random(1);
@@ -77,7 +77,7 @@ fn an_experiment_at_one_input_or_at_both_is_written_as_a_record() {
     );
     assert!(rows.iter().any(|row| row[1] != rows[0][1]));
     place.succeeds("simulate m.toml next.csv --fit a.csv --out y.csv");
-    // Without a name both move, one by one and together.
+    // Without a name both inputs change, one by one and together.
     place.succeeds(
         "design a.csv --model m.toml --between delay(u) lag(u) --duration 2000 --json both.json --out both.csv",
     );

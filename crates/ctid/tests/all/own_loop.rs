@@ -116,7 +116,7 @@ fn a_loop_that_is_not_simulated_is_refused_or_said() {
     // Inputs that are applied are those that are applied.
     let said = unfolded(place.succeeds("simulate m.toml loop.csv --out z.csv"));
     assert!(!said.contains("note: [controller.u]"), "{said}");
-    // What is no controller is said with its line.
+    // An invalid controller is reported with its line.
     place.write("m.toml", file(0.8).replace("controller.u", "controller.w"));
     place.refuses(
         "compare loop.csv --model m.toml",

@@ -1,4 +1,4 @@
-//! What nothing explains, from the program's outside: written as CSV, kept as a term of one's own, taken out again.
+//! An unexplained error through the program: written as CSV, kept as a user's own term, removed again.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -86,7 +86,7 @@ fn the_unknown_is_written_kept_and_taken_out() {
         assert!(after < part * before, "{key}: {before} -> {after}");
     }
     assert_eq!(after["known_effects"][0], "my_wave");
-    // Said where it is so, and only there.
+    // The message appears only in this case.
     let says = |result: &serde_json::Value, words: &str| {
         let said = result["sentences"].as_array().unwrap();
         said.iter().any(|one| one.as_str().unwrap().contains(words))
@@ -101,7 +101,7 @@ fn the_unknown_is_written_kept_and_taken_out() {
     let parameters = after["steps"][0]["parameters"].as_array().unwrap();
     assert!(parameters.iter().any(|p| p["name"] == "my_wave.scale"));
 
-    // Kept as it stands.
+    // Kept unchanged.
     let held = place.read("tank.toml") + "fixed = true\n";
     place.write("held.toml", held);
     let kept = place.result("compare a.csv --model held.toml");

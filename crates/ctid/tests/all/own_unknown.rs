@@ -16,7 +16,7 @@ equation
 end Block;
 "#;
 
-/// What the heater gives: stairs without edges, which no effect of the catalogue has.
+/// Output of the heater: smoothed stairs, which no effect of the catalogue has.
 fn given(u: f64) -> f64 {
     u + 5.0 * (u / 2.6).sin()
 }

@@ -139,7 +139,7 @@ fn the_friction_that_a_pendulum_lacks_is_found_added_and_removed() {
     let found = place.json("found.json");
     let group = found["groups"][0].as_array().unwrap();
     assert!(group.iter().any(|id| id == "coulomb(w)"), "{group:?}");
-    // Nothing is shown against an input that there is not.
+    // There is no plot against a missing input.
     let page = place.read("found.html");
     assert!(!page.contains("Against the input") && !page.contains("past input"));
     place.succeeds("add coulomb(w) --model p.toml --from found.json");

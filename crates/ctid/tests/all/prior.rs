@@ -1,4 +1,4 @@
-//! What is known of parameters beside the records, from the program's outside.
+//! Priors of parameters, through the program.
 
 use serde_json::Value;
 

@@ -96,7 +96,7 @@ fn compare_shows_the_error_and_writes_both_files() {
             .unwrap()
             .starts_with(&ctid::report::head())
     );
-    // Its own files may be written again.
+    // Files of the program may be overwritten.
     place
         .ctid("compare @tour.csv --model @tour.toml --json @out.json --report @out.html")
         .unwrap();

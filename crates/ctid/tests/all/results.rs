@@ -1,5 +1,5 @@
-//! What the program gives for good input: the JSON of the contract, the same whatever the form of
-//! the file, the number of threads and the run, and files that are written where they were asked for.
+//! Results of the program for valid input: the documented JSON, independent of the format of the file, the number of threads and the run,
+//! and files in the requested places.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -155,7 +155,7 @@ fn the_bundled_records_give_the_json_of_the_contract() {
     fulfils_the_contract(&place.result(DIAGNOSE), false);
 }
 
-/// The exit code is 0 whatever is found: [`Place::result`] asks for it.
+/// The exit code is 0 for any verdict: [`Place::result`] checks it.
 fn diagnosed(record: &str, model: &str) -> Value {
     let place = Place::empty();
     place.write("data.csv", record);
@@ -295,7 +295,7 @@ fn add_compare_remove_is_a_round_trip() {
         assert!(said.contains("tour.toml: removed overflow"), "{said}");
         let after = place.read("tour.toml");
         if name == "no list" {
-            // The list that `add` made stays, and is empty.
+            // The list that `add` wrote stays, and is empty.
             assert!(after.contains("effects = []"), "{after}");
             assert_eq!(after.replace("effects = []\n", ""), text, "{name}");
         } else {

@@ -1,4 +1,4 @@
-//! Where the system refuses something the program ends with exit code 2 and one line, as on any other error.
+//! If the system refuses a call, the program ends with exit code 2 and one line, as for any other error.
 #![cfg(target_os = "linux")]
 
 use std::process::Command;

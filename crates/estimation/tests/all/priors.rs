@@ -159,7 +159,7 @@ fn an_entry_that_no_sample_shows_is_as_its_prior_says() {
             prior.std_error,
             max_relative = 1e-9
         );
-        // Without a prior it has no error.
+        // Without a prior it has no standard error.
         let without = Curves {
             priors: Vec::new(),
             ..drawn(5, outputs, 0.0, 0.0)
@@ -228,7 +228,7 @@ fn intervals_hold_the_truth() {
     }
 }
 
-/// A model that lacks something may end far from a prior: what is fitted on from there begins there, and not near the prior.
+/// An incomplete model may end far from a prior: a continued fit starts at this end, and not near the prior.
 #[test]
 fn a_fit_goes_on_where_another_ended_far_from_a_prior() {
     let mut curves = drawn(5, 1, 0.0, 1.0);

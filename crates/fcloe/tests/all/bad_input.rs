@@ -1,4 +1,4 @@
-//! What cannot be fitted is refused, with the numbers that disagree.
+//! Inputs that cannot be fitted are rejected, with the numbers that disagree.
 
 use crate::support::drive;
 use ct_lti::Hold;
@@ -42,8 +42,8 @@ fn an_unstable_loop_at_the_start() {
     assert!(error.to_string().contains("1.2"), "{error}");
 }
 
-/// An output that goes the wrong way asks for a negative gain, which this controller does not stabilise: the fit stays
-/// inside, and says why it ended.
+/// An output with the opposite sign needs a negative gain, which this controller does not stabilise: the fit stays in the stable region,
+/// and reports why it ended.
 #[test]
 fn a_fit_never_leaves_the_stable_loops() {
     let mut record = record();
@@ -66,7 +66,7 @@ fn a_fit_never_leaves_the_stable_loops() {
     }
 }
 
-/// Levels are no moves: they make a wrong controller no better.
+/// Constant levels do not count as changes: they do not hide a wrong controller.
 #[test]
 fn a_controller_that_does_not_match_raw_levels() {
     let mut raw = record();
@@ -128,7 +128,7 @@ fn what_follows_r_by_chance_is_taken_off() {
     assert!((12..=40).contains(&above), "{above}");
 }
 
-/// Neither noise, wherever it enters, nor offsets, nor a sampled controller, nor the printed digits are a mismatch.
+/// Noise at any point, offsets, a sampled controller and printed digits do not count as a mismatch.
 #[test]
 fn a_controller_that_matches_is_believed() {
     let clean = record();
@@ -262,7 +262,7 @@ fn models_and_settings_that_are_none() {
     ));
 }
 
-/// Two parameters that only their product shows: nothing is made up.
+/// Two parameters of which only the product is determined: no standard errors are reported.
 #[test]
 fn what_the_data_leave_open_has_no_standard_error() {
     // A plant of second order fitted to one of first order without noise: pole and zero may cancel anywhere.
@@ -291,7 +291,7 @@ fn what_the_data_leave_open_has_no_standard_error() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Whatever the numbers, an answer or an error.
+    /// For any numbers there is a result or an error.
     #[test]
     fn nothing_panics(
         y in proptest::collection::vec(prop_oneof![-1e3..1e3f64, Just(0.0), Just(1e300), Just(-1e-300)], 0..60),

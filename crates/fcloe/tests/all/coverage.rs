@@ -30,7 +30,7 @@ fn check(rig: &Rig) -> Coverage {
         found.variance_ratios.iter().all(|ratio| honest(*ratio)),
         "{found:?}"
     );
-    // Where levels are estimated, less is known of the low frequencies that tell the two paths apart.
+    // With estimated levels, less information is available at the low frequencies that distinguish the two paths.
     assert!(
         *placed >= if rig.unknown_levels { 300 } else { 360 },
         "{placed}"
@@ -43,7 +43,7 @@ fn noise_in_the_loop() {
     check(&Rig::first_order(true));
     check(&Rig::second_order(true));
     check(&Rig::direct_term(true));
-    // Here a white residual's intervals are too narrow.
+    // Here the intervals for a white residual are too narrow.
     let white = check(&Rig::filtered_pid(true)).white;
     assert!(white.iter().any(|hits| *hits < 368), "{white:?}");
 }
@@ -149,7 +149,7 @@ fn instruments_know_their_errors() {
     ] {
         let found = instruments(&rig, lambda);
         println!("{} in loop {}: {found:.2?}", rig.name, rig.in_loop);
-        // Renewed, the filter is right for the noise; one that stays leaves a little too much.
+        // With updates the filter suits the noise; a constant filter leaves slightly too much.
         for (of, most) in found.iter().zip([2.0, 1.25]) {
             for (hits, variance_ratio) in of {
                 assert!((0.85..most).contains(variance_ratio), "{found:.2?}");

@@ -75,7 +75,7 @@ fn is_the_filtered_product_of_parameter_error_and_sensitivities() {
         for controller in [&pi, &pid, &gain, &Controller::none()] {
             let [coarse, fine] =
                 [16, 32].map(|parts| difference(&plant, &model, controller, parts));
-            // What is left is the straight line between samples: a quarter at half the step.
+            // The remaining error is that of linear interpolation between samples: a quarter at half the step.
             assert!(fine < 1e-3, "{fine:.1e}");
             assert!(
                 (3.0..5.0).contains(&(coarse / fine)),

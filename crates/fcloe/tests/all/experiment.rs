@@ -33,7 +33,7 @@ fn noise_in_the_loop_circulates() {
     let y: Vec<f64> = moved.y.iter().zip(&w).map(|(y, w)| y + w).collect();
     assert!(largest(&noisy.y, &y) < 1e-12);
     assert!(largest(&noisy.u, &moved.u) < 1e-12);
-    // On the record alone u knows nothing of it.
+    // With output noise alone, u does not depend on the noise.
     assert_eq!(run(&r, Noise::OnRecord(&w)).u, run(&r, Noise::None).u);
     assert!(
         continuous_loop(

@@ -95,8 +95,7 @@ fn levels_are_estimated_from_a_wrong_first_row() {
     assert_eq!(problem.uncertainty(&fit, None).unwrap().covariance.len(), 6);
 }
 
-/// Raw levels that are called deviations are not noticed in silence: the loop seems to start with a jump, and the
-/// residual says so.
+/// Raw levels that are declared as deviations are reported: the loop seems to start with a step, and the residual shows this.
 #[test]
 fn raw_levels_called_deviations_leave_a_residual() {
     let raw = record(&pi(), 1200, POINT, Offsets::Deviations);
@@ -105,7 +104,7 @@ fn raw_levels_called_deviations_leave_a_residual() {
     assert!(error(&fit) > 0.05);
 }
 
-/// Each record keeps its own levels and begins at rest: fitted together they are better than one after the other glued.
+/// Each record keeps its own levels and begins at rest: a joint fit is better than a fit of the concatenated records.
 #[test]
 fn several_records_with_levels_of_their_own() {
     let other = OperatingPoint {

@@ -96,7 +96,7 @@ fn bad_starts() {
     }
 }
 
-/// Where condition (14) holds, the fixed filter converges from all starts of a grid; where Re < 0, from a few.
+/// If condition (14) is satisfied, the fixed filter converges from all starts of a grid; if Re < 0, from a few.
 #[test]
 fn the_condition_is_sufficient() {
     let plant = PlantModel::first_order(6.0, 110.0).unwrap();
@@ -155,7 +155,7 @@ fn operating_point() {
     }
 }
 
-/// Whatever comes in, the estimates stay finite, the loop stable and F within its cap.
+/// For any input, the estimates stay finite, the loop stable and F within its cap.
 #[test]
 fn any_input() {
     let (_, controller) = first_order();

@@ -135,7 +135,7 @@ fn each_start_in_open_loop() {
     near(ls, (5.52, 100.9), (0.03, 1.0));
     near(printed, (5.80, 106.2), (0.03, 1.0));
     near(standard, (6.0, 110.4), (0.03, 1.0));
-    // Of lines between samples the noise leaves less after the filter.
+    // For linear interpolation between samples, the noise is smaller after the filter.
     near(general, (6.0, 110.0), (0.1, 2.0));
     near(iv, (6.0, 110.0), (0.03, 1.0));
     near(refined, (6.0, 110.0), (0.03, 1.0));
@@ -174,8 +174,8 @@ fn worst(plant: &PlantModel, truth: &PlantModel) -> f64 {
     pairs.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
 }
 
-/// From orders alone the batch fit reaches the minimum that it reaches from the truth, in the loop and in open loop,
-/// with a sensor's filter and without.
+/// From orders alone the batch fit reaches the same minimum as from the true plant, in the loop and in open loop, with and without a
+/// sensor's filter.
 #[test]
 fn the_pipeline_leads_to_the_minimum() {
     let (plant, pi, r) = second_order();
@@ -329,8 +329,8 @@ fn bad_input() {
     ));
 }
 
-/// What it rests at is its own: the instruments of the last plant, through the last plant's own filter, give that plant; and the start is
-/// forgotten.
+/// Fixed point of the refinement: the instruments of the last plant, with the last plant's filter, give that plant; and the start has no
+/// influence.
 #[test]
 fn a_refinement_rests_where_its_own_filter_and_instruments_lead() {
     let (record, controller) = first_table(Some(3));
@@ -347,7 +347,7 @@ fn a_refinement_rests_where_its_own_filter_and_instruments_lead() {
     assert!(worst(&fast, &slow) < 3e-4, "{fast:?} {slow:?}");
 }
 
-/// Filters count in the unit of time of the record, whatever its step is.
+/// Filter bandwidths use the record's unit of time, whatever its step is.
 #[test]
 fn another_unit_of_time_is_another_tau_and_nothing_else() {
     let (record, _) = first_table(None);

@@ -13,7 +13,7 @@ fn records() -> u64 {
     std::env::var("RECORDS").map_or(RECORDS, |records| records.parse().unwrap())
 }
 
-/// So many standard deviations of a share of so many records around 95 %.
+/// Tolerance in standard deviations for the share of this number of records around 95 %.
 fn band(deviations: f64, records: u64) -> std::ops::RangeInclusive<f64> {
     let width = deviations * (0.95 * 0.05 / records as f64).sqrt();
     0.95 - width..=0.95 + width
@@ -26,7 +26,7 @@ fn check(rig: &Rig, intervals: impl Fn(&Setup) -> Intervals + Sync) {
     check_of(rig, |_| {}, intervals);
 }
 
-/// The same of records that are changed before.
+/// Coverage for records that are modified first.
 fn check_of(
     rig: &Rig,
     change: impl Fn(&mut Record) + Sync,

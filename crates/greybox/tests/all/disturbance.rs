@@ -111,7 +111,7 @@ impl Disturbed {
 
 #[test]
 fn a_single_tank_with_a_disturbance_is_found() {
-    // It flows in, or is drawn.
+    // The disturbance flows in, or out.
     for (gain, hold) in [(8.0, Hold::Zero), (-6.0, Hold::First)] {
         let rig = Rig::single_tank();
         Disturbed {

@@ -1,5 +1,5 @@
-//! What each effect's own starts are worth: on simulated records whose missing effect shows about as much as the noise does,
-//! a fit that begins there finds its parameters again, within their standard errors.
+//! Quality of each effect's starts: on simulated records with a missing effect about as large as the noise, a fit from these starts finds
+//! the true parameters within their standard errors.
 
 use std::collections::BTreeMap;
 
@@ -167,7 +167,7 @@ fn base_fit<'a>(case: &Case, records: &'a [Record]) -> (Setup<'a>, Vec<f64>, f64
     (setup, fit.x, fit.rmse[0])
 }
 
-/// What came of one record.
+/// Result of one record.
 struct Outcome {
     /// Error of every parameter in standard errors; none for one that ends at a bound.
     z: Vec<Option<f64>>,
@@ -184,7 +184,7 @@ fn one(case: &Case, seed: u64) -> Outcome {
     let duration = INTERVAL * (SAMPLES - 1) as f64;
     let rough = Scales::from_ranges((3.5, 6.5), (8.0, 24.0), INTERVAL, duration);
     let still = vec![0.0; SAMPLES];
-    // How much it shows without noise, over the scales that a fit will see.
+    // Size of the effect without noise, relative to the scales of the fit.
     let seen = [case.record(&u, &still, &rough)];
     let (setup, _, structural) = base_fit(case, &seen);
     let scales = setup.structure.scales.clone();
@@ -203,7 +203,7 @@ fn one(case: &Case, seed: u64) -> Outcome {
     setup
         .choose_substeps(&start(&setup, &x, &base, &[]))
         .unwrap();
-    // As the search does: every combination of the effect's own starts is ranked by one step, hardly damped, and two are followed.
+    // As in the search: every combination of the effect's own starts is ranked by one nearly undamped step, and the best two are fitted.
     let parameters = setup.structure.effect_parameters(case.placed());
     let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
     for parameter in &parameters {
@@ -283,7 +283,7 @@ fn found(case: &Case, outcome: &Outcome) -> bool {
     };
     match case.id {
         "stiction_backlash" => {
-            // Where it began in a narrow band shows in a few readings only.
+            // The initial state in a narrow band affects a few readings only.
             let [width, jump, begin] = [0, 1, 2].map(|i| {
                 let error = outcome.estimate[i] - case.parameters[i];
                 error.abs()
@@ -296,7 +296,7 @@ fn found(case: &Case, outcome: &Outcome) -> bool {
     }
 }
 
-/// How many of so many records are found, for every case whose name contains `wanted`.
+/// Number of successes among the records, for every case whose name contains `wanted`.
 fn table(wanted: &str, records: u64) -> Vec<(String, usize)> {
     let name = |case: &Case| format!("{}@{} {}", case.id, case.vessel, case.plant.id());
     cases()
@@ -334,7 +334,7 @@ fn a_valve_with_a_wide_band_that_begins_within_it_is_found_again() {
                     plant: Plant::SingleTankLinear,
                     id: "stiction_backlash",
                     vessel: 0,
-                    // The band in which it stays takes nine tenths of the command's range.
+                    // The stiction band is nine tenths of the command's range.
                     parameters: vec![0.9 * (high - low) / (1.0 + jump), jump, begin],
                 };
                 let o = one(&case, seed);

@@ -95,7 +95,7 @@ fn every_plant_in_two_records_under_both_holds() {
             let x = near_truth(&rig, 2);
             let what = format!("{} {hold:?}", rig.plant.id());
             check_rows(&what, &setup, &x);
-            // A record's initial levels move that record alone.
+            // A record's initial levels affect that record alone.
             let rows = rows(&setup, &x);
             let n = rig.plant.vessels();
             let own = rig.theta.len();

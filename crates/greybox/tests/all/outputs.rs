@@ -140,7 +140,7 @@ fn the_likelihood_is_the_sum_of_those_of_the_outputs() {
         deviance += count * (1.0 + (std::f64::consts::TAU * variance).ln()) + log_det;
     }
     assert_relative_eq!(fit.deviance, deviance, max_relative = 1e-9);
-    // It is the least: no parameter's move lowers it.
+    // The minimum: no change of a parameter lowers it.
     let best = squares(&setup, &fit.x, &metric).unwrap().cost();
     for &i in setup.free() {
         for factor in [0.999, 1.001] {

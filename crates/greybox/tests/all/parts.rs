@@ -34,7 +34,7 @@ fn with(id: &str) -> Structure {
     structure().with(Placed { effect, vessel: 0 }).unwrap()
 }
 
-/// Structures with something that follows time, and its parameters.
+/// Structures with a function of time, and their parameters.
 fn cases() -> Vec<(Structure, Vec<f64>)> {
     let end = INTERVAL * (SAMPLES - 1) as f64;
     let mut cases: Vec<(Structure, Vec<f64>)> = [
@@ -121,7 +121,7 @@ fn what_follows_time_runs_through_the_parts() {
             apart(&together.concat(), &whole.outputs[0].values) < 1e-9,
             "{name}"
         );
-        // From its own zero the second part is another experiment.
+        // With a separate time zero, the second part is another experiment.
         let [first, mut second] = parts.clone();
         second.time.iter_mut().for_each(|t| *t -= whole.time[CUT]);
         let unrelated = simulated(&[first, second]);

@@ -52,7 +52,7 @@ fn model(text: &str) -> Model {
     Model::new(ModelSpec::parse(text).unwrap())
 }
 
-/// A record of steps of the input; `outputs` in it are NaN.
+/// Without noise: with noise the slopes of a fit have a second-order part, the residual times the curvature.
 fn inputs(rows: usize, step: f64, outputs: usize, seed: u64) -> Record {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let u = excitation::steps(rows, 10..=30, 2.0, 8.0, &mut rng).unwrap();

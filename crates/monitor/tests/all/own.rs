@@ -79,7 +79,7 @@ fn a_change_is_seen_soon_and_its_onset_is_found() {
     }
 }
 
-/// Of two sensors the one that reads too high from then on is named, with the size.
+/// Of two sensors, the one with an offset is named, with its size.
 #[test]
 fn the_sensor_that_is_off_is_named() {
     let mut plant = Plant::heaters(3200, 61);
@@ -106,7 +106,7 @@ fn the_sensor_that_is_off_is_named() {
     assert_eq!(last.verdict, Verdict::Unexplained, "{}", last.sentence);
 }
 
-/// What was learned stays; the tracker follows the parameter to where it is now.
+/// The learned model does not change; the tracker follows the parameter to its new value.
 #[test]
 fn the_tracker_follows_a_parameter_that_has_changed() {
     let mut plant = Plant::heaters(6000, 31);
@@ -285,7 +285,7 @@ fn what_cannot_be_watched_is_said() {
         matches!(&said[..], [Notice::NotLearned { why }] if why.contains("does not settle")),
         "{said:?}"
     );
-    // An input that is missing refuses the row and says which.
+    // A missing input rejects the row, and the message names the input.
     let block = model(BLOCK);
     let mut of_block = self::monitor(&block);
     let refused = of_block

@@ -1,4 +1,4 @@
-//! A pump after a valve with play: where it stands hangs on commands that may lie further back than any rows that are kept.
+//! A pump after a valve with backlash: the state of the backlash may depend on commands before the stored rows.
 
 use ct_signals::{excitation, noise};
 use monitor::{Model, Monitor, Row, Settings, Units};

@@ -37,17 +37,17 @@ pub struct Study {
     pub paper: &'static str,
     /// Runs of each table, 10 or more, each with a noise of its own.
     pub runs: usize,
-    /// What the noises were drawn from.
+    /// Seed of the noises.
     pub seed: u64,
-    /// What the paper leaves open and is assumed, a sentence each.
+    /// Assumptions about details that the paper omits, one sentence each.
     pub assumptions: Vec<String>,
-    /// What cannot be as it is printed, a sentence each.
+    /// Figures that cannot be correct as printed, one sentence each.
     pub misprints: Vec<&'static str>,
     /// All cells, in the paper's order.
     pub tables: Vec<Cell>,
-    /// How many cells with a band lie inside.
+    /// Number of cells inside their band.
     pub inside: usize,
-    /// How many have one.
+    /// Number of cells with a band.
     pub of: usize,
     /// Table I.
     pub first: FirstTable,

@@ -162,7 +162,7 @@ impl Rig {
         })
     }
 
-    /// As the paper gives it to the fit, with the sensor's filter or without.
+    /// Controller as the paper's fit uses it, with or without the sensor's filter.
     pub(super) fn controller(&self, with_filter: bool) -> Result<Controller, Error> {
         let pi = Controller::pi(self.kp, self.ki)?;
         Ok(if with_filter {

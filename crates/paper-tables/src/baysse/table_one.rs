@@ -43,7 +43,7 @@ pub struct FirstTable {
     pub as_printed: Vec<[f64; 2]>,
     /// Closed-loop output error, iterated in theta with `mu I`.
     pub plain: Vec<[f64; 2]>,
-    /// The same, iterated in the relative change delta of equation (28).
+    /// Estimates by iteration in the relative change delta of equation (28).
     pub normalised: Vec<[f64; 2]>,
     /// Iterations.
     pub iterations: Counts,
@@ -64,14 +64,14 @@ pub struct Counts {
     pub normalised_diagonal: Vec<usize>,
 }
 
-/// One run.
+/// Results of one run.
 struct Run {
     starts: [[f64; 2]; 3],
     /// Theta and delta with `mu I`, theta and delta with `mu diag(J'')`.
     fits: [([f64; 2], usize); 4],
 }
 
-/// What the paper leaves open, and is assumed.
+/// Assumptions about details that the paper omits.
 pub(super) fn assumptions() -> Vec<String> {
     let samples = BIT * BITS.len();
     vec![

@@ -17,7 +17,7 @@ pub struct Settings {
     pub time_constant: f64,
     /// Mean square of the noise over that of the output without it. Printed; that it is of powers is not.
     pub noise_ratio: f64,
-    /// c^ is kept within plus and minus this, s. Printed.
+    /// Bound of |c^|, s. Printed.
     pub filter_limit: f64,
     /// Weights `c_p` and gamma of (4.11), which are equal. gamma is printed.
     pub weight: f64,
@@ -57,7 +57,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What the paper leaves open and is assumed here, a sentence each.
+    /// Assumptions about details that the paper omits, one sentence each.
     #[must_use]
     pub fn assumptions(&self) -> Vec<String> {
         let span = self.span as f64 * self.dt;
@@ -139,7 +139,7 @@ impl Settings {
     }
 }
 
-/// How the equations are carried over a step.
+/// Integration rule of the equations over a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Rule {
@@ -153,7 +153,7 @@ impl Rule {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Euler, Self::Exact];
 
-    /// Its name in tables and sentences.
+    /// Name in tables and sentences.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

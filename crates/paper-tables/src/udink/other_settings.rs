@@ -52,10 +52,10 @@ const OTHERS: [Other; 20] = [
     }),
 ];
 
-/// The tables with one setting changed, by Euler's rule, beside the paper's.
+/// The tables with one setting changed, with Euler's rule, compared with the paper's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Changed {
-    /// What is changed, in words.
+    /// The changed setting, in words.
     pub setting: &'static str,
     /// Cells inside.
     pub inside: usize,

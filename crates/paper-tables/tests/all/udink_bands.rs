@@ -7,7 +7,7 @@ use paper_tables::udink::{Settings, Verdict, study};
 #[test]
 fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
     let study = study(&Settings::default(), 200, 1, &|_| {}).unwrap();
-    // One cell in ten lies outside by chance; what differs by the rule, not by chance, is named.
+    // One cell in ten is outside by chance; differences caused by the rule are listed.
     assert!(study.euler.inside >= 66, "{:?}", study.euler.outside);
     assert!(study.exact.inside >= 62, "{:?}", study.exact.outside);
     assert_eq!(study.euler.failed + study.exact.failed, 0);
@@ -49,7 +49,7 @@ fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
         }
     }
 
-    // Where it lies beside the checkout: the range for the median of 200 noises of another program, cell by cell.
+    // If it is next to the checkout: the range of the median of 200 noises from another program, cell by cell.
     let bands =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reproduction/udink-accept.md");
     let Ok(bands) = std::fs::read_to_string(&bands) else {

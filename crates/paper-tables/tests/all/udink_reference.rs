@@ -37,7 +37,7 @@ fn coarse() -> Settings {
     }
 }
 
-/// To 1e-6, or to the last digit of what was printed as 0.
+/// Agreement to 1e-6, or to the last digit of a value printed as 0.
 fn agrees(printed: &str, found: f64) -> bool {
     let value: f64 = printed.parse().unwrap();
     (value - found).abs() <= (1e-6 * value.abs()).max(5e-8)

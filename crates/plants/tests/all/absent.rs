@@ -63,7 +63,7 @@ fn the_derivative_at_absent_is_that_of_the_limit() {
                     }
                     let info = &base.structure.effect_parameters(placed)[0];
                     if !info.absent.is_finite() {
-                        // A threshold that is never reached has no derivative there; derivatives.rs has it at work.
+                        // A threshold that is never reached has no derivative there; derivatives.rs tests it in use.
                         continue;
                     }
                     let case = base.with_absent(&[placed]);

@@ -20,7 +20,7 @@ fn cases() -> Vec<(Case, String)> {
         .collect()
 }
 
-/// The same course held where the first input is a ramp, and a ramp where it is held.
+/// The same course held if the first input is a ramp, and a ramp if it is held.
 fn otherwise(command: Command) -> Command {
     let there = mirrored(command).from;
     match command.to {
@@ -66,8 +66,8 @@ fn effects_beside_it_agree_with_their_equations() {
         let singles = placements(plant).into_iter().map(|placed| vec![placed]);
         let sets = random_sets(plant, 3, 8, 20 + i as u64);
         for (k, set) in singles.chain(sets).enumerate() {
-            // A level that leaves its rim and comes back within a step is not seen to spill; a disturbance that falls back at every
-            // sample and rises in between would do that all the time.
+            // A level that leaves its rim and returns within a step is not detected; a disturbance that falls at every sample and rises in
+            // between would cause this all the time.
             let rim = set.iter().any(|placed| placed.effect.id == "overflow");
             case.second = [mirrored, otherwise][usize::from(!rim && (k + i / 4) % 2 == 1)];
             let with = case.with_interior(&set);

@@ -15,7 +15,7 @@ fn reading(plant: Plant, measured: &[usize]) -> Case {
     case
 }
 
-/// The same with an effect, its parameters where it shows and a lag that has not settled.
+/// The case with an effect, its parameters at values with influence, and a lag that has not settled.
 fn with(case: &Case, id: &str, output: usize) -> Case {
     let placed = Placed {
         effect: effect(id),
@@ -144,7 +144,7 @@ fn an_effect_at_a_sensor_changes_its_output_alone() {
             for output in 0..measured.len() {
                 let mut case = with(&base, id, output);
                 let own = base.theta.len();
-                // Where the readings are: half-way up what they visit.
+                // Middle of the range of the readings.
                 let readings = without.iter().map(|(readings, _)| readings[output]);
                 let middle = readings.sum::<f64>() / without.len() as f64;
                 match id {

@@ -11,8 +11,8 @@ fn compare(case: &Case, drive: Drive, seed: u64, most: f64) -> Vec<String> {
     let input = input(drive, 150, case.h, seed);
     let reference = reference::run(case, &input);
     let effects = case.structure.effects();
-    // Where a root begins within a step its error falls by 3 to the power of one and a half, five times, and is of the size
-    // of a tenth of what flows through the hole meanwhile.
+    // If an outflow begins within a step, the order of the error falls to one and a half (a factor of five for three parts), and the error
+    // is about a tenth of the flow through the hole in that time.
     let (most, falls) = if begins_with_a_root(effects) {
         (2e-4, 0.25)
     } else {
@@ -156,7 +156,7 @@ fn two_lags_in_series_may_be_exchanged() {
         let offset = case.theta[names.iter().position(|info| info.name == "offset").unwrap()];
         let mut other = base(plant);
         other.theta.swap(at[0], at[1]);
-        // The same reading and the same slope of it at the beginning.
+        // The same reading and the same slope at the beginning.
         let low = case.levels[1] - offset;
         other.levels[0] = low + (case.levels[0] - low) * case.theta[at[0]] / case.theta[at[1]];
         for drive in DRIVES {

@@ -1,4 +1,4 @@
-//! Whatever a fit may try and a user may record, the output stays finite and the levels within their vessels.
+//! For any values that a fit may try and a user may record, the output stays finite and the levels stay in their vessels.
 
 use crate::support;
 use crate::support::{Case, base, difference, effect, placements, random_sets, reference};
@@ -57,7 +57,7 @@ fn run(case: &Case, input: &[(Command, f64)], substeps: usize) -> Result<f64, Te
         }
         for (i, level) in simulator.levels().iter().enumerate().take(plant.vessels()) {
             prop_assert!(level.re.is_finite());
-            // A rim below the bottom holds nothing: the bottom comes first.
+            // A rim below the bottom has no effect: the bottom comes first.
             if plant.outlet() == Outlet::Torricelli {
                 prop_assert!(level.re >= 0.0, "level {}", level.re);
             }
@@ -144,7 +144,7 @@ fn an_empty_vessel_with_a_laminar_outflow_fills() {
     }
 }
 
-/// So many samples of a steady input.
+/// The given number of samples of a constant input.
 fn steady(n: usize, h: f64) -> Vec<(Command, f64)> {
     vec![(Command::held(4.9), h); n]
 }
@@ -161,7 +161,7 @@ fn a_level_a_little_above_a_hole_settles() {
                 vessel,
             });
             let mut case = base(plant).with_interior(&placed);
-            // Where the level settles with the hole out of reach; the hole is put below by so much, and lets it fall.
+            // The level at rest without the hole; the hole is then put below it by this distance, and the level falls.
             let height = case.theta.len() - 1;
             case.theta[height] = 100.0;
             let settled = *case.run(&steady(4000, case.h), 1).last().unwrap();
@@ -180,7 +180,7 @@ fn a_level_a_little_above_a_hole_settles() {
                     "{largest:8.1e} {error:8.1e} {slopes:8.1e} {above} {stretch} {}",
                     plant.id()
                 );
-                // The one sample that comes to stand above the hole may be far off: there the outflow has a corner.
+                // The one sample that ends near the hole may have a large error: the outflow has a corner there.
                 assert!(largest < 1e4, "a derivative of {largest}");
                 assert!(slopes < 1e-4, "settled derivatives differ by {slopes:e}");
                 assert!(error < 5e-3, "{error:e}");
@@ -189,7 +189,7 @@ fn a_level_a_little_above_a_hole_settles() {
     }
 }
 
-/// The same below a tank that leaks, where the hole is two thirds of the forgetting.
+/// The same for a leaking tank, where the hole causes two thirds of the decay.
 #[test]
 fn a_hole_below_a_leak_settles() {
     let placed = [("const_leak", 0), ("leak_at_height", 1)].map(|(id, vessel)| plants::Placed {
@@ -201,8 +201,7 @@ fn a_hole_below_a_leak_settles() {
     assert!(largest < 20.0, "a derivative of {largest}");
 }
 
-/// A tank that is pumped less than its pipe takes as soon as there is anything in it: it stands a hair above empty, where the outflow
-/// rises with a root.
+/// A tank with less inflow than its pipe can carry is nearly empty, and its outflow is a root of its level.
 #[test]
 fn a_joined_tank_that_a_pipe_keeps_all_but_empty_settles() {
     let placed = ["pipe_height", "const_leak"].map(|id| plants::Placed {
@@ -266,7 +265,7 @@ proptest! {
         // Sampling from one to three hundred times as coarse, at a steady input: what decays must not grow.
         let h = case.h * 10.0_f64.powf(stretch);
         let input = steady(300, h);
-        // What follows the clock is made for the record's duration, and goes on growing beyond.
+        // Functions of time are made for the record's duration, and grow further after it.
         let duration = &mut case.structure.scales.duration;
         *duration = duration.max(input.len() as f64 * h);
         let case = case.with_interior(&set);
@@ -294,8 +293,8 @@ fn a_tank_that_runs_dry_and_fills_again_agrees_with_its_equation() {
         assert!(one.iter().any(|&y| y < 1e-3), "it runs dry");
         let errors = [1, 4, 16].map(|n| difference(&case.run(&input, n), &reference));
         println!("{errors:?} {}", plant.id());
-        // As an empty tank fills the outflow rises with a root of time: the order falls to one and a half, of a small
-        // error, down to where the root gives way to a parabola.
+        // While an empty tank fills, the outflow is a root of time: the order falls to one and a half, of a small error, until the root is
+        // replaced by a parabola.
         assert!(
             errors[0] < 1e-3 && errors[1] < 0.2 * errors[0] && errors[2] < 0.2 * errors[1] + 1e-5,
             "{errors:?}"

@@ -186,7 +186,7 @@ fn a_straight_term_is_what_it_replaces() {
             &offset.run(&input, 4),
         );
         assert!(error < 1e-13, "{}: {error:e}", plant.id());
-        // A linear outlet's slope: what leaves beside it in proportion to the level.
+        // The slope of a linear outlet: a loss in proportion to the level.
         if plant.outlet() == Outlet::Torricelli {
             let slope = straight(Place::Vessel, Variable::Level, &[0.0, 100.0], &[0.0, -30.0]);
             let laminar = base.with(
@@ -196,7 +196,7 @@ fn a_straight_term_is_what_it_replaces() {
                 }],
                 |_, _, _| 0.3,
             );
-            // What leaves beside the outlet does not reach the next tank; of one tank there is none.
+            // A loss next to the outlet does not reach the next tank; a single tank has no next one.
             if plant.vessels() == 1 {
                 let error = difference(
                     &with(&base, &slope, &[1.0]).run(&input, 4),

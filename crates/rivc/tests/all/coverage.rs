@@ -190,8 +190,8 @@ fn closed_loop() {
     }
 }
 
-/// A long quiet record beside a short one with a hundred times the noise, and records of different steps, one of them coloured: each has a
-/// variance, and an autoregression, of its own.
+/// A long quiet record with a short one with a hundred times the noise, and records with different steps, one of them with coloured noise:
+/// each has a separate variance and autoregression.
 #[test]
 fn unequal_records() {
     let (a, b) = ([1.0, 10.0], [2.0]);

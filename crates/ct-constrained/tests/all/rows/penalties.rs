@@ -129,7 +129,7 @@ fn falls<const P: usize>(
 ) -> Result<(), TestCaseError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let theta: SVector<f64, P> = normals(&mut rng);
-    // no cap: it may forget less than eta says
+    // no cap, because a cap reduces the forgetting below eta
     let guards = Guards {
         trace_limit: f64::INFINITY,
         silent_below: 0.0,
@@ -205,7 +205,7 @@ proptest! {
     }
 }
 
-/// Why penalties have `Gamma = 0`: taken in as equality rows where violated, the Lyapunov function can grow.
+/// Reason for `Gamma = 0` of penalties: used as equality rows while violated, the Lyapunov function can grow.
 #[test]
 fn a_penalty_with_gamma_of_its_weight_would_let_it_grow() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);

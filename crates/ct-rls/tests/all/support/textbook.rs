@@ -3,7 +3,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-/// Which product makes the update of `P`.
+/// Product formula for the update of `P`.
 #[derive(Clone, Copy, Debug)]
 pub enum Form {
     /// `k g'`, `g = P phi`, needed for the gain anyway.

@@ -26,7 +26,7 @@ fn rows_behind_lost_ones_come_out_white_and_of_the_same_variance() {
                 whitener.push(&mut row);
                 whitened.push(row);
             }
-            // Each row is a sum of n independent unit values: their covariance has to be the identity.
+            // Each row is a sum of n independent unit values: their covariance must be the identity.
             for (i, a) in whitened.iter().enumerate() {
                 for (j, b) in whitened.iter().enumerate() {
                     let covariance: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
@@ -125,7 +125,7 @@ fn long_gaps_are_as_many_lost_rows() {
                         one_by_one.push_with_variance(&mut a),
                         at_once.push_with_variance(&mut b),
                     );
-                    // Of a signal that is far larger than its innovations some digits are lost either way.
+                    // For a signal far larger than its innovations, rounding loses some digits in both computations.
                     let close = if coefficients == slow { 1e-6 } else { 1e-8 };
                     assert_relative_eq!(of_a, of_b, max_relative = close);
                     for (a, b) in a.iter().zip(b) {
@@ -134,7 +134,7 @@ fn long_gaps_are_as_many_lost_rows() {
                 }
             }
         }
-        // Of the largest possible gap nothing is remembered.
+        // After the largest possible gap the memory is empty.
         let mut whitener = model.whitener(1);
         whitener.push(&mut [1.0]);
         whitener.skip_many(usize::MAX);

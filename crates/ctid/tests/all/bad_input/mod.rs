@@ -96,7 +96,7 @@ impl Rows {
         Self(bundled("tour.csv").lines().map(cells).collect())
     }
 
-    /// One cell replaced; column 0 is the time, 1 the input, 2 the output.
+    /// Replaces one cell; column 0 is the time, 1 the input, 2 the output.
     fn with(mut self, row: usize, column: usize, text: &str) -> Self {
         self.0[row - 1][column] = text.to_string();
         self

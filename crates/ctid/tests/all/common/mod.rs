@@ -1,4 +1,4 @@
-//! The program from outside: a folder to run it in, what it says there, and what it does to the files.
+//! The program as a process: a folder to run it in, its output, and its changes of files.
 
 #![allow(dead_code, clippy::unwrap_used, clippy::panic)]
 
@@ -15,7 +15,7 @@ use plants::{EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Ter
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Far longer than any run of these tests takes.
+/// Far longer than any run of these tests.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The bundled records and their model file.
@@ -32,7 +32,7 @@ pub struct Place {
     folder: TempDir,
 }
 
-/// How a run ended.
+/// End of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// Exit code; `None` where the program was killed.
@@ -188,7 +188,7 @@ pub fn outcome(mut command: Command) -> Outcome {
     }
 }
 
-/// A pipe that nobody empties would stop the program.
+/// A pipe that is not read would block the program.
 fn drain(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<Vec<u8>> {
     thread::spawn(move || {
         let mut bytes = Vec::new();
@@ -236,7 +236,7 @@ impl Random {
         (self.next() % n.max(1) as u64) as usize
     }
 
-    /// From 0 to 1.
+    /// Uniform from 0 to 1.
     pub fn uniform(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -258,9 +258,9 @@ pub struct Tanks {
     pub theta: Vec<f64>,
     /// Level of each vessel at the beginning \[cm\].
     pub levels: Vec<f64>,
-    /// What is built into them: effect, vessel, parameters; in chain order.
+    /// Hidden effects of the plant: effect, vessel, parameters; in the order of the chain.
     pub hidden: Vec<(&'static str, usize, Vec<f64>)>,
-    /// What is built into them that no effect describes.
+    /// Terms of the plant that no effect describes.
     pub terms: Vec<Term>,
     pub rows: usize,
     /// Standard deviation of the sensor's noise \[cm\].

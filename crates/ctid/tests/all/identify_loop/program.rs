@@ -73,7 +73,7 @@ fn the_program_writes_what_it_prints() {
         assert_eq!(has("condition"), method.ends_with("fcloe"));
         assert_eq!(has("trajectory"), method == "recursive-fcloe");
     }
-    // Without the model there is no controller: open loop.
+    // Without the model file there is no controller: open loop.
     let json: Value = place.result("identify loop.csv --method fcloe");
     assert_eq!(json["in_loop"]["r"], serde_json::json!([]));
 }
@@ -156,7 +156,7 @@ fn what_cannot_be_is_refused() {
     );
 }
 
-/// A plant that goes the other way than its controller expects: the signals grow, and no stable loop gives them.
+/// A plant with the opposite sign of the gain: the signals grow, and no stable loop produces them.
 #[test]
 fn a_loop_that_is_not_stable_is_refused() {
     let plant = PlantModel::first_order(-1.0, 110.0).unwrap();

@@ -1,4 +1,4 @@
-//! Rows that are not used, and what is said of them.
+//! Rows that are not used, and their messages.
 
 use super::{HEADER, MODEL, assert_says, fed, place, rows, text};
 
@@ -82,7 +82,7 @@ fn a_row_without_a_reading_is_said_and_its_command_used() {
     assert_says(&outcome, &format!("{lost} of them with something wrong"));
 }
 
-/// Each of the first digits of the state's numbers, changed to another: the file is JSON still, and its numbers are others.
+/// Each of the first digits of the state's numbers, changed to another: the file is valid JSON with other numbers.
 #[test]
 fn a_state_in_which_a_digit_has_changed_is_refused() {
     let place = place();

@@ -116,7 +116,7 @@ fn a_model_of_ones_own_is_watched_with_its_effects() {
     let estimates = events.iter().rfind(|e| e["event"] == "estimates").unwrap();
     let all = estimates["parameters"].as_array().unwrap();
     let tau = all.iter().find(|p| p["name"] == "lag_y_tau").unwrap();
-    // Its sensor does not lag.
+    // Its sensor has no lag.
     let value = tau["value"].as_f64().unwrap();
     assert!(value.abs() < 0.1 && tau["unit"] == "h", "{tau}");
 }
@@ -202,7 +202,7 @@ fn dates_are_read_and_said_for_a_model_of_ones_own() {
     assert!(last["since_date"].as_str().unwrap().starts_with("2026-02-"));
     assert!(!dated.err.contains("since t = "), "{}", dated.err);
 
-    // After a restart too; numbers in place of dates are refused.
+    // Also after a restart; numbers in place of dates are rejected.
     let first = fed(&place, "--state s.json", lines[..1800].concat());
     let rest = lines[0].clone() + &lines[1700..].concat();
     let second = fed(&place, "--state s.json", rest);

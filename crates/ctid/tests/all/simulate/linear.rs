@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::{BLOCK, FILE, TRUTH, place, record};
 use crate::common::Place;
 
-/// A block in a room that keeps its warmth.
+/// A block in a room with constant temperature.
 fn alone() -> Place {
     let place = place();
     let text = BLOCK.replace("  input Real Ta(unit=\"degC\") \"room\";\n", "");
@@ -51,7 +51,7 @@ fn a_linear_model_is_identified_beside_its_own_transfer_function() {
     // C/k and g/k of the text and of [known].
     assert!((number(&own["a"][1]) - 520.0).abs() < 1e-9, "{own}");
     assert!((number(&own["b"][0]) - 0.2).abs() < 1e-12, "{own}");
-    // What is identified is the plant.
+    // The identified model equals the plant.
     let found = |name: &str| {
         let all = json["parameters"].as_array().unwrap();
         number(&all.iter().find(|p| p["name"] == name).unwrap()["value"])

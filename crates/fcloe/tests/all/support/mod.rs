@@ -7,7 +7,7 @@ use ode_solvers::dop_shared::OutputType;
 use ode_solvers::dopri5::Dopri5;
 use ode_solvers::{DVector, System};
 
-/// A drive that jumps to several levels.
+/// An input with steps to several levels.
 pub fn drive(n: usize) -> Vec<f64> {
     (0..n)
         .map(|k| {

@@ -23,7 +23,7 @@ pub struct Rig {
     pub in_loop: bool,
     /// Raw levels instead of deviations, to be estimated.
     pub unknown_levels: bool,
-    /// Of white noise, or the correlation of neighbours.
+    /// Standard deviation of white noise, or the correlation of neighbours.
     pub rho: f64,
     /// 30 % of the readings are missing at random, and a block of 10 rows.
     pub missing: bool,
@@ -106,7 +106,7 @@ impl Rig {
         }
     }
 
-    /// Without a controller, and coloured noise.
+    /// Without a controller, and with coloured noise.
     pub fn open_loop() -> Self {
         Self {
             name: "n = 2, m = 1, open loop, coloured noise",
@@ -210,12 +210,12 @@ impl Rig {
     }
 }
 
-/// What the fits of many runs say of their intervals.
+/// Coverage of the intervals over many runs.
 #[derive(Debug)]
 pub struct Coverage {
     /// In how many runs the 95 % interval of each parameter contains the true value.
     pub hits: Vec<usize>,
-    /// The same of intervals for a white residual.
+    /// Coverage of intervals that assume a white residual.
     pub white: Vec<usize>,
     /// In how many runs the noise was placed where it is.
     pub placed: usize,

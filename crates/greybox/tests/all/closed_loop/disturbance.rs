@@ -43,7 +43,7 @@ fn the_disturbance_of_a_linear_loop_is_the_noise() {
     }
 }
 
-/// Where the controller's command is not all of it, the rest is simulated with the loop.
+/// If the command has a part in addition to the controller's, this part is simulated with the loop.
 #[test]
 fn what_is_added_to_the_command_is_simulated_with_the_loop() {
     let rig = Rig::linear_tank();
@@ -68,7 +68,7 @@ fn what_is_added_to_the_command_is_simulated_with_the_loop() {
     }
 }
 
-/// What one way of fitting says over many records: bias over spread, and how often its interval contains the true value.
+/// Results of one fitting method over many records: bias over spread, and coverage of its interval.
 fn over_records(rig: &Rig, rho: f64, simulate: bool, metric: bool) -> Vec<(f64, f64)> {
     const RECORDS: u64 = 200;
     let estimates: Vec<Vec<(f64, bool)>> = (0..RECORDS)

@@ -1,4 +1,4 @@
-//! How often the band of a prediction holds the output without noise.
+//! Coverage of the band of a prediction for the output without noise.
 
 use greybox::{
     FitOptions, FitUncertainty, InitialStates, Setup, coloured, fit, levels_from_readings,
@@ -86,7 +86,7 @@ fn share(
     let mean = on_others.simulate(&x).unwrap();
     let each = mean.iter().zip(&errors).zip(&clean);
     let q = known.quantile(LEVEL);
-    // Where a known state begins nothing is uncertain.
+    // With a known initial state the first value is exact.
     let from = usize::from(first_rows.is_none());
     each.map(|((m, e), c)| covered(&m[from..], &e[from..], &c[from..], q))
         .collect()

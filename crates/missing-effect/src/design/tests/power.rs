@@ -197,7 +197,7 @@ fn exact_twins_have_no_power() {
     assert!(most < 1e-2, "{most}");
     let said = found.sentences.join(" ");
     assert!(said.contains("No experiment within these limits"), "{said}");
-    // What a person can do instead.
+    // Possible actions at the plant.
     for alternative in &found.between {
         assert!(said.contains(&alternative.confirm), "{said}");
     }

@@ -94,7 +94,7 @@ fn noise_of_any_colour_fails_nowhere() {
     }
 }
 
-/// The same size of noise, but of another spectrum: only the bands show it.
+/// Noise of the same variance, but with another spectrum: only the frequency bands show it.
 #[test]
 fn a_band_that_the_noise_does_not_fill_fails() {
     let (time, model) = rig(1000);
@@ -114,7 +114,7 @@ fn a_band_that_the_noise_does_not_fill_fails() {
     let quick = located(&process, &[(&time, &model, &swing(3.0))]);
     let said = quick.sentences.join("; ");
     assert!(said.contains("most at periods of 2 to 4 s"), "{said}");
-    // Where the noise itself is large a oscillation of that size is nothing.
+    // Where the noise itself is large an oscillation of that size is nothing.
     assert_eq!(
         failing(&located(&process, &[(&time, &model, &swing(300.0))])),
         0

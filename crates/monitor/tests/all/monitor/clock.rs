@@ -83,7 +83,7 @@ fn another_sampling_interval_is_learned_anew() {
         ..Tank::default()
     }
     .run();
-    // From row 2000 on every third row only.
+    // From row 2000 on, every third row only.
     let kept: Vec<Row> = rows
         .iter()
         .enumerate()

@@ -31,7 +31,7 @@ fn the_command_of_a_row_counts_where_its_reading_is_lost() {
         assert_eq!(alarms(&steps), Vec::<&Alarm>::new());
         let lost = steps.iter().filter(|step| step.lost[0].is_some()).count();
         assert!(lost > 100, "{lost}");
-        // What was learned and what is said of the readings that are left is what it was with all of them.
+        // The learned model and the messages about the other readings are the same as with all readings.
         let whole = all(&mut new(model()), &rows);
         for (step, whole) in steps.iter().zip(&whole).skip(2000) {
             let (Some(said), Some(of_all)) = (step.innovations[0], whole.innovations[0]) else {

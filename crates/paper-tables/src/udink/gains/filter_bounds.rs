@@ -25,7 +25,7 @@ impl Limits {
     /// All.
     pub const ALL: [Self; 3] = [Self::None, Self::Wide, Self::Sure];
 
-    /// Its name in tables.
+    /// Name in tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -51,7 +51,7 @@ pub struct Checked {
     pub bounds: Limits,
     /// Whether `C^/A0 - gamma/(2 c)` is strictly positive real inside them for all plants within 10 % of the true one.
     pub hold: bool,
-    /// The same in a sentence, with the place where they fail.
+    /// The result in a sentence, with the frequency of failure.
     pub says: String,
 }
 

@@ -16,10 +16,10 @@ pub struct Case {
     pub structure: Structure,
     /// The plant's own parameters, then each effect's.
     pub theta: Vec<f64>,
-    /// Of each vessel, then what stood after each lag.
+    /// Level of each vessel, then the output of each lag.
     pub levels: Vec<f64>,
     pub at_rest: f64,
-    /// What the second input is while the first one is this.
+    /// Second input for a given first input.
     pub second: fn(Command) -> Command,
     /// Nominal sampling interval \[s\].
     pub h: f64,
@@ -55,7 +55,7 @@ pub fn base(plant: Plant) -> Case {
             3.0,
         ),
         Plant::FirstOrder => (vec![2.2, 80.0], vec![11.0], [None; 3], 11.0, 3.0),
-        // T3 is measured; the heads stay a few centimetres either way.
+        // T3 is measured; the heads are a few centimetres in either direction.
         Plant::ThreeTank => (
             vec![3.4, 3.1, 9.1, 8.7, 12.0],
             vec![15.0, 11.5, 8.2],
@@ -184,7 +184,7 @@ pub fn interior(case: &Case, placed: Placed, info: &ParameterInfo) -> f64 {
     }
 }
 
-/// The same value, or the one that switches the effect off: absent for what has one, else the first start.
+/// The absent value of the parameter, or its first start if it has none.
 pub fn absent(info: &ParameterInfo) -> f64 {
     if info.absent.is_nan() {
         info.starts[0]
@@ -194,7 +194,7 @@ pub fn absent(info: &ParameterInfo) -> f64 {
 }
 
 impl Case {
-    /// With effects, their parameters as `value` says.
+    /// The case with effects and their parameters from `value`.
     pub fn with(
         &self,
         effects: &[Placed],
@@ -271,7 +271,7 @@ impl Case {
     }
 }
 
-/// What a second pump is told while the first one is told this.
+/// Second pump's command for a given first command.
 pub fn mirrored(command: Command) -> Command {
     let mirror = |u: f64| 9.8 - u;
     Command {
@@ -302,7 +302,7 @@ pub fn simulate<T: Scalar>(
         .collect()
 }
 
-/// How a record is sampled and driven.
+/// Sampling and input of a record.
 #[derive(Debug, Clone, Copy)]
 pub struct Drive {
     pub ramped: bool,

@@ -11,7 +11,7 @@ use plants::Command;
 use self::equations::{Equations, PUMPS, SENSOR, SIDE};
 use super::Case;
 
-/// What a rate depends on beside the state: the time, whether each valve has made its step, whether each vessel spills.
+/// Discrete state of the rates: the time, whether each valve has stepped, whether each vessel overflows.
 #[derive(Clone, Copy)]
 struct Instant {
     t: f64,
@@ -22,7 +22,7 @@ struct Instant {
 /// The commands as functions of time, delayed and shaped, with their corners.
 struct Signal<'a> {
     equations: &'a Equations,
-    /// Of each pump: beginning, length and command of each interval.
+    /// For each pump: start, length and command of each interval.
     pieces: [Vec<(f64, f64, Command)>; 2],
 }
 
@@ -78,7 +78,7 @@ impl Signal<'_> {
 struct Stretch<'a, 'b> {
     signal: &'a Signal<'b>,
     piece: [Option<usize>; 2],
-    /// Each valve has made its step.
+    /// Whether each valve has stepped.
     late: [bool; 3],
 }
 

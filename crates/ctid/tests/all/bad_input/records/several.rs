@@ -50,7 +50,7 @@ fn an_output_without_any_sample() {
     }
 }
 
-/// Whatever the column is: the reading, the command or the time.
+/// For each column: the reading, the command or the time.
 #[test]
 fn a_record_of_missing_samples_alone() {
     for (column, header) in ["t [s]", "u [V]", "y [cm]"].iter().enumerate() {

@@ -11,7 +11,7 @@ pub(super) struct Pump {
     gain: f64,
     /// Change and time constant.
     warm_up: (f64, f64),
-    /// Width, jump and where in its band it begins.
+    /// Width, slip, and initial state of the stiction band.
     sticks: (f64, f64, f64),
     pub(super) delay: f64,
     pub(super) threshold: f64,
@@ -240,7 +240,7 @@ impl Equations {
         self.pumps[pump].gain * (1.0 + change * done(t) / done(self.duration))
     }
 
-    /// Where what a pump moves stands before the record begins.
+    /// Initial state of a pump's actuator.
     pub(super) fn rests(&self, pump: usize) -> f64 {
         let Pump {
             at_rest, sticks, ..

@@ -1,4 +1,4 @@
-//! Models of their user's own without inputs: a pendulum that oscillations freely, a ball that falls. Records have time and outputs alone.
+//! Models of their user's own without inputs: a pendulum that oscillates freely, a ball that falls. Records have time and outputs alone.
 
 use std::fmt::Write;
 use std::io::Write as _;

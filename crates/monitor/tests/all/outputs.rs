@@ -178,7 +178,7 @@ fn an_offset_of_one_sensor_is_named_with_its_sensor() {
     }
 }
 
-/// What no effect has: the reading of the upper level oscillates.
+/// An error that no effect has: the reading of the upper level oscillates.
 #[test]
 fn an_unexplained_alarm_says_at_which_output_it_shows_most() {
     let tanks = Tanks {

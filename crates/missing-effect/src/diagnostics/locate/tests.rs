@@ -6,7 +6,7 @@ use ct_signals::noise;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Time and a level that oscillations.
+/// Time and an oscillating level.
 fn rig(n: u32) -> (Vec<f64>, Vec<f64>) {
     let time: Vec<f64> = (0..n).map(f64::from).collect();
     let model = time.iter().map(|t| 10.0 + 5.0 * (t / 40.0).sin()).collect();

@@ -160,7 +160,7 @@ pub enum Error {
         /// Whether these are all.
         all: bool,
     },
-    /// Gaps in y that the filters of a regression do not forget.
+    /// Gaps in y that are too long for the filters of a regression.
     #[error(
         "{record}: {:.0} % of the readings of y are missing, and only {left} of the {rows} rows are far enough behind long gaps for filters on y; output error needs no such filters",
         100.0 * missing

@@ -121,7 +121,7 @@ pub(crate) fn learn(
     let (low, high) = record.input_range();
     if stands_still(low, high) {
         return Err(format!(
-            "the command has stood still at {low}, which does not excite the plant: move it"
+            "the command has been constant at {low}, which does not excite the plant: move it"
         ));
     }
     let mut starts = random_starts(&setup, options.starts, options.seed);

@@ -315,7 +315,7 @@ impl ContinuousRls {
         self.outcome.used()
     }
 
-    /// Smallest eigenvalue of the information matrix: how well the combination of parameters is known that is known worst.
+    /// Smallest eigenvalue of the information matrix: the information on the least well determined combination of parameters.
     #[getter]
     fn excitation(&self) -> PyResult<f64> {
         let health = self.rls.health().map_err(error::of_model)?;

@@ -106,9 +106,8 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
     /// An estimator with the start values of its gain, a model at rest, and no bounds on `c^`.
     ///
     /// `theta^` is kept where `A^` is Hurwitz, with `a_i` above a thousandth of `dt^i` and `a_n` above `dt^n` or `0.05 dt a_{n-1}(0)`,
-    /// whichever is less, for the shortest step so far. A lag below that cannot be seen; but the model's highest derivative is divided
-    /// by `a_n`, and where that comes near 0 a few samples make `P` so small that `theta^` stays where it is. Euler's rule loses a model
-    /// that is faster than a step: there `a_n >= dt^n`, with the step at hand.
+    /// whichever is less, for the shortest step so far. A shorter lag cannot be identified; but the model's highest derivative is divided by `a_n`. If `a_n` comes near 0, a few samples make `P` so small that
+    /// `theta^` does not change any more. With Euler's rule a model that is faster than a step is unstable: there `a_n >= dt^n`, with the present step.
     ///
     /// # Errors
     /// [`Error::StartNotHurwitz`].

@@ -83,10 +83,10 @@ fn definitions() {
     refuses(
         "  Real a = b; Real b = c; Real c = a;",
         8,
-        "a -> b -> c -> a depend on each other",
+        "a -> b -> c -> a form an algebraic loop",
         "make one of them a state",
     );
-    refuses("  Real a = a;", 8, "a -> a depend on each other", "");
+    refuses("  Real a = a;", 8, "a -> a form an algebraic loop", "");
     refuses(
         "  parameter Real p = 1;",
         18,

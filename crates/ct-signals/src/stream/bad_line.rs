@@ -20,7 +20,7 @@ pub enum BadLine {
         delimiter: &'static str,
     },
     /// An empty cell.
-    #[error("column \"{column}\": the cell is empty; check what writes the rows")]
+    #[error("column \"{column}\": the cell is empty; check the program that writes the rows")]
     Empty {
         /// The column's header.
         column: String,
@@ -34,7 +34,9 @@ pub enum BadLine {
         text: String,
     },
     /// A number too large to be one.
-    #[error("column \"{column}\": \"{text}\" is not a finite number; check what writes the rows")]
+    #[error(
+        "column \"{column}\": \"{text}\" is not a finite number; check the program that writes the rows"
+    )]
     NotFinite {
         /// The column's header.
         column: String,
@@ -78,6 +80,8 @@ pub enum BadLine {
         text: String,
     },
     /// Bytes that are no text.
-    #[error("the line is not UTF-8 text; check the speed of the line and what writes the rows")]
+    #[error(
+        "the line is not UTF-8 text; check the speed of the line and the program that writes the rows"
+    )]
     NotText,
 }

@@ -111,7 +111,7 @@ impl Rows {
                 });
             }
             Err(CellFault::Word | CellFault::Strict) => {
-                "check what writes the rows, or list the word under [columns] where it says that the sample is missing"
+                "check the program that writes the rows, or list the word under [columns] where it says that the sample is missing"
             }
         };
         Err(BadLine::Text {

@@ -56,12 +56,12 @@ fn without_a_header_three_or_four_numbers_have_an_order() {
     let bad = three.outputs()[0].clone().unwrap_err();
     assert_eq!(
         bad.to_string(),
-        "column \"output\": the cell is empty; check what writes the rows"
+        "column \"output\": the cell is empty; check the program that writes the rows"
     );
     let message = read(&mut three, "1\t\t5").unwrap_err();
     assert_eq!(
         message,
-        "column \"input\": the cell is empty; check what writes the rows"
+        "column \"input\": the cell is empty; check the program that writes the rows"
     );
     let message = read(&mut three, "12:30\t5\t1").unwrap_err();
     assert!(message.contains("write it so throughout"), "{message}");
@@ -92,7 +92,7 @@ fn several_outputs_are_read_in_the_order_in_which_they_are_named() {
     let bad = rows.outputs()[1].clone().unwrap_err();
     assert_eq!(
         bad.to_string(),
-        "column \"lower [mm]\": the cell is empty; check what writes the rows"
+        "column \"lower [mm]\": the cell is empty; check the program that writes the rows"
     );
 
     let (mut rows, _) = begin("0,15,4.5,14.8,9.1").unwrap();
@@ -284,7 +284,7 @@ fn several_inputs_are_read_and_each_is_needed() {
     let bad = read(&mut rows, "2,,50,40").unwrap_err();
     assert_eq!(
         bad,
-        "column \"room [degC]\": the cell is empty; check what writes the rows"
+        "column \"room [degC]\": the cell is empty; check the program that writes the rows"
     );
 }
 

@@ -199,7 +199,7 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
     for name in &raw.effects {
         if let Some((term, fixed)) = terms.get(name.as_ref().as_str()) {
             if model.terms.iter().any(|on| on.term.name == term.term.name) {
-                let what = format!("{} stands here twice; keep it once", name.as_ref());
+                let what = format!("{} is given twice; keep one of the two", name.as_ref());
                 return Err(source.at(name.span().start, what));
             }
             if *fixed {

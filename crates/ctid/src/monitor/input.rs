@@ -257,7 +257,7 @@ impl<'a> Session<'a> {
         let mend = match refused {
             Refused::NotFinite { .. } => "check what writes it",
             Refused::BeyondRange { .. } => {
-                "check what writes it, or correct the range in the model file"
+                "check the program that writes it, or correct the range in the model file"
             }
             Refused::AboveTank { .. } => {
                 "check the sensor, or give the height in the reading's unit in the model file"

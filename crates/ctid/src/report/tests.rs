@@ -104,7 +104,7 @@ fn the_headline_counts_and_says_what_remains() {
     );
     assert!(
         html(&diagnosis).contains(
-            "from <code>pump_<wbr>nonlinearity</code>; in doubt: its size ends at the edge"
+            "from <code>pump_<wbr>nonlinearity</code>; uncertain: its size is at a bound"
         )
     );
     diagnosis.effects.truncate(1);

@@ -118,7 +118,7 @@ fn so_far(design: &Design) -> Vec<String> {
         )
     } else if design.bic_ahead.abs() < TWIN {
         format!(
-            "The existing records leave it open: {} and {} fit alike.",
+            "The existing records leave it open: {} and {} fit equally well.",
             sized(first, domain),
             sized(second, domain)
         )

@@ -57,7 +57,7 @@ pub(super) fn learn(
         && !still.is_empty()
     {
         return Err(format!(
-            "every input has stood still ({}), which does not excite the plant: move one",
+            "every input has been constant ({}), which does not excite the plant: move one",
             still.join(", ")
         ));
     }

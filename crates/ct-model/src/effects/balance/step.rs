@@ -25,6 +25,6 @@ end step;
     ],
     physics: "From some time on an additional constant flow enters or leaves: a door, a valve or a consumer was opened and stays open.",
     confused_with: &["step(p)", "drift(p)", "drift(y)"],
-    confirm: "Look into the log of that time: what was switched, opened or replaced?",
+    confirm: "Look into the log for that time: what was switched, opened or replaced?",
     symptoms: &["different since", "jumped", "something was opened"],
 };

@@ -24,6 +24,6 @@ end overflow;
     )],
     physics: "The tank is full: further inflow spills over the rim, into the tank below.",
     confused_with: &["limit(h)", "saturation(y)", "leak_at_height(h)"],
-    confirm: "Fill the upper tank and look.",
+    confirm: "Fill the upper tank and watch whether it overflows.",
     symptoms: &["overflows", "spills into the tank below"],
 };

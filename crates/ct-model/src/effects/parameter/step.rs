@@ -25,6 +25,6 @@ end step;
     ],
     physics: "From some time on the parameter has another value: a part was replaced, blocked, opened or has broken.",
     confused_with: &["drift(p)", "step(x)"],
-    confirm: "Look into the log of that time: what was changed?",
+    confirm: "Look into the log for that time: what was changed?",
     symptoms: &["different since", "sudden change", "blocked", "broken"],
 };

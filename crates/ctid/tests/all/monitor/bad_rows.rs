@@ -69,7 +69,7 @@ fn a_row_without_a_reading_is_said_and_its_command_used() {
     assert_eq!((outcome.code, outcome.out.as_str()), (Some(0), ""));
     assert_says(
         &outcome,
-        "column \"y [cm]\": the cell is empty; check what writes the rows; the reading is lost, the command of the row is used",
+        "column \"y [cm]\": the cell is empty; check the program that writes the rows; the reading is lost, the command of the row is used",
     );
     assert_says(
         &outcome,

@@ -83,7 +83,7 @@ impl<const P: usize> Bounds<P> {
         self.keep
     }
 
-    /// Whether `theta` lies in the box.
+    /// Whether `theta` is inside the box.
     pub fn contains(&self, theta: &SVector<f64, P>) -> bool {
         let mut bounds = self.lower.iter().zip(&self.upper);
         theta

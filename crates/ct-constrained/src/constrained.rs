@@ -181,7 +181,7 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
         let innovation = self.rls.update_with(sample, dt, weights);
         let length = match innovation.outcome {
             Outcome::Updated | Outcome::Capped => self.window.length(weights.eta(), dt),
-            // nothing was forgotten; the rows hold all the same
+            // without forgetting; the rows are enforced nevertheless
             Outcome::Silent => dt,
             _ => return innovation,
         };

@@ -22,7 +22,7 @@ use crate::{Error, Row};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Filter {
-    /// `1/(1 + T s)`: what is slower than `T` counts.
+    /// Low-pass filter `1/(1 + T s)`: signals slower than `T` pass.
     LowPass {
         /// `T`, s; above 0.
         time: f64,

@@ -48,7 +48,7 @@ const WAY: f64 = 16.0 * f64::EPSILON;
 /// Steps for each row and parameter before the search is stopped; a few in all are usual.
 const STEPS: usize = 20;
 
-/// Moves the estimates to the nearest point that obeys all `rows`; weights play no part. Returns whether anything moved.
+/// Moves the estimates to the nearest point that satisfies all `rows`; weights have no influence. Returns whether the estimates changed.
 ///
 /// # Errors
 /// [`Error::NoCommonPoint`] where the rows contradict each other, [`Error::NotFinite`] where `f' theta` leaves the floating-point range, and
@@ -167,7 +167,7 @@ impl<const P: usize> Interval<P> {
 struct Active {
     row: usize,
     sign: f64,
-    /// 1 over `sum |f_i| sqrt(P_ii)`: with it no direction is longer than 1, whatever the units.
+    /// 1 over `sum |f_i| sqrt(P_ii)`: with this scaling no direction is longer than 1 in any units.
     unit: f64,
     lambda: f64,
 }

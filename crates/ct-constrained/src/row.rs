@@ -5,7 +5,7 @@ use nalgebra::SVector;
 
 use crate::Error;
 
-/// A tenth of what the estimator takes for an output error.
+/// A tenth of the largest output error that the estimator accepts.
 const MAX_CHI: f64 = 1e99;
 
 /// Equality or inequality.
@@ -85,9 +85,9 @@ impl<const P: usize> Row<P> {
     /// The same equality with another entry `gamma` of `Gamma` (3.9b of the paper), how fast the row makes `Q` shrink; a new row has
     /// `gamma = w`. Unit of the weight; at least 0, below `2 w`, and 0 where `w` is: then `V` falls, (3.8).
     ///
-    /// With a `gamma` other than `w` nothing is minimised, least of all (3.5), and the row needs
-    /// [`ConstrainedRls::with_free_gamma`](crate::ConstrainedRls::with_free_gamma). Below `w` it goes on to pull where `Q` would have
-    /// shrunk already, as a row whose `chi` varies may want; above `w` it counts for more than it pulls.
+    /// With a `gamma` other than `w` no criterion is minimised, not even (3.5), and the row needs
+    /// [`ConstrainedRls::with_free_gamma`](crate::ConstrainedRls::with_free_gamma). Below `w` the row keeps its influence for longer than its information, which is useful
+    /// for a varying `chi`; above `w` its information exceeds its influence.
     ///
     /// # Errors
     /// [`Error::Gamma`] out of this range; [`Error::PenaltyGamma`] for an inequality and a `gamma` other than 0.
@@ -102,7 +102,7 @@ impl<const P: usize> Row<P> {
         Ok(Self { gamma, ..self })
     }
 
-    /// `f' theta = chi` with a weight: see [`Row::new`].
+    /// Equality `f' theta = chi` with a weight: see [`Row::new`].
     ///
     /// # Errors
     /// As of [`Row::new`].
@@ -110,7 +110,7 @@ impl<const P: usize> Row<P> {
         Self::new(Relation::Equal, f, chi, weight)
     }
 
-    /// `f' theta <= chi`, a penalty with a weight where it is violated: see [`Row::new`].
+    /// Inequality `f' theta <= chi`, a penalty with a weight: see [`Row::new`].
     ///
     /// # Errors
     /// As of [`Row::new`].
@@ -118,7 +118,7 @@ impl<const P: usize> Row<P> {
         Self::new(Relation::AtMost, f, chi, weight)
     }
 
-    /// `f' theta >= chi`, a penalty with a weight where it is violated: see [`Row::new`].
+    /// Inequality `f' theta >= chi`, a penalty with a weight: see [`Row::new`].
     ///
     /// # Errors
     /// As of [`Row::new`].
@@ -141,7 +141,7 @@ impl<const P: usize> Row<P> {
         self.weight
     }
 
-    /// Its entry of `Gamma`: the weight of an equality, unless [`with_gamma`](Self::with_gamma) says otherwise; 0 of a penalty.
+    /// Entry of the row in `Gamma`: the weight for an equality, unless [`with_gamma`](Self::with_gamma) was used; 0 for a penalty.
     pub fn gamma(&self) -> f64 {
         self.gamma
     }

@@ -45,7 +45,7 @@ pub enum Error {
     /// A length that does not fit the rest.
     #[error("{what} has {found} entries, but {expected} are needed")]
     Length {
-        /// What was given.
+        /// The quantity in question.
         what: &'static str,
         /// Entries that are needed.
         expected: usize,
@@ -63,7 +63,7 @@ pub enum Error {
     NotPositive {
         /// The setting.
         what: &'static str,
-        /// Its value.
+        /// Value of the entry.
         value: f64,
     },
     /// A filter that does not forget.

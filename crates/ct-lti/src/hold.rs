@@ -3,7 +3,7 @@
 /// Hold: the course of a signal between two samples. Sampling is exact for a signal with this course.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Hold {
-    /// `u[k]` stands from `t[k]` to `t[k+1]`: what a D/A converter puts out.
+    /// `u[k]` is held from `t[k]` to `t[k+1]`: the output of a D/A converter.
     #[default]
     Zero,
     /// A straight line from `u[k]` to `u[k+1]`: the better guess for a signal that was measured.

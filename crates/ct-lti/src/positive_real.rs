@@ -40,7 +40,7 @@ pub enum Positivity {
         /// A frequency where it fails, in most cases the worst one by the relative size of N \[rad/time\]. Where
         /// `Re G` touches d from above, the frequency of touching, rounded. Infinite where it fails nowhere else.
         frequency: f64,
-        /// `Re G(jw) - d` there, at most 0 \[unit of G\].
+        /// `Re G(jw) - d` at that frequency, at most 0 \[unit of G\].
         excess: f64,
     },
     /// The denominator has a root on the imaginary axis or to its right.
@@ -48,8 +48,7 @@ pub enum Positivity {
 }
 
 impl Positivity {
-    /// Whether the condition holds at every finite frequency: [`Positivity::Strict`] or
-    /// [`Positivity::StrictBelowInfinity`].
+    /// Whether the condition is satisfied at every finite frequency: [`Positivity::Strict`] or [`Positivity::StrictBelowInfinity`].
     pub fn holds(self) -> bool {
         matches!(self, Self::Strict | Self::StrictBelowInfinity)
     }

@@ -120,7 +120,7 @@ fn fma_difference(a: f64, b: f64, c: f64, d: f64) -> f64 {
     libm::fma(a, b, -cd) + error
 }
 
-/// `a/b`, also where the square of b leaves the range of `f64`.
+/// `a/b`, also if the square of b overflows.
 fn ratio(a: Complex64, b: Complex64) -> Complex64 {
     let size = b.re.abs().max(b.im.abs());
     (a / size) / (b / size)

@@ -26,7 +26,7 @@ pub struct Sampled {
     pub phi: Vec<f64>,
     /// Effect of the input at the start of the step, n entries.
     pub g0: Vec<f64>,
-    /// Effect of the input at its end, n entries; all 0 under [`Hold::Zero`].
+    /// Effect of the input at the end of the step, n entries; all 0 for [`Hold::Zero`].
     pub g1: Vec<f64>,
     /// Length of the step \[time\].
     pub step: f64,
@@ -145,7 +145,7 @@ impl Sampler {
         Ok(())
     }
 
-    /// Takes the last step back, once.
+    /// Undoes the last step, once.
     pub(crate) fn undo(&mut self, x: &mut [f64]) {
         x.swap_with_slice(&mut self.next_state);
     }

@@ -18,7 +18,7 @@ pub struct StateSpace {
 }
 
 impl StateSpace {
-    /// From A, row by row, b, c and d. b says how many states there are.
+    /// From A, row by row, b, c and d. The length of b is the number of states.
     ///
     /// # Errors
     /// [`Error::Length`], [`Error::NotFinite`].

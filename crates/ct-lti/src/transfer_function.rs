@@ -1,6 +1,6 @@
 //! Transfer functions `G = B/A` of one input and one output, proper.
 //!
-//! Nothing is cancelled: a series connection keeps a pole and a zero in the same place, as the two parts do.
+//! Common poles and zeros are not cancelled in a series connection.
 
 use alloc::vec::Vec;
 

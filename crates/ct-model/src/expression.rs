@@ -52,7 +52,7 @@ pub enum Function {
 }
 
 impl Function {
-    /// All functions.
+    /// List of all functions.
     pub const ALL: [Self; 15] = [
         Self::Abs,
         Self::Sign,

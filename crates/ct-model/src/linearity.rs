@@ -106,7 +106,7 @@ enum Part {
     Parameters,
     /// Inputs and parameters.
     Inputs,
-    /// Linear in states, with parameters as coefficients, and any function of inputs beside.
+    /// Linear in states, with parameters as coefficients, plus any function of inputs.
     States,
     Other,
 }

@@ -82,12 +82,12 @@ pub struct Output {
     pub variable: Variable,
 }
 
-/// A model.
+/// A model. Expressions refer to variables by their position here.
 ///
 /// Every expression holds variables by their position here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
-    /// Its name.
+    /// Name of the model.
     pub name: String,
     /// Description of the model in a few words.
     pub description: String,

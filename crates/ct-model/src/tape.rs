@@ -70,7 +70,7 @@ pub(crate) struct Play {
 #[derive(Debug, Clone)]
 pub(crate) struct Registers<T> {
     pub values: Vec<T>,
-    /// The answers of the guards.
+    /// Answers of the guards.
     pub answers: Vec<bool>,
     taken: Vec<bool>,
     /// The operations on the selected branches, with the registers of their results: those that slopes need, ...
@@ -306,7 +306,7 @@ impl Tape {
         }
     }
 
-    /// Has the branches follow the answers.
+    /// Updates the branches after a change of answers.
     pub fn answers_changed<T: Scalar>(&self, registers: &mut Registers<T>) {
         let mut changed = false;
         for (branch, taken) in self.branches.iter().zip(&mut registers.taken) {

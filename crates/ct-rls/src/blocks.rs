@@ -1,4 +1,4 @@
-//! Two blocks of parameters that share one output and know nothing of each other's uncertainty.
+//! Two blocks of parameters that share one output and have no covariance between them.
 //!
 //! Model: `y = theta1'phi1 + theta2'phi2`, with a `P` that has no entries between the blocks; [U] 4.11, 4.18:
 //! ```text
@@ -14,8 +14,8 @@
 //! P_i+     as of one block
 //! ```
 //! The integrals have no closed form that keeps its digits; with `c = gamma` Gauss and Legendre's rule of 8 points in
-//! `ln(1 + (s_1 + s_2) b)` gives them to 7e-7 for `b s` up to 100, to 1e-12 below 0.1. To take one block after the other instead errs
-//! by a third where the step is stiff. For `gamma < c` the range is cut into pieces; for `gamma = 0` in both there is a closed form.
+//! `ln(1 + (s_1 + s_2) b)` gives them to 7e-7 for `b s` up to 100, to 1e-12 below 0.1. Updating one block after the other instead has an error
+//! of a third if the step is stiff. For `gamma < c` the range is cut into pieces; for `gamma = 0` in both there is a closed form.
 //!
 //! Convergence: **not** that of one block. `V = sum delta_i'P_i^-1 delta_i` may grow for every `gamma > 0`; with `gamma = 0` and
 //! `eta = 0` in both it falls, `dV/dt = -2 c eps^2` for `c_1 = c_2`.

@@ -71,7 +71,7 @@ pub enum Error {
     /// An entry of `theta(0)` is not finite.
     #[error("theta(0)[{index}] is {value}; take 0 where nothing is known")]
     Theta {
-        /// Which parameter, from 0.
+        /// Index of the parameter, from 0.
         index: usize,
         /// The value that was given.
         value: f64,
@@ -113,7 +113,7 @@ pub enum Error {
     Size {
         /// The quantity with the wrong size.
         what: &'static str,
-        /// Its size.
+        /// Actual size.
         found: usize,
         /// The number of parameters.
         expected: usize,
@@ -143,7 +143,7 @@ pub enum Error {
     LostDefiniteness {
         /// Name of the integrator.
         integrator: &'static str,
-        /// Which pivot of `P = U D U'`, from 0.
+        /// Index of the pivot of `P = U D U'`, from 0.
         index: usize,
         /// Its value.
         pivot: f64,

@@ -87,7 +87,7 @@ pub enum Outcome {
     BadStep,
     /// The regressor has a wrong length (run-time sizes only): nothing was done.
     BadSize,
-    /// The run has stopped; the health says why. Nothing was done.
+    /// The run has stopped; the health gives the reason. The sample was not used.
     Stopped,
 }
 

@@ -116,7 +116,7 @@ impl Guard {
         outcome
     }
 
-    /// The step to make, or why there is none.
+    /// The step to make, or the reason why there is none.
     #[inline(always)]
     pub fn begin<M: Memory>(
         &mut self,

@@ -13,7 +13,7 @@ impl Integrator for RandomWalk {}
 impl Integrator for Euler {}
 impl Integrator for Rk4 {}
 
-/// An integrator on the factors of `P`, which stay positive definite: [`ExactHold`], [`Directional`] or [`RandomWalk`].
+/// An integrator for the factors of `P`, which keep `P` positive definite: [`ExactHold`], [`Directional`] or [`RandomWalk`].
 pub trait FactoredIntegrator: Integrator + sealed::FactorRule {}
 
 impl FactoredIntegrator for ExactHold {}

@@ -194,7 +194,7 @@ fn raise(u: &mut [f64], d: &mut [f64], j: usize, more: f64, left: &mut [f64]) {
     }
     for m in (0..j).rev() {
         let own = left[m];
-        // in this order no product leaves the floating-point range
+        // in this order no product overflows
         let gain = weight * own;
         let raised = d[m] + gain * own;
         let inverse = 1.0 / raised;

@@ -169,7 +169,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
         self.weights = weights;
     }
 
-    /// Starts `P` again and keeps the estimates: after a jump of the parameters, or after a run has stopped.
+    /// Starts `P` again and keeps the estimates: after a step change of the parameters, or after a run has stopped.
     ///
     /// # Errors
     /// [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`], [`Error::TraceAboveLimit`]; nothing is changed then.
@@ -250,7 +250,7 @@ impl<const P: usize, I: Integrator> RecursiveEstimator for ContinuousRls<P, I> {
     }
 }
 
-/// With a smaller `f'P f` a step along `P f` may leave the floating-point range.
+/// With a smaller `f'P f` a step along `P f` may overflow.
 const MIN_RELAXED: f64 = 1e-200;
 
 pub(crate) fn check_theta(theta: &[f64]) -> Result<(), Error> {

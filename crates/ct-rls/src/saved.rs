@@ -98,7 +98,7 @@ impl<const N: usize> Serialize for Above<N> {
     }
 }
 
-/// Reads as many numbers as there are places, no more and no fewer.
+/// Reads exactly as many numbers as the array has entries.
 fn fill<'de, A: SeqAccess<'de>>(
     mut from: A,
     places: &mut dyn Iterator<Item = &mut f64>,

@@ -24,7 +24,7 @@ pub enum ColumnFault {
         /// The columns that fit, quoted.
         candidates: String,
     },
-    /// One column was named for two roles.
+    /// One column has two roles.
     Shared {
         /// The column's header.
         column: String,

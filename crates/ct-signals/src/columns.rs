@@ -144,7 +144,7 @@ pub struct Heading {
     pub header: String,
     /// The header without the unit.
     pub name: String,
-    /// The unit; empty where the header does not say.
+    /// The unit; empty if the header has none.
     pub unit: String,
 }
 
@@ -221,8 +221,8 @@ impl Columns {
             .map_or("", |output| unit::split(output).1)
     }
 
-    /// The header of the time as a file that goes with these columns has it, with its unit, and the seconds in that; `t [s]`
-    /// where none is named, or its unit is none of the time.
+    /// Header of the time column for a new file with these columns, with its unit, and the unit in seconds; `t [s]` if no column is named,
+    /// or if its unit is no unit of time.
     #[must_use]
     pub fn time_header(&self) -> (String, f64) {
         let named = self.time.as_deref().map(unit::split);

@@ -28,7 +28,7 @@ const SAME_RATE: f64 = 0.2;
 const STAYS: usize = 3;
 /// A logger has several rates if this share of the long steps occurs in such a sequence.
 const OF_A_RATE: f64 = 0.5;
-/// More rows are never put in.
+/// Largest number of inserted rows.
 const MOST_PUT_IN: usize = 100_000;
 /// A part with fewer samples of an output contains less information than its initial states need.
 const SHORTEST: usize = 8;

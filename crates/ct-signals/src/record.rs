@@ -28,7 +28,7 @@ pub enum Hold {
 pub struct Channel {
     /// The header's name without its unit, for example `y`.
     pub name: String,
-    /// The unit, for example `cm`; empty where the file does not say.
+    /// The unit, for example `cm`; empty if not known.
     pub unit: String,
     /// Hold between two samples; it has no meaning for an output.
     #[serde(default)]
@@ -91,7 +91,7 @@ impl Channel {
         interpolated(&self.values)
     }
 
-    /// The name with the unit in brackets, as a header has it; the name alone where there is no unit.
+    /// The name with the unit in brackets, as in a header; the name alone without a unit.
     #[must_use]
     pub fn header(&self) -> String {
         match self.unit.as_str() {
@@ -139,7 +139,7 @@ pub struct Record {
     pub inputs: Vec<Channel>,
     /// The sensors' readings; samples may be missing.
     pub outputs: Vec<Channel>,
-    /// The set points, where there is a loop.
+    /// The set points, if there is a loop.
     pub references: Vec<Channel>,
     /// Date and time at zero of the record's clock, if known.
     #[serde(skip)]
@@ -219,7 +219,7 @@ impl Record {
             .map_or((f64::NAN, f64::NAN), Channel::range)
     }
 
-    /// Checks that an input moves.
+    /// Checks that an input changes.
     ///
     /// # Errors
     /// [`Error::ConstantInput`], which names the record and the first input's column.

@@ -1,7 +1,7 @@
-//! Is anything left in a residual? Whiteness, and correlation with the input.
+//! Tests of a residual: whiteness, and correlation with the input.
 //!
 //! Both tests give a probability `p`: how often a residual that is pure noise would look at least
-//! this far from it. Below 0.01, say, something remains.
+//! this far from it. Below 0.01, say, the residual is not noise.
 //!
 //! **Missing samples**: NaN. Means, sums and counts are then over the samples and the pairs of samples that are there. In a
 //! white Gaussian series of `n` samples with `n_k` pairs at lag k,
@@ -161,8 +161,8 @@ pub fn prewhitened_input_test(u: &[f64], e: &[f64], lags: usize) -> Result<(Vec<
     Ok((correlation, regression_on_lags(TASK, &u, &e, lags)?))
 }
 
-/// The probability that white `e` is explained that well by `u` at lags `1..=lags`. What is missing of `u` is its mean, rows that `e` lacks
-/// do not count.
+/// p-value of the regression of a white `e` on `u` at lags `1..=lags`. Missing samples of `u` are replaced by its mean; rows without `e`
+/// are not used.
 fn regression_on_lags(task: &'static str, u: &[f64], e: &[f64], lags: usize) -> Result<f64, Error> {
     let (u, e) = (centred(u), centred(e));
     let counted: Vec<usize> = (1..=lags)
@@ -304,7 +304,7 @@ fn has_missing(x: &[f64]) -> bool {
     x.iter().any(|x| x.is_nan())
 }
 
-/// Samples that are there.
+/// Number of present samples.
 fn present(x: &[f64]) -> usize {
     x.iter().filter(|x| !x.is_nan()).count()
 }

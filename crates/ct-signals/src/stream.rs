@@ -201,7 +201,7 @@ impl Rows {
         self.names.get(before + at).map_or("", String::as_str)
     }
 
-    /// Units of inputs and outputs, in order and in printable text; empty where nothing says.
+    /// Units of inputs and outputs, in order and in printable text; empty if unknown.
     pub fn units(&self) -> impl Iterator<Item = &str> {
         self.units.iter().map(String::as_str)
     }

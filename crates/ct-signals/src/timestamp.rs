@@ -80,7 +80,7 @@ impl Timestamp {
             .and_then(|total| total.checked_add(nanoseconds));
         match total {
             Some(total) => total as f64 / 1e9,
-            // Three hundred years hold no nanoseconds in an `f64`.
+            // An `f64` cannot represent nanoseconds over three hundred years.
             None => seconds as f64 + nanoseconds as f64 / 1e9,
         }
     }

@@ -35,7 +35,7 @@ pub(crate) fn write_if(
     replace(path, content, still).map_err(|error| unwritten(path, &error))
 }
 
-/// Puts `content` into a new file; whether there was none.
+/// Writes `content` into a new file; returns false if the file exists.
 pub(crate) fn create(path: &Path, content: &[u8]) -> Result<bool, Error> {
     let created = fs::symlink_metadata(path).is_err();
     let created = created.then(|| new(path, content));
@@ -132,7 +132,7 @@ fn target(path: &Path) -> io::Result<PathBuf> {
     }
 }
 
-/// A link whose file is not there.
+/// A link to a file that does not exist.
 pub(crate) fn leads_nowhere(path: &Path) -> bool {
     let link = fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink());
     link && fs::metadata(path).is_err()

@@ -1,4 +1,4 @@
-//! `ctid check`: what a model's text holds.
+//! `ctid check`: summary of a model's text.
 
 use std::path::Path;
 

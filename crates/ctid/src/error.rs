@@ -31,7 +31,7 @@ pub enum Error {
     File {
         /// The path as it was given.
         file: String,
-        /// What is wrong and the correction.
+        /// The error and the correction.
         what: String,
     },
     /// Another program changed the file between reading and writing.

@@ -67,8 +67,8 @@ pub(crate) fn noise_floors(diagnosis: &Diagnosis) -> PerOutput {
     )
 }
 
-/// Errors of several outputs are one number only where each is divided by its noise: of an only output the error itself, of several the
-/// weighted one, and the unit that goes with it.
+/// Errors of several outputs are combined only after division by their noise: with one output the error itself, with several the weighted
+/// one, and its unit.
 fn one_error<T>(diagnosis: &Diagnosis, only: T, weighted: T) -> (T, &str) {
     if several(diagnosis) {
         (weighted, TIMES_THE_NOISE)
@@ -236,7 +236,7 @@ pub(crate) fn places(diagnosis: &Diagnosis) -> Vec<String> {
         .collect()
 }
 
-/// `upper tank 1.00, lower tank 0.31: cannot be told`.
+/// Places of an effect in words: `upper tank 1.00, lower tank 0.31: cannot be told`.
 pub(crate) fn place_scores(domain: Domain, places: &[PlaceScore]) -> String {
     let scores: Vec<String> = places
         .iter()

@@ -13,7 +13,7 @@ const USUAL: usize = 80;
 /// Layout of text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Look {
-    /// Colours may be used.
+    /// Whether colours may be used.
     pub colour: bool,
     /// Columns to fill.
     pub width: usize,

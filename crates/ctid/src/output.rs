@@ -39,7 +39,7 @@ pub enum Kind {
     Json,
     /// The result as a page.
     Report,
-    /// A record as CSV; nothing is written where there is none to play.
+    /// A record as CSV; no file is written without a record.
     Record,
     /// The shape of what is missing, as CSV; nothing is written where nothing is.
     Unknown,
@@ -64,7 +64,7 @@ pub trait Found: Serialize {
         None
     }
 
-    /// The shape of what nothing explains as CSV, where there is one.
+    /// The unexplained error as CSV, if there is one.
     fn unknown(&self) -> Option<String> {
         None
     }

@@ -27,7 +27,7 @@ pub fn program(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
         Err(error) => error.to_string(),
     };
-    // Whoever has closed standard error still gets the exit code.
+    // If standard error is closed, the exit code is still correct.
     let _ = writeln!(io::stderr(), "{}", one_line(&message));
     ExitCode::from(2)
 }

@@ -93,7 +93,7 @@ impl Bar {
     }
 }
 
-/// The time since the beginning, and how much of the limit is left.
+/// The time since the beginning, and the remaining part of the limit.
 fn clock(elapsed: Duration, limit: Option<Duration>, interrupted: bool) -> String {
     let seconds = elapsed.as_secs();
     if interrupted {

@@ -1,4 +1,4 @@
-//! `ctid effects --like WORD`: effects by what a person at the plant says of them.
+//! `ctid effects --like WORD`: effects by a description of symptoms.
 
 use ct_model::effects::Candidate;
 use ct_signals::quoted;

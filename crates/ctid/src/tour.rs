@@ -26,8 +26,8 @@ pub struct Tour {
     pub diagnosis: Diagnosis,
 }
 
-/// Walks through the five steps, tells them on `out`, and writes `report.html` into `folder`; where
-/// a file that is not of an earlier tour has that name, `report-2.html`, and so on.
+/// Runs the five steps with explanations on `out`, and writes `report.html` into `folder`; if a file with this name is not from an earlier
+/// tour, `report-2.html`, and so on.
 ///
 /// # Errors
 /// Where the folder or `out` cannot be written to.

@@ -1,4 +1,4 @@
-//! The result of a search as plain values: the model that was believed, then the effects one by one, with what each does to the error.
+//! The result of a search as plain values: the believed model, then the effects one by one, with the change of the error.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! The believed model, with the effects that the model file has already, fitted to the records; and the candidates beside it.
+//! The believed model, including the effects of the model file, fitted to the records; and the candidates.
 //!
 //! The candidates follow from what the model without effects visits. The listed effects are added one after the other, each from its best
 //! start, as the search would add them.
@@ -65,7 +65,7 @@ pub fn all_candidates(
     Ok(all)
 }
 
-/// The believed model fitted, and the candidates.
+/// Fits the believed model, and lists the candidates.
 pub(crate) fn begin<'a>(
     problem: &'a Problem,
     options: &Options<'a>,

@@ -37,12 +37,12 @@ pub enum Error {
         /// Identifier of the effect.
         id: String,
     },
-    /// An effect of the model file beside which the model cannot be simulated.
+    /// With an effect of the model file, the model cannot be simulated.
     #[error(
         "with {id} the simulation fails from every start of its parameters: give better start values under [effect.\"{id}\"], or remove it"
     )]
     NoStart {
-        /// Its identifier.
+        /// Identifier of the effect.
         id: String,
     },
 }

@@ -143,7 +143,7 @@ fn columns_of(
     Some(columns)
 }
 
-/// Chosen columns of all rows whose sample is there, whitened and weighted, every so many.
+/// Selected columns of all present rows, whitened and weighted, every n-th column entry.
 fn whitened(
     all: &Rows,
     chosen: Vec<usize>,

@@ -1,8 +1,8 @@
 //! Partial explanation: the largest part of the error that effects explain, if the residual is slower than noise that a search can model.
 //!
-//! Measured records hold several causes, and disturbances that are nearly integrated. A noise model with a long memory looks at changes from
-//! sample to sample alone: it takes every slow effect for noise, and a fit in its metric lets the simulation drift off. There sets are compared
-//! by their simulation error. A set is a part of the answer where
+//! Measured records hold several causes, and disturbances that are nearly integrated. A noise model with a long memory uses changes from sample to sample only: it treats every slow
+//! effect as noise, and a fit with this weighting lets the simulation drift. In this case sets are compared by their simulation
+//! error. A set is a partial explanation if
 //! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an effect
 //!   that follows time alone, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and without others
 //!   beside it, as those then bend to any disturbance;
@@ -154,8 +154,8 @@ impl Context<'_> {
         all.any(|(parameter, error)| error.is_none() && names.contains(&&parameter.about.name))
     }
 
-    /// The part of the mean squared error that a set explains on parts of the records that it was not fitted to: a quarter of each record is
-    /// left out in turn (cross-validation). Negative where the set does harm.
+    /// The part of the mean squared error that a set explains on parts of the records that it was not fitted to: a quarter of each record
+    /// is left out in turn (cross-validation). Negative if the error rises.
     fn carried_over(&self, base: &Node, set: &Node) -> Result<f64, Error> {
         let before = self.left_out_squares(base)?;
         let after = self.left_out_squares(set)?;

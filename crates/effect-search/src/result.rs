@@ -132,6 +132,6 @@ pub struct Diagnosis {
     pub candidates: usize,
     /// Steps that the time limit left out of the search; empty if the search is complete.
     pub left_out: Vec<String>,
-    /// How long it took \[s\].
+    /// Computing time \[s\].
     pub seconds: f64,
 }

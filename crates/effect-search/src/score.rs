@@ -289,7 +289,7 @@ impl Context<'_> {
             return Ok(None);
         };
         let fall = count * (node.fit.cost / best.max(f64::MIN_POSITIVE)).ln();
-        // A simulation without derivatives tells which of the starts is better.
+        // A simulation without derivatives shows which of the starts is better.
         let kept = if smooth && scored.len() == 1 {
             1
         } else {

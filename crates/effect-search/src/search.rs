@@ -35,7 +35,7 @@ pub(crate) struct Grown {
 }
 
 impl Context<'_> {
-    /// Fits of candidates beside a set.
+    /// Fits of candidates added to a set.
     pub fn refits(&self, node: &Node, trials: &[Trial], noise: &Noise) -> Vec<Node> {
         let fits = trials.par_iter().filter_map(|trial| {
             if self.limit.passed() {
@@ -151,7 +151,7 @@ impl Context<'_> {
         self.grow_on(grown, noise, max_effects)
     }
 
-    /// The search goes on, to sets of up to so many effects.
+    /// Continues the search to larger sets.
     pub fn grow_on(&self, grown: Grown, noise: &Noise, max_effects: usize) -> Result<Grown, Error> {
         let Grown {
             base,
@@ -229,7 +229,7 @@ impl Context<'_> {
             > fitted * self.samples().ln()
     }
 
-    /// A pair of candidates beside a set, from the best starts of each.
+    /// A pair of candidates added to a set, from the best starts of each.
     fn pair(
         &self,
         base: &Node,

@@ -36,7 +36,7 @@ pub fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
     // Flat enough for neighbours to be compared, by a filter that has no room for a line.
     let mut flat = ArModel::fit(&[series], 1)?.whiten(series);
     for (k, value) in flat.iter_mut().enumerate() {
-        // A missing sample shows no line.
+        // A missing sample contributes nothing.
         if value.is_nan() {
             *value = 0.0;
         }

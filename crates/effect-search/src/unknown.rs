@@ -62,7 +62,7 @@ pub struct Unknown {
 }
 
 impl Context<'_> {
-    /// The missing term beside a set; `None` where no function lowers the criterion.
+    /// The missing term for a set; `None` if no function lowers the criterion.
     pub fn unknown(&self, node: &Node, floors: &[f64]) -> Result<Option<Unknown>, Error> {
         let (with_shapes, of) = self.with_shapes();
         with_shapes.unknown_among(node, &of, floors)

@@ -24,8 +24,8 @@ pub struct Fit {
     pub cost: f64,
     /// Root mean square of the residual at each output, not whitened \[output unit\].
     pub rmse: Vec<f64>,
-    /// The noise in whose metric it was fitted. After [`coloured`] its innovations are those of the residual; in a
-    /// metric that was given they are as they were given.
+    /// The noise model used as weighting in the fit. After [`coloured`] its innovations are those of the residual; otherwise those of the
+    /// given model.
     pub noise: Noise,
     /// Weights of the rows of each output, in addition to whitening ([`crate::Squares::weights`]).
     pub weights: Vec<f64>,
@@ -40,7 +40,7 @@ pub struct Fit {
     pub samples: usize,
     /// Samples of each output.
     pub samples_per_output: Vec<usize>,
-    /// Priors of fitted entries, which count as a sample each.
+    /// Number of priors of fitted entries, each of which counts as a sample.
     pub priors: usize,
     /// Number of starts.
     pub starts: usize,
@@ -68,8 +68,8 @@ impl Fit {
             || self.cost == other.cost
     }
 
-    /// The better of this fit and one of the same model in the same metric from other starts. Starts are counted
-    /// together; those of both count as agreed where both ended in the same minimum.
+    /// The better of this fit and another one of the same model with the same weighting from other starts. The numbers of starts are added;
+    /// starts of both count as agreed if both ended in the same minimum.
     #[must_use]
     pub fn or_better(self, other: Self) -> Self {
         let starts = self.starts + other.starts;

@@ -1,4 +1,4 @@
-//! Least squares under a noise model: what is fitted says its residuals and their Jacobian ([`Residuals`]), and everything else is here.
+//! Least squares with a noise model: the problem supplies its residuals and their Jacobian ([`Residuals`]), and everything else is here.
 //!
 //! - [`fit_from`]: Levenberg-Marquardt within bounds from many starts, in parallel, in `O(p^2)` memory ([`Triangle`]).
 //! - [`coloured`]: the noise of each output as an autoregressive process, from the residual by marginal likelihood ([`noise_of`]), and the

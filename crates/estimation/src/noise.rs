@@ -101,7 +101,7 @@ impl Noise {
         self.outputs.iter().map(ArModel::order).sum()
     }
 
-    /// The colour alone is the same: models may differ in their scales.
+    /// Whether the AR coefficients are equal: the scales may differ.
     #[must_use]
     pub fn same_colour(&self, other: &Self) -> bool {
         self.outputs.len() == other.outputs.len()

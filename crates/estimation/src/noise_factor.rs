@@ -126,8 +126,7 @@ impl Factor {
             }
         }
     }
-    /// The adjoint of the filter that colours, or of the one that whitens: the sensitivity to each row of `sum x y`, `y`
-    /// what the filter makes of the rows.
+    /// The adjoint of the colouring or the whitening filter: the sensitivity to each row of `sum x y`, with `y` the filtered rows.
     fn adjoint(&self, filter: &Gains, rows: &mut [f64], lanes: usize, colour: bool) {
         let q = self.order();
         let (before, rows) = rows.split_at_mut(filter.before * lanes);

@@ -34,8 +34,8 @@ pub trait Residuals: Sync {
     /// Number of samples of each output without missing ones.
     fn samples(&self) -> &[usize];
 
-    /// Shows every row `[d model/d x_free, measured - model]` with what is known of its sample, until `each` says that it has seen enough;
-    /// `None` then, and where the model is not finite.
+    /// Passes every row `[d model/d x_free, measured - model]` with the properties of its sample to `each`, until `each` returns false;
+    /// then the result is `None`, as for a model that is not finite.
     fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()>;
 
     /// Rows of the residual alone, without derivatives.

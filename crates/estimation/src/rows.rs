@@ -39,7 +39,7 @@ impl Rows {
             .collect()
     }
 
-    /// Series by series, whether each row's sample is there.
+    /// Whether each row's sample is present, series by series.
     pub(crate) fn present(&self) -> impl Iterator<Item = (usize, Vec<bool>)> {
         let columns = self.columns;
         let there = move |row: &[f64]| !row[columns - 1].is_nan();

@@ -31,7 +31,7 @@ pub struct Triangle {
 }
 
 impl Triangle {
-    /// `columns` counts the residual's column too.
+    /// `columns` includes the residual's column.
     #[must_use]
     pub fn new(columns: usize) -> Self {
         Self {
@@ -69,7 +69,7 @@ impl Triangle {
         }
     }
 
-    /// Folds in rows that are given column by column: each of [`Triangle::columns`] slices, the residual's last, holds one entry for every row.
+    /// Adds rows that are given column by column: each of [`Triangle::columns`] slices, the residual's last, has one entry per row.
     pub fn push_columns(&mut self, columns: &[&[f64]]) {
         let rows = columns.first().map_or(0, |column| column.len());
         let mut from = 0;
@@ -185,8 +185,8 @@ impl Triangle {
     }
 
     /// Minimises `|J x - r|^2 + damping sum_j (scale_j x_j)^2` over the `free` parameters; the others stay zero.
-    /// Directions that no row speaks of stay zero too. Outputs count by what is left of their residuals there, not here
-    /// (iteratively reweighted least squares).
+    /// Directions without influence on any row stay zero too. The weights of the outputs come from
+    /// their residuals there, not here (iteratively reweighted least squares).
     #[must_use]
     pub fn solve(&self, free: &[usize], scale: &[f64], damping: f64) -> Vec<f64> {
         let mut step = self.solve_weighted(free, scale, damping);

@@ -35,7 +35,7 @@ pub struct Squares {
     pub sums: Vec<f64>,
     /// Samples of each output.
     pub samples: Vec<usize>,
-    /// Standard deviation of each output below which no noise is believed: it keeps one that is met exactly from counting alone.
+    /// Lower bound of each output's noise standard deviation: it prevents an output that is fitted exactly from dominating.
     floors: Vec<f64>,
     /// Standard deviation of each output where it is known.
     known: Option<Vec<f64>>,

@@ -60,7 +60,7 @@ impl Stop {
 pub struct Iterate {
     /// The parameters.
     pub theta: Vec<f64>,
-    /// J there.
+    /// Value of J.
     pub cost: f64,
 }
 

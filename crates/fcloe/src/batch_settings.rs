@@ -25,7 +25,7 @@ pub enum Method {
     GaussNewton,
     /// Damped.
     LevenbergMarquardt {
-        /// The first mu, above 0. The paper takes 0.1, and 1 after a poor start.
+        /// The first mu, above 0. The paper uses 0.1, and 1 after a poor start.
         mu: f64,
         /// Matrix of the damping.
         damping: Damping,

@@ -112,8 +112,8 @@ pub fn controller_mismatch(
     Ok(best)
 }
 
-/// The square of that part of what is missed which follows the ladder, and what noise of the same spectrum would show of it, by generalised
-/// least squares.
+/// The square of the part of the command's error that follows the controller's polynomial terms, and its expected value for noise of the
+/// same spectrum, by generalised least squares.
 fn following(free: &[Vec<f64>], ladder: &[Vec<f64>], missed: &[f64]) -> Result<(f64, f64), Error> {
     let plain = Projection::new(ladder, missed);
     let noise = ArModel::fit(&[&plain.left(ladder, missed)], 4)?;

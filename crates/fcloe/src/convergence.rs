@@ -20,7 +20,7 @@ use crate::{ClosedLoop, Controller, Error, PlantModel};
 /// Result of condition (14) for one filter and one plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
-    /// The answer.
+    /// Result of the condition.
     pub verdict: Verdict,
     /// The smallest `Re (P^/P)(jw)` over all frequencies; NaN where P is not Hurwitz.
     pub least: f64,
@@ -38,7 +38,7 @@ pub enum Verdict {
     Positive,
     /// `Re (P^/P)` is 0 or negative at some frequency: data at that frequency move the estimates in the wrong direction.
     Negative,
-    /// P itself is not Hurwitz, so there is no such loop.
+    /// P itself is not Hurwitz, so the loop is unstable.
     Unstable,
 }
 

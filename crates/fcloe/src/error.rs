@@ -139,7 +139,7 @@ pub enum Error {
         record: String,
         /// Index of the later time.
         index: usize,
-        /// The step there \[s\].
+        /// The irregular step \[s\].
         step: f64,
         /// The median step \[s\].
         expected: f64,

@@ -30,7 +30,7 @@ pub struct LoopData {
     pub u: Vec<f64>,
 }
 
-/// A loop with a continuous controller, from rest; `r` does what `hold` says.
+/// A loop with a continuous controller, from rest; `hold` is the hold of `r`.
 ///
 /// In open loop (R = 0) r is the input itself.
 ///
@@ -100,7 +100,7 @@ pub fn sampled_loop(
         check_length(w, r)?;
     }
     let period = step / periods as f64;
-    // The sensor's filter stays continuous, between plant and sampler.
+    // The sensor's filter is continuous, between plant and sampler.
     let sensor = TransferFunction::new(Polynomial::one(), controller.filter().clone())?;
     let mut process = Held::new(&plant.transfer_function()?.series(&sensor)?, period)?;
     let mut law = Held::new(&controller.law()?, period)?;

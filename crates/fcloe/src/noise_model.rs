@@ -61,7 +61,7 @@ pub(crate) struct Residual {
 pub struct NoiseModel {
     /// Point where the noise enters.
     pub path: NoisePath,
-    /// The noise there.
+    /// Noise model of the path.
     pub ar: ArModel,
 }
 

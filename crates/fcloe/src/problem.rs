@@ -31,7 +31,7 @@ const LARGEST_MISMATCH: f64 = 0.1;
 pub struct Levels {
     /// Level of r, or of u in open loop, at which the loop rested before the record.
     pub drive: f64,
-    /// Level of y there.
+    /// Level of y.
     pub y: f64,
 }
 

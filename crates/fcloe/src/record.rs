@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Controller, Error};
 
-/// The levels about which the linear model holds, units of r, u and y.
+/// The levels around which the linear model is valid, units of r, u and y.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct OperatingPoint {
     /// Reference.
@@ -25,7 +25,7 @@ pub struct OperatingPoint {
 pub enum Offsets {
     /// The signals are deviations already, and the loop is at rest at 0 when the record begins.
     Deviations,
-    /// Known, to be subtracted: the loop rests there when the record begins.
+    /// Known levels, which are subtracted: the loop is at rest there when the record begins.
     Known(OperatingPoint),
     /// The mean of the first rows, in which the loop rests: at least 1.
     FirstRows(usize),
@@ -133,7 +133,7 @@ impl LoopRecord {
         self.y.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.y.is_empty()
     }

@@ -23,7 +23,7 @@ pub struct StartRun {
     pub condition: Condition,
     /// The estimates at the end; none where the start's loop is not stable, so that there is no run.
     pub end: Option<Vec<f64>>,
-    /// The largest relative error of a parameter there; infinite without a run.
+    /// The largest relative error of a parameter at the end; infinite without a run.
     pub error: f64,
     /// Number of steps that were rejected to keep the loop stable.
     pub refused: u64,

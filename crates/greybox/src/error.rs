@@ -1,4 +1,4 @@
-//! What can go wrong in a fit.
+//! Errors of a fit.
 
 /// What can go wrong in a fit.
 #[derive(Debug, thiserror::Error)]
@@ -61,7 +61,7 @@ pub enum Error {
         /// Number in the model.
         needed: usize,
     },
-    /// The least squares have no answer.
+    /// The least-squares problem has no solution.
     #[error(transparent)]
     Estimation(#[from] estimation::Error),
     /// Cancelled by [`Setup::stop`](crate::Setup::stop).
@@ -75,7 +75,7 @@ pub enum Error {
         /// The record.
         record: String,
     },
-    /// The reference never moves.
+    /// The reference is constant.
     #[error(
         "{record}: the reference stays at {value}, so that nothing but noise moves the loop: take a record in which the set point changes"
     )]

@@ -39,7 +39,7 @@ pub struct Replay {
     pub states: Vec<f64>,
     /// The measured command less the controller's \[input unit\].
     pub beside: Vec<f64>,
-    /// Root mean square of `beside` \[input unit\].
+    /// Root mean square of the additional input \[input unit\].
     pub rms: f64,
     /// Standard deviation of the measured command \[input unit\].
     pub moves: f64,

@@ -23,8 +23,8 @@ const QUICKER: [f64; 3] = [0.3, 3.0, 9.0];
 
 /// Plants that are quicker or slower than one, in front of which something sticks or saturates; none for other effects.
 ///
-/// A model without it answers to commands that move nothing. It imitates what the plant does then by a small gain and another time
-/// constant, a much longer one or none at all. Of tanks the gain and the outflows are taken more or less together: the levels stay.
+/// A model without the effect responds to commands that do not move the real actuator. Its fit compensates for this by a small gain and another time
+/// constant, a much longer one or none at all. For tanks the gain and the outflows are scaled together, so that the levels do not change.
 #[must_use]
 pub fn with_other_speeds(setup: &Setup, placed: Placed, x: &[f64]) -> Vec<Vec<f64>> {
     let plant = setup.structure.plant;
@@ -181,7 +181,7 @@ fn scores_of_simulations(
             models.push(without);
         }
     }
-    // Outputs count against each other as in the first model, the same for all.
+    // Outputs have the weights of the first model in all comparisons.
     let weights = match setup.outputs() {
         1 => vec![1.0],
         _ => models
@@ -189,8 +189,8 @@ fn scores_of_simulations(
             .find_map(|x| estimation::squares(setup, x, noise))?
             .weights(),
     };
-    // The effect's own columns take no part; those of time constants only where the model fits best without the effect, since elsewhere
-    // they are not near what they will be.
+    // The effect's own columns are not used; those of time constants only where the model fits best without the effect, because elsewhere
+    // the time constants are far from their final values.
     let simulated = |x: &Vec<f64>| {
         let left = (!setup.leaves_out(STARTS)).then(|| whitened(setup, x, noise, &weights));
         left.flatten()
@@ -235,7 +235,7 @@ fn whitened(setup: &Setup, x: &[f64], noise: &Noise, weights: &[f64]) -> Option<
     let series = noise.whiten(&setup.disturbance(x).ok()?);
     let weighted = series.iter().zip(weights.iter().cycle());
     let all = weighted.flat_map(|(series, weight)| series.iter().map(move |v| v * weight));
-    // Rows of missing samples take no part here as in the columns.
+    // Rows of missing samples are left out, as in the columns.
     Some(all.filter(|value| !value.is_nan()).collect())
 }
 
@@ -305,7 +305,7 @@ impl WithoutEffect {
                 gain: None,
             };
         };
-        // The column of the gain there, times the gain.
+        // The column of the gain, times the gain.
         let before = self.residual.iter().zip(by_gain);
         for (left, (residual, by_gain)) in left.iter_mut().zip(before) {
             *left = by_gain + residual - *left;

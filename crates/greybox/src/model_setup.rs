@@ -1,4 +1,4 @@
-//! A model of its user's text against records: the vector that is fitted, its bounds, its starts.
+//! Fit of a user's own model to records: the vector of parameters, its bounds, its starts.
 //!
 //! The fitted vector holds the parameters in the order of the text, then for every record the initial values of the states. Time is that
 //! of the records, in units of the model's time: `der()` is per such a unit. Inputs are held from row to row, or run in straight lines, as
@@ -168,8 +168,8 @@ impl<'a> ModelSetup<'a> {
         }
     }
 
-    /// Standard deviation of the noise of each output as a linear prediction from the past leaves it, which what the model lacks hardly enters;
-    /// that of the residual where there are too few samples. `None` where the simulation cannot go on.
+    /// Standard deviation of the noise of each output, from a linear prediction from the past, which is nearly independent of model errors;
+    /// that of the residual if there are too few samples. `None` if the simulation diverges.
     #[must_use]
     pub fn output_noise(&self, x: &[f64]) -> Option<Vec<f64>> {
         let simulated = self.simulate(x)?;

@@ -59,8 +59,8 @@ fn slowest(records: &[Record]) -> usize {
     slowest.unwrap_or(1)
 }
 
-/// The sum of squares that the prediction of one output leaves, so many rows ahead from so many past readings; over how many samples, and
-/// its coefficients.
+/// Sum of squares of the prediction error of one output, for the given number of rows ahead and of past readings; with the number of
+/// samples, and of coefficients.
 fn prediction(
     records: &[Record],
     model: &[Vec<f64>],

@@ -69,7 +69,7 @@ impl ReadingGrid {
     }
 }
 
-/// The grid that nearly all readings of an output in all records lie on, the one of the largest step; `None` where there is none.
+/// The grid of the largest step on which nearly all readings of an output are, over all records; `None` if there is none.
 #[must_use]
 pub fn reading_grid(records: &[Record], output: usize) -> Option<ReadingGrid> {
     let mut sorted: Vec<f64> = records
@@ -122,7 +122,7 @@ pub fn reading_grid(records: &[Record], output: usize) -> Option<ReadingGrid> {
                 median_change,
             })
         });
-    // A grid of too few steps is not known by a half of its step either. A span is that of its own grid up to rounding.
+    // A grid of too few steps is uncertain by half of its step. A span is a multiple of its own grid up to rounding.
     largest.filter(|grid| span >= (FEWEST_STEPS - NEAR) * grid.step)
 }
 
@@ -149,7 +149,7 @@ fn levels(sorted: &[f64], same: f64) -> Vec<f64> {
 fn refined(mut step: f64, levels: &[f64]) -> Option<f64> {
     let n = levels.len();
     let mut places = 1;
-    // Up to so many steps the count of a difference is certain.
+    // Up to this number of steps, the number of steps in a difference is certain.
     let mut certain = 0.2 / PRINTED;
     while places < n {
         for _ in 0..2 {

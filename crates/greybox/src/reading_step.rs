@@ -1,5 +1,5 @@
-//! Whether the readings of records are whole multiples of one number, and of which: exactly, as a converter leaves them, or with
-//! noise of their own on them.
+//! Whether the readings of records are whole multiples of one number, and of which: exactly, as after a converter, or with additional
+//! noise.
 
 use ct_signals::Record;
 
@@ -15,8 +15,7 @@ const FEWEST_STEPS: f64 = 4.0;
 /// Number of readings in the first test.
 const FIRST_LOOK: usize = 400;
 
-/// The largest `D` that nearly all readings of an output are multiples of \[output unit\], if there is one that is coarse enough to be
-/// more than the last digit.
+/// The largest `D` such that nearly all readings of an output are multiples of `D` \[output unit\], if it is larger than the last digit.
 pub(crate) fn reading_step(records: &[Record], output: usize) -> Option<f64> {
     exact_reading_step(records, output).or_else(|| noisy_step(records, output))
 }

@@ -64,7 +64,7 @@ fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     } else {
         y
     };
-    // A mean of next to nothing says nothing.
+    // A mean near zero contains no information.
     let largest = scales.input.0.abs().max(scales.input.1.abs());
     let driven = u.abs() > 1e-6 * largest;
     let drive = match (driven, largest > 0.0) {

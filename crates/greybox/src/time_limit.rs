@@ -1,4 +1,4 @@
-//! A limit on the time of a search that consists of many fits.
+//! Time limit of a search that consists of many fits.
 //!
 //! A fit whose setup has a limit that has passed takes no further steps and ends where it is
 //! ([`Stop::Evaluations`](crate::Stop::Evaluations)); of several starts only the first is followed. So results depend on the speed of the

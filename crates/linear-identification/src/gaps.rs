@@ -51,7 +51,7 @@ struct TimeConstants {
     slowest: f64,
 }
 
-/// Records that are fitted, and others of the same plant, without gaps, for models of at most this order.
+/// The fitted records, and others of the same plant, without gaps, for models of at most this order.
 ///
 /// # Errors
 /// [`Error::Signals`] and [`Error::NoSignal`] for a record that is none, [`Error::NoStretch`] where nothing is left of a record, [`Error::FirstFit`] where its first fit fails.

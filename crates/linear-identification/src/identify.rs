@@ -1,4 +1,4 @@
-//! The entry: gaps are mended, then the method is called.
+//! Entry point: gaps are handled, then the method is called.
 
 use ct_signals::Record;
 

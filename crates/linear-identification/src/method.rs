@@ -7,7 +7,7 @@ use serde::Serialize;
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Recursive output error, stabilised by an adaptive error filter that is kept within bounds
+    /// Recursive output error, stabilised by an adaptive error filter with bounds
     StabilizedOe,
     /// Recursive least squares on the filtered equation
     CtRls,

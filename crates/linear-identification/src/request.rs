@@ -17,9 +17,9 @@ pub struct Request {
     pub controller: Option<fcloe::Controller>,
     /// Operating point; for the same methods.
     pub levels: LevelChoice,
-    /// Smallest and largest command, in the input's unit; infinite where there is none.
+    /// Smallest and largest command, in the input's unit; infinite without a limit.
     pub limits: (f64, f64),
-    /// Delay of the inputs; none where nothing is said. For SRIVC and RIVC.
+    /// Delay of the inputs; none by default. For SRIVC and RIVC.
     pub delay: Option<DelayChoice>,
     /// Whether `A(0) = 0`; for the same methods.
     pub integrator: bool,

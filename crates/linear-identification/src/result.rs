@@ -19,7 +19,7 @@ pub struct Settings {
     pub first_order_rmse: f64,
 }
 
-/// What was found.
+/// Result of an identification.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Identification {
     /// Version of this record.
@@ -87,7 +87,7 @@ pub struct Trajectory {
     pub samples: Vec<usize>,
     /// One series for each parameter.
     pub values: Vec<Vec<f64>>,
-    /// Standard errors; NaN (`null`) where too little has been seen.
+    /// Standard errors; NaN (`null`) with too few samples.
     pub std_errors: Vec<Vec<f64>>,
 }
 

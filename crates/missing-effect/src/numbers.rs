@@ -42,7 +42,7 @@ pub fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Option<St
     }
 }
 
-/// A whole number, `-` where there is none.
+/// A whole number, `-` if there is none.
 #[must_use]
 pub fn whole(value: f64) -> String {
     if value.is_finite() {

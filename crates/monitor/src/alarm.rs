@@ -56,7 +56,7 @@ pub struct Alarm {
     pub size: Option<Size>,
     /// The score that passed the threshold when the alarm was raised, and the threshold.
     pub score: f64,
-    /// See `score`.
+    /// Threshold of `score`.
     pub threshold: f64,
     /// With several outputs, the one whose reading offset had the largest score at the alarm: this names the vessel.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -83,8 +83,8 @@ impl Bank {
             && self.c.len() == cells * parameters
     }
 
-    /// Takes in the whitened rows of a sample, one for each output that has a reading: a derivative for each direction, then the residual.
-    /// Whether a score passes the threshold; `covariance` is that of the parameters, row by row.
+    /// Processes the whitened rows of a sample, one for each output with a reading: a derivative for each direction, then the residual.
+    /// Returns whether a score exceeds the threshold; `covariance` is that of the parameters, row by row.
     pub(crate) fn update(&mut self, rows: &[f64], covariance: &[f64], threshold: f64) -> bool {
         let (p, q) = (self.parameters, self.directions);
         let limit = threshold * threshold;

@@ -143,7 +143,7 @@ impl Refused {
         }
     }
 
-    /// The column to look at: `time`, `input` or `output`.
+    /// Name of the column in question: `time`, `input` or `output`.
     #[must_use]
     pub fn column(&self) -> &'static str {
         match self {

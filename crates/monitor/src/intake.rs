@@ -1,11 +1,11 @@
-//! Rows as they come: what is refused, where samples are missing, and the means of blocks of rows.
+//! Incoming rows: rejected rows, gaps, and means of blocks of rows.
 //!
 //! The usual step of the time is the median of the first 21. A step of more than one and a half times the longest of them is
 //! a gap: a short one is bridged by the held command, a longer one begins a new stretch. Where 20 steps in a
 //! row are of another length, the sampling interval has changed. A time that goes back is refused; where 100 rows in a row do, in order
 //! among themselves, the clock was set back, or ran ahead for a row, and a new stretch begins.
 //!
-//! A process that is sampled much faster than it moves is watched in blocks: time, command and reading are their means over
+//! A process that is sampled much faster than its dynamics is monitored in blocks: time, command and reading are their means over
 //! `every` rows, and the command runs in a straight line from one mean to the next.
 //!
 //! A row may lack the reading of an output. In a block such a row is taken on the straight line between the readings beside it; a block whose
@@ -21,7 +21,8 @@ const STEPS: usize = 21;
 const GAP: f64 = 1.5;
 /// Steps of another length in a row that make it the usual one.
 const OTHER: usize = 20;
-/// Rows in a row whose time goes back, after which it is the clock that did: more than a logger sends again when its line was down.
+/// Number of consecutive rows with earlier times after which the clock counts as set back: more than a logger repeats after a broken
+/// connection.
 const BACK: usize = 100;
 /// A gap of more than so many usual steps begins a new stretch.
 const BRIDGED: f64 = 5.0;
@@ -247,7 +248,7 @@ impl Intake {
         })
     }
 
-    /// Looks at a step of the time.
+    /// Processes a step of the time.
     fn step(&mut self, previous: f64, time: f64) -> Option<Notice> {
         let step = time - previous;
         if self.steps.len() == STEPS {

@@ -66,19 +66,19 @@ const LEFT: f64 = 0.1;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Kept {
     pub sample: Sample,
-    /// States of the learned model: the levels, of a plant.
+    /// States of the learned model: the levels of a plant.
     pub states: Each<f64>,
     /// State of the actuator's backlash in the input's unit: backlash has unlimited memory, so the state cannot be found by simulating a
     /// few rows.
     pub stands: f64,
-    /// Readings of the learned model.
+    /// Simulated readings of the learned model.
     pub modelled: Each<f64>,
     /// Whitened residual of each output in its standard deviations; zero where the reading is lost.
     pub innovations: Each<f64>,
 }
 
 impl Kept {
-    /// Measured minus the learned model.
+    /// Residual: measured minus the learned model's output.
     pub(crate) fn residual(&self, output: usize) -> Option<f64> {
         Some(self.sample.outputs[output]? - self.modelled[output])
     }
@@ -105,7 +105,7 @@ pub(crate) struct Left {
     pub before: f64,
     /// Sum of squares with the effect.
     pub left: f64,
-    /// Rows there times outputs.
+    /// Number of rows times outputs.
     pub samples: usize,
 }
 
@@ -225,7 +225,7 @@ fn innovations(rows: &[Kept], output: usize, residuals: &[f64], noise: &ArModel)
 
 /// An output in each row.
 struct Series {
-    /// Measured or filled in; all NaN where there is none.
+    /// Measured or interpolated readings; all NaN if there are none.
     readings: Vec<f64>,
     /// Residuals minus those of the learned model.
     residuals: Vec<f64>,

@@ -67,7 +67,7 @@ mod tests {
         let mut values = [1.0, 2.0, 77.0, -1.0, 3.0];
         expect(&noise, &mut values, &[2]);
         assert!((values[2] - a * (2.0 - 1.0) / (1.0 + a * a)).abs() < 1e-12);
-        // At the end there is only what was before.
+        // At the end of the series only earlier values are used.
         expect(&noise, &mut values, &[4]);
         assert!((values[4] + a).abs() < 1e-12);
         let mut white = [1.0, 5.0];

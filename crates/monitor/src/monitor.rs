@@ -89,7 +89,7 @@ pub enum Notice {
         from: f64,
         /// Time of the row after it \[s\].
         to: f64,
-        /// How many.
+        /// Number of missing rows.
         missing: u64,
         /// The command is taken to have been held; else what is not known of the levels is waited for.
         bridged: bool,
@@ -110,7 +110,7 @@ pub enum Notice {
         /// The usual step now \[s\].
         to: f64,
     },
-    /// The learning is over.
+    /// Learning is finished.
     Learned {
         /// Number of rows.
         rows: usize,
@@ -179,7 +179,7 @@ pub struct Monitor<'a> {
 }
 
 impl<'a> Monitor<'a> {
-    /// A monitor that has seen nothing yet, of a [`Model`](crate::Model) of a plant or an [`OwnModel`](crate::OwnModel).
+    /// A new monitor of a [`Model`](crate::Model) of a plant or an [`OwnModel`](crate::OwnModel).
     ///
     /// `units` are those of a plant's rows; a user's own model has units itself.
     ///
@@ -265,8 +265,8 @@ impl<'a> Monitor<'a> {
 
     /// Processes a row.
     ///
-    /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command, and
-    /// nothing is judged by what is lost.
+    /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command, and no test uses a missing
+    /// reading.
     ///
     /// # Errors
     /// [`Refused`]: time or command cannot be used, and the row is not.
@@ -316,7 +316,7 @@ impl<'a> Monitor<'a> {
         self.intake.last
     }
 
-    /// How many outputs there are.
+    /// Number of outputs.
     #[must_use]
     pub fn outputs(&self) -> usize {
         self.model.0.outputs()

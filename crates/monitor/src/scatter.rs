@@ -114,7 +114,7 @@ impl Block {
     }
 }
 
-/// The scatter's state between two rows.
+/// State of the noise monitor between two rows.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Scatter {
     first: Option<f64>,
@@ -174,7 +174,7 @@ impl Scatter {
         };
     }
 
-    /// Takes in an innovation \[standard deviations\].
+    /// Processes an innovation \[standard deviations\].
     pub(crate) fn update(&mut self, e: f64, limit: &Limit, most: &Most) -> Option<Moved> {
         let Some(first) = self.first.take() else {
             self.first = Some(e);

@@ -9,7 +9,7 @@ use ct_rls::{DynamicRls, Guards, RecursiveEstimator, Weights};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Forgetting never raises the variances above so many times the learned ones on average.
+/// Forgetting never raises the variances above the learned ones times this factor on average.
 const MOST: f64 = 1e4;
 /// After a step change, standard errors are multiplied by this factor.
 const JUMP: f64 = 30.0;
@@ -54,7 +54,7 @@ impl TrackerState {
 }
 
 impl Tracker {
-    /// `memory` \[s\]; `None` where there is nothing to track, or the covariance is not one.
+    /// `memory` \[s\]; `None` if there is nothing to track, or if the covariance is not positive definite.
     pub(crate) fn new(state: &TrackerState, tracked: &[(usize, f64)], memory: f64) -> Option<Self> {
         let n = tracked.len();
         if n == 0 || state.deviation.len() != n || state.covariance.len() != n * n {

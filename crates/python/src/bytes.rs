@@ -1,4 +1,4 @@
-//! Objects as bytes, for `pickle`: MessagePack, which keeps numbers that are none.
+//! Objects as bytes, for `pickle`: MessagePack, which can store NaN and infinity.
 
 use pyo3::prelude::*;
 use serde::de::DeserializeOwned;

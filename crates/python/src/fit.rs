@@ -154,7 +154,7 @@ impl Fit {
         all.collect()
     }
 
-    /// The unit of each output; empty where no record says it.
+    /// The unit of each output; empty if no record has it.
     #[getter]
     fn output_units(&self) -> Vec<String> {
         units_of(&self.fitted.records().records)

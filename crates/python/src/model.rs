@@ -212,7 +212,7 @@ impl Model {
         crate::linear::linearize(py, spec, &at)
     }
 
-    /// The model beside a running plant.
+    /// A monitor of a plant with this model.
     fn monitor(
         &self,
         time_unit: f64,
@@ -274,7 +274,7 @@ impl Model {
         Ok(spec.states.into_iter().map(|s| s.about.name).collect())
     }
 
-    /// As bytes, to be pickled.
+    /// As bytes, for pickle.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         Ok(PyBytes::new(py, &bytes::of(&self.0.kept())?))
     }

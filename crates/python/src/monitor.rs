@@ -1,4 +1,4 @@
-//! A model beside a running plant.
+//! A monitor: the model run in parallel with a plant.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -181,7 +181,7 @@ fn notice<'py>(py: Python<'py>, notice: &Notice) -> PyResult<Bound<'py, PyDict>>
     Ok(all)
 }
 
-/// Residual, the same in standard deviations; none without a reading, and while it learns.
+/// Residual, and innovation in standard deviations; none without a reading, and during learning.
 type Innovation = Option<(f64, f64)>;
 
 #[pymethods]
@@ -226,7 +226,7 @@ impl Monitor {
         ))
     }
 
-    /// Name, unit, value as learned, value now, half the width of its 95 % interval.
+    /// Name, unit, learned value, present value, half the width of its 95 % interval.
     #[getter]
     fn estimates(&self) -> Vec<(String, String, f64, f64, Option<f64>)> {
         let all = self.monitor().estimates().into_iter();
@@ -234,7 +234,7 @@ impl Monitor {
             .collect()
     }
 
-    /// `learning`, `watching` or `alarmed`, and rows, or the largest score and its threshold.
+    /// `learning`, `watching` or `alarmed`, and the number of rows, or the largest score and its threshold.
     #[getter]
     fn progress(&self) -> (&'static str, f64, f64) {
         match self.monitor().progress() {

@@ -161,7 +161,7 @@ impl StabilizedOe {
         Ok(Self(made.map_err(error::of_model)?))
     }
 
-    /// Takes in a sample, held over `dt` seconds. Returns the innovation before it.
+    /// Processes a sample that is held over `dt` seconds. Returns the innovation before the update.
     fn update(&mut self, u: f64, y: f64, dt: f64) -> f64 {
         self.0.update(u, y, dt)
     }

@@ -196,8 +196,8 @@ impl ContinuousRls {
         Self::made(&theta0.as_array().to_vec(), &rows_of(&P0), weights)
     }
 
-    /// Takes in a sample: the regressor, the output, and the time in s over which they are held. Returns the innovation `y - theta' phi` before
-    /// it. A sample that cannot be used, a NaN say, changes nothing; `outcome` says why.
+    /// Processes a sample: the regressor, the output, and the time in s over which they are held. Returns the innovation `y - theta' phi`
+    /// before the update. A sample that cannot be used, such as a NaN, changes nothing; `outcome` gives the reason.
     fn update(&mut self, phi: &Bound<'_, PyAny>, y: f64, dt: f64) -> PyResult<f64> {
         let innovation = if let Ok(phi) = phi.cast::<PyArray1<f64>>() {
             // A few numbers are copied faster than it is noted that they are read.
@@ -296,7 +296,7 @@ impl ContinuousRls {
         PyArray1::from_vec(py, self.rls.theta())
     }
 
-    /// The matrix that stands for their covariance.
+    /// The covariance matrix of the estimator.
     #[getter]
     #[pyo3(name = "P")]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {

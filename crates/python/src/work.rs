@@ -20,7 +20,7 @@ enum Said<T> {
     Done(T),
 }
 
-/// Tells the caller which phase has begun.
+/// Reports the present phase to the caller.
 pub struct Phases<T>(Sender<Said<T>>);
 
 impl<T> Phases<T> {
@@ -30,8 +30,8 @@ impl<T> Phases<T> {
     }
 }
 
-/// Does work that may take long. It is handed a flag, which Ctrl-C sets: it ends soon then, and its result is dropped for a
-/// `KeyboardInterrupt`. `progress`: called with every phase that begins.
+/// Runs work that may take long. Ctrl-C sets a flag that the work receives: the work ends soon then, and a `KeyboardInterrupt` replaces its
+/// result. `progress`: called with every new phase.
 pub fn run<T: Send>(
     py: Python<'_>,
     progress: Option<&Py<PyAny>>,

@@ -21,7 +21,7 @@ pub struct Input {
 /// One record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Data {
-    /// For messages.
+    /// Name in messages.
     pub name: String,
     /// Sampling instants \[time\], rising; their steps may differ.
     pub time: Vec<f64>,
@@ -29,8 +29,8 @@ pub struct Data {
     pub inputs: Vec<Input>,
     /// The output at the sampling instants, output unit; NaN where its reading is missing.
     pub output: Vec<f64>,
-    /// The reference of a loop whose controller moves the first input; nothing in open loop. In a loop the instruments come from it,
-    /// whatever the controller.
+    /// The reference of a loop whose controller drives the first input; none in open loop. In a loop the reference gives the instruments,
+    /// for any controller.
     pub reference: Option<Vec<f64>>,
     /// Whether the record continues the preceding one in the list, after a time with unknown inputs: it has its own initial state, and
     /// shares the offset and the noise of that record.
@@ -63,7 +63,7 @@ impl Data {
         self.time.is_empty()
     }
 
-    /// Number of readings of the output that are there.
+    /// Number of present readings of the output.
     pub fn readings(&self) -> usize {
         self.output.iter().filter(|y| !y.is_nan()).count()
     }

@@ -20,7 +20,8 @@ const REACH: f64 = 0.25;
 /// Grids that are finer by this factor.
 const FINER: f64 = 4.0;
 const GRIDS: usize = 4;
-/// Other points of the first grid that are starts too, beside no delay: where the order is high the rough comparison may miss the best.
+/// Number of other grid points that are also starts, in addition to zero delay: for high orders the rough comparison may miss the best
+/// point.
 const OTHERS: usize = 2;
 /// Distances of neighbouring delays from the estimate, in steps.
 const NEIGHBOURS: [f64; 8] = [2.0, 1.5, 1.0, 0.5, -0.5, -1.0, -1.5, -2.0];
@@ -126,8 +127,8 @@ impl Problem<'_> {
         Ok((candidates, finest))
     }
 
-    /// Delays about those of a model, whose whitened output error is compared under one model of the noise: each stretch between samples
-    /// has a minimum of its own, and which is the lowest depends on the noise's spectrum. The best model, where one is better.
+    /// Searches for better delays near those of a model, by the whitened output error with a common noise model: each interval between
+    /// samples has a separate minimum, and the noise's spectrum decides which is the lowest. Returns the best model, if one is better.
     pub(crate) fn better_delay(&self, found: &Refined) -> Option<Model> {
         let step = self.shortest_step();
         let largest =

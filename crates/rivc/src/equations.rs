@@ -25,11 +25,11 @@ pub(crate) struct Equations {
     zy: DVector<f64>,
     /// Squares of phi, to scale the columns with.
     sizes: DVector<f64>,
-    /// Rows whose reading is there.
+    /// Number of rows with a reading.
     pub(crate) samples: usize,
     /// Squares of the measured output, in the same unit.
     measured_squares: f64,
-    /// Squares of the residual, whitened where there is a model of the noise.
+    /// Sum of squared residuals, whitened if there is a noise model.
     residual_squares: f64,
     /// The residual of each record, NaN where the reading is missing; where the filter is that of the model `y - y^` on the measured inputs.
     pub(crate) residuals: Vec<Vec<f64>>,
@@ -135,7 +135,8 @@ impl Equations {
         }
     }
 
-    /// An autoregression of each record's residual, of at most this order, one for the parts of a record; one without noise counts as one with a billionth of the largest.
+    /// An AR model of each record's residual, of at most this order, one for all parts of a record; a record without noise gets a billionth
+    /// of the largest noise.
     pub(crate) fn residual_noise(&self, order: usize) -> Result<Vec<ArModel>, Error> {
         let mut models = Vec::with_capacity(self.residuals.len());
         for group in self.layout.groups() {
@@ -223,7 +224,7 @@ impl Equations {
         Ok(solution)
     }
 
-    /// Variance of the residual, whitened where there is a model of the noise.
+    /// Variance of the residual, whitened if there is a noise model.
     pub(crate) fn variance(&self) -> f64 {
         self.residual_squares / (self.samples - self.unknowns()).max(1) as f64
     }

@@ -72,13 +72,13 @@ pub enum Error {
         index: usize,
         /// The time before.
         before: f64,
-        /// The time there.
+        /// The time at this sample.
         after: f64,
     },
     /// A setting outside its range.
     #[error("{what} is {value}, but must be {range}")]
     Setting {
-        /// Which setting.
+        /// Name of the setting.
         what: &'static str,
         /// What was given.
         value: f64,
@@ -139,12 +139,12 @@ pub enum Error {
         /// Number of parameters.
         parameters: usize,
     },
-    /// A delay beside a direct term.
+    /// A delay together with a direct term.
     #[error(
         "the delay of input {input} cannot be estimated with m = n = {n}: the output would be discontinuous in the delay; choose m of at most {most}"
     )]
     DelayOfDirectTerm {
-        /// Which input, from 1.
+        /// Number of the input, from 1.
         input: usize,
         /// Degree of A and B.
         n: usize,
@@ -156,7 +156,7 @@ pub enum Error {
         "{what} is constant at {value} in all records, so that nothing can be identified from it; record at least a step up and a step down"
     )]
     Constant {
-        /// Which signal.
+        /// Name of the signal.
         what: String,
         /// Constant value of the signal.
         value: f64,
@@ -168,7 +168,7 @@ pub enum Error {
     Uneven {
         /// Name of the record.
         record: String,
-        /// Which sample, from 0.
+        /// Index of the sample, from 0.
         index: usize,
         /// The step to it.
         step: f64,
@@ -227,7 +227,7 @@ pub enum Error {
     },
 }
 
-/// Said where readings are missing.
+/// Text about missing readings.
 fn without(missing: usize) -> String {
     match missing {
         0 => String::new(),

@@ -124,7 +124,7 @@ pub struct Parameter {
     pub std_error: Option<f64>,
 }
 
-/// A name that the program has: of a type of its own, as serde would borrow a plain reference from what is read.
+/// A name in the program: a separate type, because serde would borrow a plain reference from the input.
 type Name = &'static str;
 
 /// The estimate. `A = 1 + a_1 p + .. + a_n p^n`, with an integrator `A = p + a_2 p^2 + .. + a_n p^n`.

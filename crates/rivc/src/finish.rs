@@ -132,7 +132,7 @@ fn rms(equations: &Equations) -> f64 {
     (squares / equations.samples as f64).sqrt()
 }
 
-/// Measured outputs less residuals; where a reading is missing, what the model says.
+/// Measured outputs minus residuals; the model's output where a reading is missing.
 fn simulated(
     problem: &Problem,
     equations: &Equations,

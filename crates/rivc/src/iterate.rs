@@ -33,7 +33,7 @@ pub(crate) struct Refined {
     pub(crate) model: Model,
     pub(crate) iterations: usize,
     pub(crate) converged: bool,
-    /// Models of the records' noise, where there are any.
+    /// Noise models of the records, if there are any.
     pub(crate) noise: Option<Vec<ArModel>>,
     /// Mean square of the output error on the measured inputs; whitened where there are models of the noise.
     pub(crate) mean_square: f64,
@@ -142,9 +142,8 @@ impl Problem<'_> {
         })
     }
 
-    /// Filter, instruments and, where there are any, the models of the noise, of at most the given order, estimated again until all has
-    /// converged. `reach` limits the change of a delay in one iteration. Without convergence the model with the least output error on the
-    /// way comes back.
+    /// Iterates filter, instruments and, if used, noise models of at most the given order until convergence. `reach` limits the change of a
+    /// delay in one iteration. Without convergence the iterate with the least output error is returned.
     pub(crate) fn refine(
         &self,
         start: Model,

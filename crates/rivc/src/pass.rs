@@ -39,7 +39,7 @@ pub(crate) struct Row<'a> {
     pub(crate) simulated: f64,
     /// The measured output, or its replacement.
     pub(crate) y: f64,
-    /// The reading is missing: the row does not count.
+    /// The reading is missing: the row is not used.
     pub(crate) missing: bool,
 }
 
@@ -54,7 +54,7 @@ pub(crate) struct Pass<'a> {
     /// First sample that is used: the filters begin there.
     pub(crate) first: usize,
     pub(crate) model: &'a Model,
-    /// Whether columns of the estimated delays are there.
+    /// Whether there are columns of the estimated delays.
     pub(crate) with_delays: bool,
 }
 
@@ -81,7 +81,7 @@ impl Pass<'_> {
         Ok(simulated)
     }
 
-    /// Shows every row.
+    /// Passes every row to a function.
     pub(crate) fn rows(&self, bank: &Bank, instruments: Instruments, mut see: impl FnMut(&Row)) {
         let see: &mut dyn FnMut(&Row) = &mut see;
         match self.structure.n {

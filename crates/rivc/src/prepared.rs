@@ -308,8 +308,8 @@ fn needed_alone(structure: &Structure) -> usize {
 }
 
 impl Data {
-    /// Whether a record has readings enough for an offset and initial states of its own beside the largest delay, and, in a loop, samples enough for a model of
-    /// its input: a shorter part of a record is refused by [`estimate`](crate::estimate()), and says little.
+    /// Whether a record has enough readings for its offset and initial states with the largest delay, and, in a loop, enough samples for a
+    /// model of its input: a shorter part of a record is rejected by [`estimate`](crate::estimate()), and contains little information.
     pub fn is_long_enough(&self, structure: &Structure) -> bool {
         let largest = structure.largest_delay();
         let from = |t: f64| self.time.first().is_some_and(|first| t >= first + largest);

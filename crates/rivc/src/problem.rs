@@ -135,8 +135,7 @@ impl Problem<'_> {
         Ok(self.model(&x, &delayed.delays, false))
     }
 
-    /// A few iterations at fixed delays, with models of the noise that stay: the best model on the way, with the mean square of its
-    /// output error.
+    /// A few iterations at fixed delays, with fixed noise models: the best iterate, with the mean square of its output error.
     pub(crate) fn follow(
         &self,
         delayed: &Delayed,

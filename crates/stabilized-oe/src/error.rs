@@ -57,9 +57,9 @@ pub enum Error {
         index: usize,
         /// The value that was given.
         value: f64,
-        /// Its lower bound.
+        /// Lower bound.
         lower: f64,
-        /// Its upper bound.
+        /// Upper bound.
         upper: f64,
     },
     /// A state of the model that is not finite.
@@ -70,7 +70,7 @@ pub enum Error {
         /// The value that was given.
         value: f64,
     },
-    /// The model's output left the range of numbers. The estimates from before are kept.
+    /// The model's output overflows. The estimates before the step are kept.
     #[error(
         "the model's output became {value} over a step of {dt} s; use ExactHold, shorten the step, or bound theta more closely"
     )]

@@ -257,7 +257,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         &self.gain
     }
 
-    /// The gain: to start `P` again, or to project onto rows of one's own. What is changed in `theta^` counts from the next sample on.
+    /// The gain: to restart `P`, or to project onto other rows. Changes of `theta^` take effect from the next sample on.
     pub fn gain_mut(&mut self) -> &mut G {
         &mut self.gain
     }

@@ -29,8 +29,8 @@ pub struct StateVariableFilters<const N: usize> {
 }
 
 impl<const N: usize> StateVariableFilters<N> {
-    /// `lambda^n/(s + lambda)^n`; `lambda` in 1/s, 2 to 10 times the bandwidth of what is identified: lower forgets the fast
-    /// dynamics, higher lets noise through. Both filters start at rest on their first sample.
+    /// `lambda^n/(s + lambda)^n`; `lambda` in 1/s, 2 to 10 times the bandwidth of what is identified: a lower value suppresses the fast dynamics, a
+    /// higher one passes noise. Both filters start at rest on their first sample.
     ///
     /// # Errors
     /// [`Error::Lti`] for a `lambda` that is not above 0 and finite.

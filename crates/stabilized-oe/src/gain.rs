@@ -49,7 +49,7 @@ pub trait Gain<const N: usize, const P: usize> {
     /// Euler's rule takes equality rows by Euler's rule, and stops where `gamma h f'P f` is too large.
     fn take_row(&mut self, row: &CoupledRow<N, P>, dt: f64);
 
-    /// Replaces `theta^` and keeps the rest.
+    /// Replaces `theta^`; the other values do not change.
     ///
     /// # Errors
     /// As of [`ContinuousRls::set_theta`].
@@ -307,7 +307,7 @@ impl<const N: usize, const P: usize, const T: usize, I: Integrator> Gain<N, P>
         let ([information, _], [ratio, _]) =
             row_step(row, ([self.rls.weights(); 2], [self.silent; 2]), dt);
         if ratio == 0.0 {
-            // exact whatever the rule
+            // exact for every rule
             self.rls.relax(&f, row.chi(), information);
         } else {
             self.rls.absorb_with(&f, row.chi(), information, ratio);

@@ -1,4 +1,4 @@
-//! Bounds where none are given, and whether a start lies inside its bounds.
+//! Default bounds, and the check whether a start is inside its bounds.
 
 use ct_constrained::Bounds;
 use nalgebra::SVector;

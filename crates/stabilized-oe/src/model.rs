@@ -29,7 +29,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
         Self { state, held: None }
     }
 
-    /// Length of the step under way, s; 0 before the first.
+    /// Length of the current step, s; 0 before the first.
     pub fn since(&self) -> f64 {
         self.held.map_or(0.0, |held| held.dt)
     }
@@ -53,7 +53,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
         self.held = Some(Held { theta, inputs, dt });
     }
 
-    /// Makes the step under way `dt` seconds longer.
+    /// Extends the current step by `dt` seconds.
     pub fn extend(&mut self, dt: f64) {
         if let Some(held) = &mut self.held {
             held.dt += dt;

@@ -116,7 +116,7 @@ pub(crate) fn window(weights: Weights, dt: f64) -> f64 {
 /// Value that means no bound in the check.
 const FAR: f64 = 1e90;
 
-/// Whether some `(theta, c)` obeys all rows.
+/// Whether some `(theta, c)` satisfies all rows.
 ///
 /// The shortest one, if there is one, is a combination of the rows, `x = sum mu_j m_j`; so the rows are feasible where those of their
 /// Gram matrix, in `mu`, are.

@@ -35,7 +35,7 @@ pub enum FilterBounds<const N: usize> {
         a: [f64; N],
         /// A frequency where it fails, rad/s.
         frequency: f64,
-        /// `Re C^/A0 - d` there.
+        /// `Re C^/A0 - d` at this frequency.
         excess: f64,
         /// `d`
         above: f64,

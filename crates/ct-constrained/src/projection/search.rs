@@ -120,7 +120,7 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
         self.count += 1;
     }
 
-    /// Lets a row go and goes back to the start.
+    /// Removes a row from the active set and restarts.
     fn remove(&mut self, j: usize) {
         let (active, count) = (self.active, self.count);
         self.count = j;
@@ -159,8 +159,8 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
         if scale > 0.0 { 1.0 / scale } else { 1.0 }
     }
 
-    /// Makes a row active whose bound on one side is exceeded, and lets others go that are in its way. `false` where no point obeys
-    /// this row and the active ones.
+    /// Makes a row active that is violated on one side, and removes rows that block the step. `false` if no point satisfies this row and
+    /// the active ones.
     pub(super) fn enter(&mut self, row: usize, sign: f64, excess: f64) -> bool {
         let unit = self.unit(row);
         let mut entering = Active {

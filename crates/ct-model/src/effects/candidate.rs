@@ -50,8 +50,8 @@ pub struct Candidate {
     /// Numbers of the record that the effect's equations contain, by their names in its text ([`Effect::record_numbers`]). If they are
     /// passed to [`candidates_keeping`], the effect means the same for another record.
     pub record_numbers: BTreeMap<&'static str, f64>,
-    /// The candidate of the model file, by its identifier, that this one repeats with states and parameters of its own: a second RC pair. Alone
-    /// the two are the same.
+    /// Identifier of the candidate of the model file that this one repeats with its own states and parameters: a second RC pair. Alone the
+    /// two are equal.
     pub repeats: Option<String>,
     pub(super) fragment: Fragment,
     /// Names of its variables begin with this.
@@ -67,8 +67,8 @@ impl Candidate {
             .collect()
     }
 
-    /// Whether the outputs have a derivative by every size where the effect is not there: it can be scored there, over the starts of its
-    /// shapes.
+    /// Whether the outputs have a derivative with respect to every size at the absent value: then the effect can be scored there, over the
+    /// starts of its shape parameters.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
         let mut roles = self.parameters.iter().map(|parameter| parameter.role);
@@ -232,8 +232,8 @@ pub fn candidates_keeping(
     of_effects(all_effects(), spec, visited, kept)
 }
 
-/// Smooth functions of what the records visit, at all ports of a model: `shape(x,u)`, `course(x)`. They are no candidates of a search. `kept`: as
-/// [`candidates_keeping`] has it.
+/// Smooth functions of the variables, at all ports of a model: `shape(x,u)`, `course(x)`. They are no candidates of a search. `kept`: as in
+/// [`candidates_keeping`].
 #[must_use]
 pub fn shapes_keeping(
     spec: &ModelSpec,

@@ -83,7 +83,7 @@ pub enum Starts {
 pub struct Effect {
     /// Name of the effect: `lag`.
     pub id: &'static str,
-    /// Where it acts.
+    /// Where the effect acts.
     pub place: Place,
     /// Model text of the effect.
     pub text: &'static str,
@@ -105,8 +105,8 @@ const RECORD_NUMBERS: [&str; 10] = [
 ];
 
 impl Effect {
-    /// The constants of its text that take their values from what the data visit: `low`, `duration`. With them the effect means the same on
-    /// another record.
+    /// Constants of the text whose values come from the range of the data: `low`, `duration`. With the same constants the effect means the
+    /// same on another record.
     #[must_use]
     pub fn record_numbers(&self) -> Vec<&'static str> {
         // A test reads every text.

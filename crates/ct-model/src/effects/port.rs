@@ -139,13 +139,13 @@ impl ModelSpec {
         !factors.iter().any(scales)
     }
 
-    /// Whether the equation of a state holds a variable, flows looked through.
+    /// Whether the equation of a state contains a variable, directly or through flows.
     pub(super) fn depends_on(&self, state: usize, on: Variable) -> bool {
         let mut seen = vec![false; self.flows.len()];
         self.holds(&self.states[state].right, on, &mut seen)
     }
 
-    /// Whether an output holds a variable, without a state between.
+    /// Whether an output contains a variable without a state in between.
     pub(super) fn is_read_directly(&self, variable: Variable) -> bool {
         let mut seen = vec![false; self.flows.len()];
         let mut outputs = self.outputs.iter();

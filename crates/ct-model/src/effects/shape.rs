@@ -25,7 +25,7 @@ macro_rules! heights {
     };
 }
 
-/// A function of the signal `x` (or `u`): where it begins, the unit and bound of its heights, and what stands before and after the sum.
+/// A shape function of the signal `x` (or `u`): its interval, the unit and bound of its heights, and the text before and after the sum.
 macro_rules! of_signal {
     ($inputs:literal, $x:literal, $unit:literal, $bound:literal, $before:literal, $behind:literal) => {
         concat!(

@@ -179,7 +179,7 @@ mod tests {
             all.join(".")
         });
         (product.clone(), prop::option::of(product)).prop_map(|(above, below)| match below {
-            // A product below a stroke would need brackets, and there are none in brackets.
+            // A product in the denominator would need nested brackets, which are not supported.
             Some(below) => format!("{above}/{}", below.replace('.', "/")),
             None => above,
         })

@@ -117,7 +117,7 @@ impl Tape {
         tape
     }
 
-    /// Moves what parameters alone define to the front.
+    /// Moves operations on parameters alone to the front.
     fn parameters_first(&mut self, fixed: &[bool]) {
         let mut order: Vec<usize> = (0..self.operations.len()).collect();
         order.sort_by_key(|&i| !fixed[i]);

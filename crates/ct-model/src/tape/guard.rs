@@ -1,4 +1,4 @@
-//! Guards, whose signs decide on branches, and what a branch makes of their answers.
+//! Guards: signs that select branches, and branch conditions on these signs.
 
 use super::Register;
 use crate::expression::Comparison;
@@ -24,7 +24,7 @@ impl Guard {
         }
     }
 
-    /// Whether the difference has left the side for which the answer was given.
+    /// Whether the difference has left the side of the given answer.
     pub fn is_crossed(self, answer: bool, difference: f64) -> bool {
         let positive = match self.comparison {
             Comparison::Less | Comparison::LessOrEqual => !answer,

@@ -114,7 +114,7 @@ impl Builder<'_> {
     ) -> Result<ModelSpec, TextError> {
         let mut initial = self.initial(initial)?;
         let (mut assigned, mut differential) = self.matched(declarations, &equations)?;
-        // Parameters first: what is declared above may stand in what is declared below.
+        // Parameters first: a later declaration may use an earlier one.
         for declaration in declarations {
             match self.names.all[&declaration.name] {
                 Variable::Parameter(_) => self.parameter(declaration)?,

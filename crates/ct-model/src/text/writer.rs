@@ -182,7 +182,7 @@ fn quoted(text: &str) -> String {
     format!("\"{escaped}\"")
 }
 
-/// A description after a blank; nothing where there is none.
+/// A description after a blank; empty if there is none.
 fn description(text: &str) -> String {
     if text.is_empty() {
         return String::new();

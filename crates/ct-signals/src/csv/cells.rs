@@ -162,10 +162,10 @@ impl CellFault {
     }
 }
 
-/// The mend of [`CellFault::Thousands`].
+/// Correction for [`CellFault::Thousands`].
 pub(crate) const THOUSANDS: &str =
     "write decimals with a point and without separators for thousands";
-/// The mend of [`CellFault::NoNumber`].
+/// Correction for [`CellFault::NoNumber`].
 pub(crate) const TIME_AS_NUMBER: &str =
     "the rows before have the time as a number: write it so throughout";
 
@@ -173,7 +173,7 @@ pub(crate) const TIME_AS_NUMBER: &str =
 #[derive(Debug, Clone)]
 pub(crate) struct Numbers {
     decimal_comma_allowed: bool,
-    /// The decimal mark seen so far.
+    /// The decimal mark found so far.
     mark: Option<char>,
     /// A missing sample is refused.
     strict: bool,
@@ -225,7 +225,7 @@ impl Numbers {
         }
     }
 
-    /// A cell of the time's column, which holds a number.
+    /// Reads a cell of the time column that contains a number.
     pub fn time(&mut self, cell: &str) -> Result<f64, CellFault> {
         match self.value(cell) {
             Ok(value) if value.is_finite() => {

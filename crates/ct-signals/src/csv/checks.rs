@@ -14,8 +14,7 @@ const SATURATED_SHARE: f64 = 1.0 / 3.0;
 /// quantised output has many samples at every level, a saturated one only at its limits.
 const SATURATED_RATIO: usize = 4;
 
-/// Inputs, outputs and sampling intervals between its inverse and this can be raised to the powers
-/// that a fit takes, with many digits to spare.
+/// Inputs, outputs and sampling intervals between the inverse of this and this do not overflow in the powers that a fit computes.
 const LARGEST: f64 = 1e15;
 
 impl Table {

@@ -58,7 +58,7 @@ pub struct ReadSummary {
     pub missing: Vec<MissingSamples>,
     /// Columns that were converted.
     pub converted: Vec<Converted>,
-    /// The interval of the grid on which the record was put \[s\].
+    /// Interval of the grid after resampling \[s\].
     pub resampled: Option<f64>,
 }
 

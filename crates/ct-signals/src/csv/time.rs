@@ -40,7 +40,7 @@ impl Times {
         // Dates with an offset are shown, and limits of a part understood, with that offset.
         let zone = columns.time_zone.as_deref().or_else(|| offset_of(cell));
         let reader = match TimestampReader::new(format, zone, [cell]) {
-            // The rest of the column tells day and month apart.
+            // The rest of the column distinguishes day and month.
             Err(TimestampError::DayOrMonth { .. }) => {
                 let cells = all();
                 TimestampReader::new(format, zone, cells.iter().map(String::as_str))
@@ -100,7 +100,7 @@ impl Times {
             });
         }
         let mend = match self {
-            // An hour comes twice where clocks are set back.
+            // An hour occurs twice when clocks are set back.
             Self::Dates { .. } if previous - time <= 3600.0 => {
                 "name the zone with time_zone = \"...\" under [columns] where clocks were set back, or sort the rows by time"
             }

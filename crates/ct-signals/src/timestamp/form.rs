@@ -38,14 +38,14 @@ pub(super) enum DateForm {
 /// Fields of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Fields {
-    /// Days since 1970-01-01; `None` where there is no date.
+    /// Days since 1970-01-01; `None` without a date.
     pub days: Option<i64>,
     /// Seconds of the day; without a date there may be more than a day of them.
     pub seconds: i64,
     pub nanoseconds: u32,
     /// Seconds that local time is ahead of UTC.
     pub offset: Option<i32>,
-    /// Whether there is a time of day.
+    /// Whether the cell has a time of day.
     pub timed: bool,
 }
 

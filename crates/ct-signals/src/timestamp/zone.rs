@@ -311,7 +311,7 @@ fn known_around(zone: &TimeZone, seconds: i64, offset: Offset) -> KnownOffset {
     }
 }
 
-/// `:07.25`, or nothing where there is nothing.
+/// Text such as `:07.25`, or empty for zero.
 pub(super) fn seconds_text(seconds: u8, nanoseconds: u32) -> String {
     let mut text = String::new();
     if seconds != 0 || nanoseconds != 0 {

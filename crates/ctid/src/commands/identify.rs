@@ -44,8 +44,8 @@ pub(super) struct Identify {
     /// Records that are not fitted, on which the models are tried
     #[arg(long, value_name = "TEST.csv", num_args = 1..)]
     test: Vec<PathBuf>,
-    /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used; beside a
-    /// linear model of your own stands its own transfer function
+    /// Model file: source of the columns, the hold of the input and, for methods for a loop, the controller; for a linear model of your
+    /// own, the identified model is compared with its transfer function
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
     /// For a linear model of your own with several inputs: the input that is identified
@@ -54,8 +54,8 @@ pub(super) struct Identify {
     /// For a linear model of your own with several outputs: the output that is identified
     #[arg(long, value_name = "NAME", requires = "model")]
     output: Option<String>,
-    /// The columns' names, where their first letters do not tell; several inputs with + between them, for srivc and rivc. Without a fourth name there is
-    /// no reference
+    /// Names of the columns, if their first letters are not sufficient; several inputs with + between them, for srivc and rivc. Without a
+    /// fourth name there is no reference
     #[arg(long, value_name = "TIME,INPUT,OUTPUT[,REFERENCE]", value_parser = columns)]
     columns: Option<Columns>,
     /// Hold of the input between samples

@@ -23,7 +23,7 @@ use crate::progress::Bar;
 use crate::symptoms::Sought;
 use crate::{Error, catalogue, check, design, edit, monitor, serve, tour};
 
-/// Says which physical effect a model of measured data is missing.
+/// Finds the physical effect that a model of measured data is missing.
 #[derive(Debug, Parser)]
 #[command(
     version,
@@ -40,9 +40,9 @@ enum Command {
     Compare(Compare),
     /// Find the missing effect: score the catalogue, confirm by refit, report what the data can show
     Diagnose(Diagnose),
-    /// Add an effect to a model file; comments and layout stay
+    /// Add an effect to a model file; comments and layout are preserved
     Add(Add),
-    /// Remove an effect from a model file; comments and layout stay
+    /// Remove an effect from a model file; comments and layout are preserved
     Remove(Remove),
     /// List the catalogue of effects, or describe one
     Effects(Effects),
@@ -52,7 +52,7 @@ enum Command {
     Simulate(Simulate),
     /// Write the fitted model as Modelica, or the curves and residuals of its fit as CSV
     Export(Export),
-    /// Propose the next experiment, which tells two effects apart
+    /// Propose the next experiment, which distinguishes two effects
     Design(design::Arguments),
     /// Watch a running plant: rows on standard input; alarms out when the model stops fitting, with the effect it looks like
     Monitor(monitor::Arguments),
@@ -195,7 +195,7 @@ impl Results {
     }
 }
 
-/// Writes the files, then says what was found and what was written.
+/// Writes the files, then prints the findings and the names of the files.
 pub(crate) fn finish(
     found: &impl Found,
     text: &str,

@@ -1,4 +1,4 @@
-//! `ctid design`: the next experiment, which tells two effects apart.
+//! `ctid design`: the next experiment, which distinguishes two effects.
 
 pub mod text;
 

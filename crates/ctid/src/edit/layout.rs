@@ -40,8 +40,7 @@ pub(super) fn push(document: &mut DocumentMut, id: &str) {
     effects.set_trailing_comma(comma);
 }
 
-/// Takes an effect out of the list. What stands before an entry may be the comment of the entry
-/// above it, so it is handed on to what follows.
+/// Removes an effect from the list. Text before an entry may be the comment of the entry above it, so the text is moved to the next entry.
 pub(super) fn take_out(effects: &mut Array, id: &str) -> bool {
     let Some(index) = effects.iter().position(|on| on.as_str() == Some(id)) else {
         return false;
@@ -69,7 +68,7 @@ pub(super) fn take_out(effects: &mut Array, id: &str) -> bool {
     true
 }
 
-/// Writes `where = "..."` into the `[effect.X]` table, made where there is none.
+/// Writes `where = "..."` into the `[effect.X]` table, which is created if necessary.
 pub(super) fn set_place(document: &mut DocumentMut, id: &str, word: &str) -> Option<()> {
     let mut tables = Table::new();
     tables.set_implicit(true);

@@ -1,5 +1,5 @@
-//! `ctid add` and `ctid remove`: they edit the `effects = [...]` line of a model file and leave
-//! everything else as it stands, comments and layout included.
+//! `ctid add` and `ctid remove`: they edit the `effects = [...]` line of a model file and do not change anything else, including comments
+//! and layout.
 
 mod layout;
 pub(crate) mod own;
@@ -84,7 +84,7 @@ pub struct Edited {
 /// Serialises changes: of two simultaneous changes, as from two tabs of `ctid serve`, one would be lost.
 static CHANGING: Mutex<()> = Mutex::new(());
 
-/// Whoever writes into the file meanwhile, such as an editor, is read so often again.
+/// Number of attempts if another program, such as an editor, writes to the file at the same time.
 const READINGS: usize = 5;
 
 /// Changes a file's text; its kind of line ends stays. What others have written there meanwhile is kept: the change is then made to
@@ -287,7 +287,7 @@ pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Er
     Ok(Edited { text, done })
 }
 
-/// ` at the upper vessel`, ` at the sensor of the lower tank`, where the plant has several; `assumed` when nobody said which.
+/// ` at the upper vessel`, ` at the sensor of the lower tank`, if the plant has several; `assumed` if the user did not name a place.
 fn place_of(model: &ModelFile, placed: Placed, assumed: bool) -> String {
     let Some(name) = placed.place_name(model.plant, &model.known) else {
         return String::new();

@@ -10,7 +10,7 @@ use crate::report::rounded;
 use crate::term_file::TermFile;
 use crate::{Error, model_file, term_file};
 
-/// The text with a term whose table is there already.
+/// The text with a term whose table already exists.
 pub(super) fn with_waiting_term(
     file: &str,
     text: &str,

@@ -290,7 +290,7 @@ pub(super) fn check_terms(
     Ok(())
 }
 
-/// Enough rows for the parameters; every record brings initial levels of its own.
+/// Checks that there are enough rows for the parameters; every record has its own initial levels.
 pub(super) fn check_rows(model: &ModelFile, records: &[Record]) -> Result<(), Error> {
     let Some(first) = records.first() else {
         return Ok(());

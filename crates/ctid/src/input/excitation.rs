@@ -29,7 +29,7 @@ const STANDARD_ERRORS: f64 = 4.0;
 /// Properties that a record cannot show.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ExcitationWarning {
-    /// The command of a record never moves.
+    /// The command of a record is constant.
     Still {
         /// The record.
         record: String,
@@ -47,7 +47,7 @@ pub enum ExcitationWarning {
     NoAnswer {
         /// The record.
         record: String,
-        /// The output, where there are several.
+        /// The output, if there are several.
         output: Option<String>,
         /// Range of the output.
         range: f64,
@@ -332,7 +332,8 @@ mod tests {
 
     #[test]
     fn an_output_that_answers_in_noise_does() {
-        // Slow and fast beside the sampling and the steps, as large as the noise or half of it; and without noise to speak of.
+        // Slow and fast compared with the sampling and the steps, with noise as large as the response or half of it; and with almost no
+        // noise.
         for (gain, tau, held) in [
             (1.0, 10.0, 20),
             (0.7, 200.0, 1000),

@@ -224,7 +224,7 @@ impl Files {
     }
 }
 
-/// Counts the times of all records with dates from the first of these dates.
+/// Measures the times of all records with dates from the first of these dates.
 pub fn on_one_clock(records: &mut [Record]) {
     let starts = records.iter().filter_map(|record| record.calendar.as_ref());
     let Some(first) = starts.map(|calendar| calendar.start).min() else {

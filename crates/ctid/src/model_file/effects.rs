@@ -25,8 +25,7 @@ pub(super) struct Setting {
 }
 
 impl Source<'_> {
-    /// The `[effect.X]` tables; a table of an effect that is not on is checked too, and kept for
-    /// the day on which it is added.
+    /// The `[effect.X]` tables; a table of an effect that is not in the model is checked too, and kept for later use.
     pub(super) fn effect_tables(
         &self,
         (plant, known): (Plant, &Known),
@@ -230,7 +229,7 @@ pub(super) fn any_scales(second_pump: bool) -> Scales {
     scales
 }
 
-/// A structure to ask for names and places, a second pump running or not.
+/// A structure for queries of names and places, with a second pump or without.
 pub(crate) fn any_structure(plant: Plant, known: &Known, second_pump: bool) -> Structure {
     Structure::new(plant, known.clone(), any_scales(second_pump))
 }

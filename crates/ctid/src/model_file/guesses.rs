@@ -1,4 +1,4 @@
-//! First guesses, and what is known of parameters beside the records.
+//! First guesses and priors of parameters.
 
 use std::collections::BTreeMap;
 

@@ -146,7 +146,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
     })?;
     let text = String::from_utf8(bytes)
         .map_err(|_| cannot("the model file is not UTF-8 text; save it as UTF-8".to_string()))?;
-    // Some editors put a byte-order mark in front.
+    // Some editors write a byte-order mark at the beginning.
     Ok(text
         .strip_prefix('\u{feff}')
         .map(str::to_string)

@@ -33,7 +33,7 @@ impl Source<'_> {
 
     /// The parser's error in one line, with the key that was probably meant.
     pub(crate) fn syntax(&self, error: &toml::de::Error) -> Error {
-        // Words of the file stand between backquotes.
+        // Words of the file are between backquotes.
         let parts = error.message().trim().split('`').enumerate();
         let parts = parts.map(|(i, part)| {
             if i % 2 == 1 {

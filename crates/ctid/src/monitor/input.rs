@@ -292,7 +292,7 @@ fn may_follow_a_part(bad: &BadLine) -> bool {
     )
 }
 
-/// Whether no later row will be understood either, until the model file says more.
+/// Whether all later rows will cause this error too, until the model file has more information.
 fn never_understood(error: &TimestampError) -> bool {
     matches!(
         error,

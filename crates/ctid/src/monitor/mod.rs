@@ -47,7 +47,7 @@ pub struct Arguments {
     /// Mean number of rows of the input between false alarms, of all kinds together
     #[arg(long, value_name = "N", default_value_t = Settings::default().rows_between_false_alarms, allow_negative_numbers = true)]
     false_alarm_every: f64,
-    /// Fewest rows to learn from, 100 to 1024
+    /// Least number of rows for learning, 100 to 1024
     #[arg(long, value_name = "N", default_value_t = Settings::default().learning_rows)]
     learn: usize,
 }
@@ -155,14 +155,14 @@ struct Session<'a> {
     monitor: Monitor<'a>,
     /// Conversion of each input and output of a user's own model to the model's unit.
     conversions: Vec<Option<Conversion>>,
-    /// The monitor goes on from a saved state.
+    /// Whether the monitor continues from a saved state.
     restored: bool,
     rows: Option<Rows>,
     /// Lines before the first row that were none.
     parts: usize,
     line: u64,
     trouble: Trouble,
-    /// The rows' way to write times has been looked at.
+    /// Whether the time format of the rows was checked.
     timed: bool,
     /// Rows at the beginning that the restored monitor has already processed.
     seen_before: u64,

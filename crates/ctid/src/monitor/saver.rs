@@ -12,7 +12,7 @@ use crate::{Error, one_line};
 const SAVED_EVERY: Duration = Duration::from_secs(60);
 
 pub(super) struct Saver {
-    /// None where no state is kept.
+    /// None if no state is saved.
     path: Option<PathBuf>,
     tried: Instant,
     /// Rows of the state that is in the file.

@@ -18,7 +18,7 @@ const DRAWN: usize = 400;
 pub(super) const DRAWN_EVERY: Duration = Duration::from_millis(250);
 /// Lines of a plot.
 const ROWS: usize = 6;
-/// The plot shows at least so many standard deviations.
+/// Least range of the plot in standard deviations.
 const LEAST: f64 = 4.0;
 
 pub(super) struct Screen {
@@ -110,7 +110,7 @@ impl Screen {
         ));
     }
 
-    /// The innovations of a row, where there are any.
+    /// Adds the innovations of a row, if there are any.
     pub(super) fn innovations(&mut self, time: f64, innovations: &[Option<Innovation>]) {
         if self.term.is_none() {
             return;
@@ -130,7 +130,7 @@ impl Screen {
         }
     }
 
-    /// Takes the plot away.
+    /// Removes the plot.
     pub(super) fn clear(&mut self) {
         if let Some(term) = &self.term {
             let _ = term.clear_last_lines(self.drawn);
@@ -138,7 +138,7 @@ impl Screen {
         }
     }
 
-    /// Draws the plot again where something has come; nothing where standard error is no terminal.
+    /// Redraws the plot after new data; no plot if standard error is no terminal.
     pub(super) fn draw(&mut self, monitor: &Monitor) {
         let learning = matches!(monitor.progress(), Progress::Learning(_));
         if self.term.is_none() || !(self.fresh || learning) {
@@ -188,7 +188,7 @@ impl Screen {
     }
 }
 
-/// The line above the plot. A terminal would break a longer one in two, and one of them would stay when the plot is taken away.
+/// The line above the plot. A terminal would break a longer line, and a part of it would stay when the plot is removed.
 fn heading(
     of: Option<&str>,
     residual: f64,

@@ -26,7 +26,7 @@ pub struct Curves {
     pub record: String,
     /// The output's name.
     pub output: String,
-    /// Its unit.
+    /// Unit of the values.
     pub unit: String,
     /// Length of the record \[s\].
     pub length: f64,
@@ -62,7 +62,7 @@ pub struct Comparison {
     pub curves: Vec<Curves>,
 }
 
-/// Fits the model and says how far it is off. Of the options the seed, the limit on the time and the interruption flag are used.
+/// Fits the model and computes its errors. The seed, the time limit and the interruption flag of the options are used.
 ///
 /// # Errors
 /// Where nothing can be fitted, with the file that is to blame.

@@ -15,7 +15,7 @@ use crate::{Error, names};
 /// The tables of effects, by identifier.
 pub(super) type RawEffects = BTreeMap<Spanned<String>, BTreeMap<Spanned<String>, Setting>>;
 
-/// The key of the numbers of the record, beside the names of parameters.
+/// Key of the numbers of the record, next to the names of parameters.
 pub(crate) const RECORD: &str = "record";
 /// The key of the parameters that are not fitted.
 const FIXED: &str = "fixed";

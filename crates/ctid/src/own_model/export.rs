@@ -120,7 +120,7 @@ fn names_of(records: &[Record]) -> Vec<String> {
     names
 }
 
-/// The model with the values of its text and of `[known]` or, where there are records, those of a fit to them.
+/// The model with the values of its text and of `[known]` or, with records, those of a fit to them.
 ///
 /// # Errors
 /// One line that names the file, the place and the correction.

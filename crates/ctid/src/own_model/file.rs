@@ -197,7 +197,7 @@ impl OwnModelFile {
         self.gathered(all, files.data.len(), self.time_unit(&files.data[0])?)
     }
 
-    /// Readings of records, of which so many come first that are fitted, as the model takes them; `time_unit`: seconds in one of the model's.
+    /// Records in the form of the model, of which the first `fitted` ones are fitted; `time_unit`: seconds in one unit of the model's time.
     ///
     /// # Errors
     /// Where a column's unit is none of its signal.

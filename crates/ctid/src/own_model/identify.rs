@@ -58,7 +58,7 @@ impl<T: Found> Found for Beside<'_, T> {
 }
 
 impl<'f> OneByOne<'f> {
-    /// The input and the output that were chosen, or the only ones.
+    /// The chosen input and output, or the only ones.
     ///
     /// # Errors
     /// Where the model is not linear, or there are several and none was chosen, or none has this name.

@@ -91,7 +91,7 @@ pub(crate) fn like(file: &OwnModelFile, sought: &Sought, look: Look) -> Result<S
     Ok(by_effect(&found, &words, look))
 }
 
-/// `ctid check`: the ports with the names of what can act there, a few lines.
+/// `ctid check`: a short list of the ports with the names of their effects.
 pub(crate) fn summary(spec: &ModelSpec, look: Look) -> String {
     let all = candidates(spec, &Visited::nominal(spec));
     let ports = [

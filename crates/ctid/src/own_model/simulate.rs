@@ -68,8 +68,7 @@ pub(crate) fn simulate(
     Ok((found, summaries))
 }
 
-/// A model with its effects in it on the inputs of a record, of which the initial states are fitted to so many first readings. `path` is
-/// what is named in the error.
+/// A model with its effects on the inputs of a record, with initial states fitted to the first readings. `path` is the name in errors.
 ///
 /// # Errors
 /// Where the simulation does not go on.

@@ -69,9 +69,9 @@ pub(super) struct Curve {
     pub colour: Colour,
     pub dash: &'static str,
     pub width: f64,
-    /// A symbol where there are points instead of a line.
+    /// Symbol of points without a line.
     pub marker: Option<&'static str>,
-    /// Whether a value stands until the next.
+    /// Whether a value is held until the next one.
     pub held: bool,
     pub legend: bool,
     pub x: Vec<f64>,

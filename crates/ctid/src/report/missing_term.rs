@@ -7,8 +7,7 @@ use super::page::{figure, section};
 use super::tables::table;
 use super::text::{escape, prose, unit};
 
-/// A function that stands for what is missing. The page and the report draw it as they draw the unknown of a plant: the fields that both have
-/// are called the same.
+/// The unexplained error as a function. The page and the report draw it like the unknown of a plant: common fields have the same names.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct MissingTerm {
     /// Identifier of the function: `shape(T,u)`.

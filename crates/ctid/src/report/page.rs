@@ -10,7 +10,7 @@ pub(crate) const PLOTS: &str = include_str!("plots.js");
 /// plotly.js, gzipped, in base64.
 pub(crate) const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
 
-/// Stands where the plots need a script.
+/// Message on a page whose scripts do not run.
 pub(super) const NOTICES: &str = "<noscript><p class=\"notice\">The plots need a browser that runs scripts; \
      the findings and the tables do not.</p></noscript>\n\
      <p class=\"notice\" id=\"no-plots\" hidden></p>\n";

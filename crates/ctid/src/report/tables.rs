@@ -97,7 +97,7 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
     format!("<p>Added to the model, in this order:</p>\n<ol class=\"groups\">\n{items}</ol>\n")
 }
 
-/// The acceptance test in numbers, and why the effects are not the whole answer.
+/// The acceptance test in numbers, and the reasons for a partial explanation.
 pub(super) fn acceptance(diagnosis: &Diagnosis) -> String {
     let Some(test) = &diagnosis.acceptance else {
         return String::new();

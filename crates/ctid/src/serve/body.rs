@@ -1,4 +1,4 @@
-//! The body of a request, read whole: so many bytes, which keep coming, and so many over all that are under way.
+//! Reading of a request's body, with limits for its size, its transfer time, and the total of all transfers.
 
 use std::future::poll_fn;
 use std::pin::Pin;
@@ -93,7 +93,7 @@ mod tests {
             .map_err(|refusal| refusal.to_string())
     }
 
-    /// A body of which nothing ever comes.
+    /// A body without any data.
     struct Silent;
 
     impl HttpBody for Silent {

@@ -1,9 +1,7 @@
 //! Connections: their number is limited, and an idle connection does not block others.
 //!
-//! On a new connection nobody has shown yet that he knows the secret. Such connections have places of their own, so that other users of the
-//! machine, who can connect too, take none of the owner's; they end with their first answer, a refusal. Where all places are taken the next
-//! connection is let in and the one that was idle for the longest time is closed: of those that do not know the secret the oldest,
-//! whatever it sends.
+//! A new connection has not sent the access key yet. Such connections have a separate limit, so that other users of the machine cannot use up the owner's connections; without the key they end with their
+//! first answer, an error. If the limit is reached, a new connection is accepted and the one that was idle for the longest time is closed; among connections without the key, the oldest one.
 
 use std::convert::Infallible;
 use std::io::{self, IoSlice};

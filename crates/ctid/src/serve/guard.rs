@@ -1,12 +1,12 @@
-//! Who may ask: who knows the secret of this run, on pages that this server has sent.
+//! Access control: requests need the access key of this run, and have to come from pages of this server.
 //!
-//! Every address begins with the secret, which stands in the address that is printed and nowhere else: other users of the machine
-//! can connect, but without it nothing is answered. It is no cookie, which a browser would also send to the servers of others at
+//! Every address begins with the access key, which is only in the printed address: other
+//! users of the machine can connect, but get no answer without the key. It is no cookie, which a browser would also send to the servers of others at
 //! other ports of this machine.
 //!
-//! A page of another site that is open in the same browser can send requests to any local server. Its requests carry its own
-//! `Origin`, which is refused. A name that it has pointed at 127.0.0.1 after it was loaded stands in `Host`, which is refused too.
-//! And it does not know the secret.
+//! A page of another site that is open in the same browser can send requests to any local server. Its requests have its own `Origin`,
+//! which is rejected. A host name that it resolves to 127.0.0.1 later is in `Host`, which is rejected too.
+//! And it does not have the access key.
 
 use std::hint::black_box;
 

@@ -33,7 +33,7 @@ pub(super) enum Task {
     Compare,
     /// Fits the model with these effects instead of its own; the stored model does not change.
     Chain(Vec<(String, Option<String>)>),
-    /// Searches what is missing; at most so many effects, where that is said.
+    /// Searches missing effects, optionally at most a given number.
     Diagnose {
         max_effects: Option<NonZeroU8>,
         effort: EffortLevel,
@@ -140,7 +140,7 @@ impl Work {
     }
 }
 
-/// Begins a computation in place of the one that runs; what it gives is put into the session.
+/// Starts a computation and stops the running one; its result is stored in the session.
 ///
 /// # Errors
 /// Where records and model do not allow it.
@@ -250,7 +250,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                 }
             }
         }));
-        // The tab may be gone, and so is whoever waits.
+        // The tab may be closed.
         let Some(shared) = place.upgrade() else {
             return;
         };

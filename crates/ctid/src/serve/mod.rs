@@ -104,7 +104,7 @@ const FILES_AT_ONCE: usize = 4;
 /// Other requests of the largest size.
 const REQUESTS_AT_ONCE: usize = 64;
 
-/// What may be typed.
+/// Command line options.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Records (CSV) that are loaded at the start; others can be dropped on the page
@@ -132,7 +132,7 @@ struct App {
 }
 
 impl Arguments {
-    /// Serves the page until the process ends; the address goes to `out` first.
+    /// Runs the server until the process ends; prints the address to `out` first.
     pub(crate) fn run(&self, out: &mut dyn Write) -> Result<(), Error> {
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)

@@ -83,7 +83,7 @@ pub(super) struct Session {
     /// Serialises the fits of a user's own model, including stopped ones.
     pub own_fits: Arc<Mutex<()>>,
     pub records: Vec<Upload>,
-    /// Counts the changes of the records.
+    /// Number of changes of the records.
     pub data: u64,
     /// Number of changes of the displayed state.
     pub version: u64,
@@ -327,7 +327,7 @@ impl Session {
         Ok(())
     }
 
-    /// Takes a record in place of all others.
+    /// Replaces all records by one.
     pub(super) fn take_alone(&mut self, upload: Upload) {
         self.records = vec![upload];
         self.data_changed();

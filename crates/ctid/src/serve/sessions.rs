@@ -10,10 +10,9 @@ use super::upload::Upload;
 
 /// Largest number of tabs; the tab with the oldest request is dropped.
 const MOST: usize = 8;
-/// Bytes over all tabs: records as they were sent and as they were read, and what was computed. One tab may hold more, and is then
-/// alone.
+/// Limit in bytes over all tabs: records as sent and as read, and results. A single tab may use more.
 const BYTES: usize = 512 << 20;
-/// A computation whose page has not asked for so long is nobody's. Browsers let a page in the background ask once a minute.
+/// A computation is stopped if its page sends no request for this time. Browsers let a page in the background send one request per minute.
 const ALONE: Duration = Duration::from_secs(180);
 
 /// A tab's session.
@@ -92,7 +91,7 @@ impl Sessions {
         while held() > bytes && last().is_some_and(|id| self.forget_oldest(&id)) {}
     }
 
-    /// Stops what nobody waits for.
+    /// Stops computations of closed pages.
     pub(super) fn stop_abandoned(&self) {
         self.stop_unseen_for(ALONE);
     }

@@ -8,7 +8,7 @@ use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 use crate::edit::{self, Edited};
 use crate::{Error, model_file};
 
-/// The part of a model file that the form shows. Everything may be missing; it is checked as a model file once it is written.
+/// The part of a model file in the form. Every entry is optional; the content is checked as a model file after writing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(super) struct Settings {

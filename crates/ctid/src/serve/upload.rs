@@ -101,7 +101,7 @@ impl Upload {
                 read.clone().map(|(record, _)| record)
             }
             _ => {
-                // Whether a fitted record has to move depends on the others.
+                // Whether a fitted record has to change depends on the other records.
                 let reading = parse_csv(&self.name, &self.content, columns, options);
                 let read = reading.map(|reading| (Arc::new(reading.record), reading.summary));
                 let read = read.map_err(|error| error.to_string());

@@ -89,7 +89,7 @@ pub struct Simulated {
     pub states: Vec<(String, f64)>,
     /// Source of the initial states.
     pub states_from: StateSource,
-    /// The probability with which each band holds.
+    /// Coverage of each band.
     pub level: f64,
     /// The outputs, in the order of the model.
     pub outputs: Vec<SimulatedOutput>,
@@ -139,7 +139,7 @@ pub(crate) fn csv_text(rows: impl Iterator<Item = Vec<String>>) -> String {
     String::from_utf8(bytes).unwrap_or_default()
 }
 
-/// A number as a cell; nothing where there is none.
+/// A number as a cell; empty for NaN.
 pub(crate) fn cell(value: f64) -> String {
     if value.is_nan() {
         String::new()

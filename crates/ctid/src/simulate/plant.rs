@@ -257,7 +257,8 @@ fn simulated(
     })
 }
 
-/// The initial levels: fitted to the first readings, on more of them where these do not tell, or at rest; `None` where there is no rest.
+/// The initial levels: fitted to the first readings, to more of them if these are not sufficient, or at rest; `None` without a steady
+/// state.
 fn states(
     setup: &Setup,
     parameters: &[f64],

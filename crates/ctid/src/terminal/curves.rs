@@ -1,4 +1,4 @@
-//! The plots: measurement and model over time, and what lies between them.
+//! Plots of measurement and model over time, and of the residual.
 
 use console::Style;
 use missing_effect::{Diagnosis, Shown, Step};
@@ -57,7 +57,7 @@ fn in_unit(unit: &str) -> String {
     }
 }
 
-/// `, upper` where there are several outputs.
+/// ` upper` after a comma, if there are several outputs.
 fn of_output(diagnosis: &Diagnosis, output: usize) -> String {
     let name = diagnosis.outputs.get(output);
     let name = name.filter(|_| findings::several(diagnosis));

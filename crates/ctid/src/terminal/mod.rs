@@ -79,7 +79,7 @@ pub(crate) fn header(diagnosis: &Diagnosis, look: Look) -> String {
                 &diagnosis.input_unit,
             ),
         ];
-        // Further outputs stand below the first.
+        // Further outputs are listed below the first.
         for (name, output) in diagnosis.outputs.iter().zip(&record.outputs) {
             let range = range(output, &diagnosis.output_unit);
             row.resize(heading.len() - 1, String::new());

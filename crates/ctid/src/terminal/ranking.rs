@@ -120,7 +120,7 @@ fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<S
     table(&sides, &rows)
 }
 
-/// `rim 21.30 ± 0.12 cm`, or without the error, to the digits that it leaves.
+/// `rim 21.30 ± 0.12 cm`, or without the error, with the significant digits.
 fn size(parameter: &Parameter, with_error: bool) -> String {
     let name = parameter.name.rsplit('.').next().unwrap_or_default();
     let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);

@@ -1,4 +1,4 @@
-//! Two fitted effects, and what either would show in an experiment.
+//! Two fitted effects, and their responses in an experiment.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ pub(super) struct Comparison<'s, 'a> {
     known: [Triangle; 2],
     /// The existing records as each has them, free of noise.
     simulated: [Vec<Record>; 2],
-    /// `before[i]`: misfit of the other to what `i` shows.
+    /// `before[i]`: misfit of the other model to the response of model `i`.
     before: [f64; 2],
     /// Range of each output.
     visited: Vec<(f64, f64)>,

@@ -105,7 +105,7 @@ pub enum Refused {
         /// The length \[s\].
         duration: f64,
     },
-    /// The limit on the time has passed before anything could be said.
+    /// The time limit has passed before there was a result.
     #[error(
         "the time did not suffice to fit both effects and to try experiments; allow more (--effort thorough), or give fewer rows or a shorter --duration"
     )]

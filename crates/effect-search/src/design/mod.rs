@@ -1,4 +1,4 @@
-//! The next experiment: the one that tells two effects apart which the records leave undecided.
+//! Design of the next experiment, which distinguishes two effects that the records do not distinguish.
 //!
 //! Each of the two is fitted to the records. Either is then simulated with sequences within the user's limits, at one input or at several at
 //! once, and it is computed how far the other stays behind what they show ([`least`]). The most promising are confirmed by refits: the

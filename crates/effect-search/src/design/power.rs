@@ -97,8 +97,8 @@ pub fn times_as_long(power: &Power, ahead: [f64; 2]) -> Option<f64> {
     Some(times(0).max(times(1))).filter(|times| times.is_finite() && *times > 1.0)
 }
 
-/// The order of two experiments, the better one first: by power as far as it is of use, then by excursion, then by power. Each with how far an
-/// output or a level leaves what it visited in the records, as a part of that.
+/// Order of two experiments, the better one first: by power up to a sufficient value, then by excursion, then by power. The numbers are the
+/// excursions outside the range of the records, as a share of that range.
 #[must_use]
 pub fn by_use((a, out_a): (&Power, f64), (b, out_b): (&Power, f64)) -> Ordering {
     let useful = |power: &Power| power.power.min(PLENTY);

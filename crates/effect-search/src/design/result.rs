@@ -32,7 +32,7 @@ pub struct InputRange {
     pub high: f64,
     /// The range is what the records visited, as none was given.
     pub visited: bool,
-    /// Largest change in a second, where there is a limit.
+    /// Largest change per second, if there is a limit.
     pub slew: Option<f64>,
 }
 
@@ -92,7 +92,7 @@ pub struct Sequences {
 /// An input of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InputSequence {
-    /// Its name in the model.
+    /// Name of the input in the model.
     pub input: String,
     /// Its unit.
     pub unit: String,

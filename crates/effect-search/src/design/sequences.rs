@@ -29,7 +29,7 @@ pub struct Room {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// What the longest record had, once more.
+    /// Repetition of the longest record's experiment.
     Again,
     /// Two levels, changed after every clock period.
     Step,

@@ -57,7 +57,7 @@ impl Series {
         self
     }
 
-    /// The rows whose value is there.
+    /// The present rows.
     fn there(&self) -> Self {
         let only = |signal: &Vec<f64>| {
             let rows = signal.iter().zip(&self.values);

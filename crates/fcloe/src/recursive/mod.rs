@@ -246,9 +246,9 @@ impl RecursiveEstimator for RecursiveFcloe {
     type Covariance = DMatrix<f64>;
     type Error = Error;
 
-    /// Learns from y at this sample, then moves the model over dt with the drive held. Where y is missing (NaN) or of
-    /// no sense the model moves on all the same; where the drive is not finite, the last one is held. Where the model's states
-    /// leave the range of numbers it begins again from rest; the outcome says what was done with the sample. Steps are 1e-40 to
+    /// Updates the estimates with y at this sample, then simulates the model over dt with the drive held.
+    /// If y is missing (NaN) or implausible, the model is simulated without an update; if the drive is not finite, the last value is held. If the model's states overflow, the
+    /// model restarts from rest; the outcome shows how the sample was used. Steps are 1e-40 to
     /// 1e30 of the time's unit, and no longer than 10 000 time constants of the fastest root.
     fn update(&mut self, sample: &LoopSample, dt: f64) -> Innovation {
         let point = self.settings.operating_point;

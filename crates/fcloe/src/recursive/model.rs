@@ -159,7 +159,7 @@ impl MovingLoop {
         for _ in 0..substeps as usize {
             self.term.copy_from_slice(&self.state);
             let (mut input, mut size) = (drive, 1.0);
-            // Blocks of equal roots make the terms grow with k^2 beside the power.
+            // Blocks of equal roots make the terms grow with k^2 in addition to the power.
             let mut k = 1.0;
             while size * k * k > 1e-18 {
                 self.slope(input);

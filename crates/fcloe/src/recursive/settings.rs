@@ -41,7 +41,7 @@ pub struct RecursiveSettings {
     pub step_limit: f64,
     /// No parameter grows above its scale times this factor, and `a_n` does not fall below its scale divided by this factor; above 1.
     pub range: f64,
-    /// The levels about which the model holds, subtracted from the signals.
+    /// The levels around which the model is valid; they are subtracted from the signals.
     pub operating_point: OperatingPoint,
 }
 

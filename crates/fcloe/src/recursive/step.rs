@@ -83,7 +83,7 @@ impl RecursiveFcloe {
         debug_assert!(kept.is_ok());
     }
 
-    /// Whether `tried` may be the estimates. Moves `p`.
+    /// Whether `tried` is an acceptable estimate. Updates `p`.
     fn allowed(&mut self) -> bool {
         let range = self.settings.range;
         let inside = self

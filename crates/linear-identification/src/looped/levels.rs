@@ -20,7 +20,7 @@ const LONG: f64 = 3.0;
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum LevelChoice {
-    /// Estimated by fcloe; else the rows before the reference moves first, or the means
+    /// Estimated by fcloe; otherwise the means of the rows before the first change of the reference, or of all rows
     #[default]
     Auto,
     /// Estimated with the parameters, by fcloe alone
@@ -56,8 +56,8 @@ impl Task<'_> {
         })
     }
 
-    /// Whether output and command are constant too while the drive does. Under an integrator the output stands where the reference is.
-    /// Where nothing says that, the rows have to be enough for a slow transient to be seen.
+    /// Whether output and command are constant as long as the drive is. With an integrator the output at rest equals the reference. Without
+    /// this knowledge, there must be enough rows to see a slow transient.
     fn rests(&self, record: &LoopRecord, still: usize) -> bool {
         if still < ROWS_AT_REST || still >= record.len() {
             return false;

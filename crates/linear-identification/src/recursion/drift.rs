@@ -21,8 +21,8 @@ const STRETCHES: usize = 8;
 /// The estimates depend on the level if their values at both ends of the level's range differ by this number of standard errors.
 const APART: f64 = 3.0;
 
-/// The longest memory, of the record's length, and the least way of the remembered level, of the output's range, with which estimates that
-/// are constant say something. The default memory of a record that is long enough is a fifth of it.
+/// The longest memory, as a share of the record's length, and the least range of the remembered level, as a share of the output's range,
+/// for which constant estimates are significant. The default memory of a long record is a fifth of it.
 const LONGEST_MEMORY: f64 = 0.21;
 const LEAST_WAY: f64 = 0.2;
 
@@ -31,7 +31,7 @@ const LEAST_WAY: f64 = 0.2;
 pub struct Drift {
     /// Mean output that the recursion remembers, in the output's unit, rising.
     pub level: Vec<f64>,
-    /// Static gain `b_0` there.
+    /// Static gain `b_0` as a function of the level.
     pub gain: OverLevel,
     /// `a_1`: the time constant for n = 1, otherwise the sum of the time constants, s.
     pub time_constant: OverLevel,
@@ -42,7 +42,7 @@ pub struct Drift {
 }
 
 impl Drift {
-    /// Whether gain or time constant move more than chance would have it.
+    /// Whether gain or time constant change by more than chance.
     #[must_use]
     pub fn moves(&self) -> bool {
         self.gain.moves() || self.time_constant.moves()
@@ -172,7 +172,7 @@ fn remembered(scaled: &Scaled) -> Vec<f64> {
             continue;
         }
         let faded = (-scaled.eta * step).exp();
-        // in units of the memory: the whole past comes to 1
+        // in units of the memory: the whole past counts as 1
         let new = 1.0 - faded;
         length = faded * length + new;
         if length > 0.0 {

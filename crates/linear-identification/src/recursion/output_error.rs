@@ -169,7 +169,7 @@ fn left_plausible<const N: usize>(
     if about(a, reach)?.contains(&SVector::from(found)) {
         return Ok(None);
     }
-    // Outside the box the bounds may hold all the same.
+    // Outside the box the bounds may still be sufficient.
     let [.., here] = PLAUSIBLE;
     let (bounds, _) = filter_bounds(a)?;
     Ok(match check_filter_bounds(&bounds, &about(&found, here)?, 0.5)? {

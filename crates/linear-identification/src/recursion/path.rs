@@ -1,4 +1,4 @@
-//! The way of a recursion over a record.
+//! Trajectory of a recursion over a record.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -80,7 +80,7 @@ impl Scaled {
                  sample faster, or record longer"
             ));
         }
-        // The filters have to be seen by the samples.
+        // The bandwidth of the filters has to be below the sampling rate.
         let fastest = 1.0 / step;
         let bandwidth = request.bandwidth.unwrap_or((BANDWIDTH / unit).min(fastest));
         if bandwidth > 2.0 * fastest {

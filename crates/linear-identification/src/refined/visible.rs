@@ -1,4 +1,4 @@
-//! Whether an input, or in a loop the reference, shows in the simulation error.
+//! Test whether the simulation error depends on an input or, in a loop, on the reference.
 
 use ct_signals::{Record, quoted, residual_tests};
 
@@ -20,7 +20,7 @@ pub(super) struct Joined {
 }
 
 impl Joined {
-    /// In open loop every input is held against the error, in a loop the reference, as the input answers to the noise there.
+    /// In open loop the error is tested against every input, in a loop against the reference, because the input depends on the noise there.
     pub fn add(&mut self, record: &Record, in_loop: bool, error: impl Iterator<Item = f64>) {
         let signals: Vec<&ct_signals::Channel> = match record.references.first().filter(|_| in_loop)
         {

@@ -1,11 +1,11 @@
 //! Several methods and orders on one record, by the same measures.
 //!
-//! Each method fits what it fits; they are compared by one error: the model runs on the input alone, from an initial state and a level
-//! that are fitted to the record (`n + 1` numbers, least squares), on the record it was identified on and on others. A method that the
-//! record does not allow has a reason instead of a row.
+//! Methods have different criteria; they are compared by a common error: the model runs on the input alone, from an initial state and a level
+//! that are fitted to the record (`n + 1` numbers, least squares), on the record it was identified on and on others. A method that cannot be used on the record has
+//! a reason instead of a row.
 //!
-//! In a loop the command answers to the noise, and a model that takes this answer for the plant simulates better on the measured command
-//! than the plant does: there no method is called worse for its error, and that is said.
+//! In a loop the command depends on the noise, and a model that attributes this feedback to the plant simulates better on the
+//! measured command than the true plant: there methods are not ranked by their error, and a note says so.
 //!
 //! Missing readings have no error. Of a record that is cut at gaps of its input this error is that over the rows after which the plant has
 //! forgotten them.
@@ -14,7 +14,7 @@
 //! - BIC: `N log sigma^2 + k log N`, `sigma` of the innovations of an autoregressive model of the simulation error, `k` its coefficients,
 //!   the `n + m + 1` parameters, and the initial state and level;
 //! - YIC (Young 1989): `log(sigma_e^2/sigma_y^2) + log(mean_i(se_i^2/theta_i^2))`, small where the fit is good and all parameters are
-//!   known; only where the method says standard errors.
+//!   known; only if the method gives standard errors.
 //!
 //! The order that is shown of a method has the least BIC of those whose parameters all differ significantly from zero, and whose time constants are no
 //! shorter than a step; where there is none, of all.

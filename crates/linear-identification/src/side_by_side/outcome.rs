@@ -42,7 +42,7 @@ pub(super) fn outcome(
             error.map(|error| (error / p.value).powi(2))
         })
         .collect();
-    // Least squares says no standard errors; of the other methods one that is not known says that the parameter is not.
+    // Least squares gives no standard errors; for other methods an unknown standard error counts as not significant.
     let significant = found.method == Method::Ls
         || parts
             .iter()

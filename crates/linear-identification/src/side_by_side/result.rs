@@ -35,7 +35,7 @@ pub struct Row {
     pub method: Method,
     /// The order.
     pub order: Order,
-    /// Wall time beside the others, s.
+    /// Wall time with all methods in parallel, s.
     pub seconds: f64,
     /// Assumptions of the method.
     pub assumes: &'static str,
@@ -62,7 +62,7 @@ pub struct Outcome {
     pub test_fit_percent: Option<f64>,
     /// Whether all parameters differ significantly from zero, as far as standard errors are known, and no time constant is shorter than a step.
     pub determined: bool,
-    /// See the module.
+    /// Criterion: see the module.
     pub bic: f64,
     /// See the module.
     pub yic: Option<f64>,

@@ -28,7 +28,7 @@ pub(crate) struct Doubted<'a> {
     pub jumped: Option<Jump>,
 }
 
-/// Takes from what is confirmed what something simpler explains as well; `in_loop`: the records come from a loop that is not simulated.
+/// Removes from the confirmed set what a simpler explanation covers as well; `in_loop`: the records come from a loop that is not simulated.
 pub(crate) fn doubt<'a>(
     base: &Node<'a>,
     found: &Found<'a>,
@@ -68,9 +68,9 @@ pub(crate) fn doubt<'a>(
     if !beyond_small_walk(&confirmed)? {
         confirmed = found.base.clone();
     }
-    // Drifts, oscillations and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
-    // explain as much, and where the other effects of the set are called for without them: what only corrects an imitation is not. Where
-    // white noise is left this is not asked, since an imitation hardly ever leaves white noise.
+    // Drifts, oscillations and steps fit disturbances of any origin. They are accepted only if their residual is noise, if a random walk
+    // does not explain as much, and if the other effects of the set are significant without them: an effect that only corrects a wrong one
+    // is not. With a white residual this test is not needed, because a wrong explanation hardly ever leaves white noise.
     if by_clock(&confirmed) {
         let others = without_clock(&confirmed, noise)?;
         let count = others.added.len();
@@ -109,9 +109,8 @@ pub(crate) fn doubt<'a>(
 /// The best smaller set without effects that follow time alone all of which are called for, and which leaves noise, nearly as little of
 /// it; `None` where there is none.
 ///
-/// In a loop the command answers to every disturbance, and the likelihood of a model that runs on the measured command is biased by as
-/// much as a few effects gain. A valve that sticks is then imitated by a pump that saturates and an outlet that changes at the instant of
-/// a slip: chosen instants and limits meet the noise better than what the valve is bound to do.
+/// In a loop the command depends on every disturbance, and the likelihood of a model that runs on the measured command is biased by as much as a few effects gain. A sticking valve can then
+/// be replaced by a saturating pump and an outlet that changes at the instant of a slip: free instants and limits fit the noise better than the physical law of the valve.
 fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Option<Node<'a>> {
     if confirmed
         .setup

@@ -18,7 +18,7 @@ pub(crate) const NEARLY: f64 = 1.05;
 pub(crate) struct Group {
     /// Identifiers: the effect itself, then what fits as well in its place, best first.
     pub members: Vec<String>,
-    /// The places of the effect itself, most likely first, where there are several.
+    /// The places of the effect itself, most likely first, if there are several.
     pub places: Vec<PlaceScore>,
 }
 
@@ -66,7 +66,7 @@ pub(crate) fn groups<'a>(
                 };
                 stand_in(set, last, position).is_some_and(|other| !found(other))
             };
-            // The exchanges of an only effect are all candidates there are.
+            // For a single effect, all candidates are alternatives.
             let known = if last.added.len() == 1 && singles.is_some() || last.setup.out_of_time() {
                 &[]
             } else {
@@ -103,7 +103,7 @@ pub(crate) fn groups<'a>(
                 if !possible(&node) {
                     continue;
                 }
-                // An effect at an instant or with a course that the fit has chosen follows any disturbance: what hangs on the plant's own
+                // A function of time with a fitted instant or course can follow any disturbance: an effect that depends on the plant's own
                 // signals and explains nearly as much cannot be distinguished from it.
                 let nearly = own.effect.by_clock
                     && node.added.iter().all(|placed| !placed.effect.by_clock)

@@ -82,9 +82,8 @@ pub(crate) struct Judged<'a> {
 impl<'a> Judge<'_, 'a> {
     /// The accepted set, or the accepted part of it.
     ///
-    /// Beside something that is not noise, an effect that one of the clock can replace is no answer: it is some course of time, and
-    /// whatever is left may have made it. That speaks against this effect alone. The others stay where they are called for without it, and
-    /// are the answer where they explain enough without it: what was there to mend an imitation is neither.
+    /// If the residual is not noise, an effect that a function of time can replace is not accepted: an unknown disturbance may have caused both. This applies to that effect alone. The other
+    /// effects stay if they are significant without it, and are accepted if they explain enough without it: effects that only compensated a rejected one are dropped too.
     pub fn judge(&self, mut set: Node<'a>) -> Result<Judged<'a>, Error> {
         let mut judged = self.as_it_is(&set, None)?;
         loop {
@@ -174,7 +173,7 @@ impl<'a> Judge<'_, 'a> {
         )
     }
 
-    /// The models on the way to a set.
+    /// The models from the base to a set.
     pub fn course(&self, set: &Node<'a>) -> Result<Course<'a>, Error> {
         let mut nodes = trail(self.base, set, &set.setup.white_noise())?;
         let last = nodes.pop().unwrap_or_else(|| self.base.clone());
@@ -208,8 +207,8 @@ impl<'a> Judge<'_, 'a> {
             Some(left) if !matches!(left.what, Remains::Slow(..)) => Some(left),
             left => self.jumped.or(left),
         };
-        // The last model is shown in the noise's metric, where its parameters are best known; a model that lacks
-        // something is not: a metric that takes what it lacks for noise would let its simulation drift off.
+        // The last model is shown with the noise weighting, in which its parameters are most accurate. An incomplete model is not: a
+        // weighting that treats the missing effect as noise would let its simulation drift.
         if !self.wandering && !self.stopped && left.is_none() {
             last.fit = own.clone().continuing(&last.fit);
         }
@@ -275,7 +274,7 @@ impl<'a> Course<'a> {
 pub(crate) fn explained(base: &Node, last: &Node, floor: &[f64]) -> Result<f64, Error> {
     let series = |node: &Node| node.setup.disturbance(&node.fit.x);
     let (before, after) = (series(base)?, series(last)?);
-    // A floor of nothing leaves all of the error to be explained.
+    // With a noise floor of zero, all of the error is to be explained.
     let rms = base.setup.rms_per_output(&before);
     let least = |(floor, rms): (&f64, &f64)| floor.max(NOTHING * rms).max(f64::MIN_POSITIVE);
     let scales: Vec<f64> = floor.iter().zip(&rms).map(least).collect();

@@ -1,8 +1,7 @@
 //! Level shift: the simplest function of time that no effect describes. From one sample to the next the reading changes by a constant.
 //!
-//! A recalibration, a sensor that was moved, a cable that was changed. An outlet that opens at that instant imitates it
-//! in part, and beside it a wide play of the sensor or a leak the rest: down to the noise, with three sizes or four for
-//! what is one. So whatever is claimed has to be better than a jump.
+//! Causes are a recalibration, a sensor that was moved, a cable that was changed. An outlet that opens at that instant explains a part of the level shift, and a wide hysteresis
+//! of the sensor or a leak the rest: down to the noise, with three or four sizes instead of one. So a set of effects has to be better than a level shift.
 
 use ct_signals::Record;
 use greybox::{Noise, fit_from};
@@ -25,7 +24,7 @@ const AROUND: usize = 8;
 /// A level shift has a size and an instant; the fit counts the size.
 const INSTANT: f64 = 1.0;
 
-/// A model with a jump of the reading, fitted.
+/// A fitted model with a level shift of the reading.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Jump {
     /// Criterion of the model with the level shift.

@@ -173,8 +173,8 @@ pub(crate) fn largest_part<'a>(
 /// The part of the mean squared error that a set explains on one half of a record after a fit to the other half, both ways (two-fold
 /// cross-validation); initial states as on held-out records. Negative if the error rises; of several records the longest is used.
 ///
-/// A noise model that is nearly integrated looks at changes from sample to sample alone, and takes any slow effect for noise. Physics
-/// that is real helps on data that were not fitted; what imitates a slow disturbance does not.
+/// A nearly integrated noise model uses changes from sample to sample only, and treats any slow effect as noise. A true effect
+/// reduces the error on data that were not fitted; an effect that only fits a slow disturbance does not.
 fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
     let white = base.setup.white_noise();
     let records = base.setup.records.iter();

@@ -1,4 +1,4 @@
-//! Whether effects that follow time alone explain more than a random walk beside the noise does.
+//! Test whether functions of time explain more than a random walk in addition to the noise.
 //!
 //! **Model of the residual** (local level model): `e[k] = l[k] + v[k]`, `l[k+1] = l[k] + w[k]`, `v` and `w` white with variances
 //! `s^2` and `q s^2`, `l[0]` zero or unknown. No autoregressive model of low order describes it, and every drift, step or slow period looks
@@ -6,11 +6,11 @@
 //! search over its logarithm.
 //!
 //! Both residuals are whitened first by the noise model of the set with the effects: beside coloured noise a random walk would
-//! otherwise describe the noise, and the effects with it. Whitened, a walk is a walk still, smaller by the sum of the filter `A(1)`; sizes
+//! otherwise describe the noise, and the effects with it. A whitened walk is still a walk, smaller by the factor `A(1)`; sizes
 //! are stated in the standard deviation of the noise itself.
 //!
-//! **Parameters**: a walk that is taken for the plant's response bends the parameters, so each model is fitted again beside the walk, in
-//! one step from its linearisation. Without that step some effect seems to go beyond the walk in one record of thirty whose noise drifts.
+//! **Parameters**: a walk that is attributed to the plant biases the parameters, so each model is fitted again beside the walk, in
+//! one step from its linearisation. Without that step a false effect is significant in one of thirty records with drifting noise.
 //!
 //! **Cost**: `O(N p^2)` for a value of `q`.
 //!
@@ -77,7 +77,8 @@ impl Walk {
 struct Whitened {
     columns: usize,
     series: Vec<Vec<f64>>,
-    /// Size of a slow move of the output in the whitened rows, over that of their innovations, where the move is as large as the noise.
+    /// Gain of the whitening filter for a slow change of the output: its size in the whitened rows over that of their innovations, for a
+    /// change as large as the noise.
     slow: f64,
 }
 
@@ -178,7 +179,7 @@ impl Whitened {
     }
 }
 
-/// Whether a set lowers the deviance beyond chance against one that lacks some of its effects, where the residual of either may hold a
+/// Whether a set lowers the deviance significantly compared with a set that lacks some of its effects, if either residual may contain a
 /// random walk.
 pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node, walk: Walk) -> Result<bool, Error> {
     let noise = colour(gained)?;

@@ -1,7 +1,7 @@
-//! Readings that a converter has rounded with their noise.
+//! Readings that a converter has rounded together with their noise.
 //!
-//! The readings themselves are the evidence: nearly all are multiples of one number `D`, which needs no fit and no criterion. The criterion
-//! hardly falls: the noise that is rounded with the level (dither) makes the mean reading nearly linear in the level, and rounding acts as a
+//! The readings themselves are the evidence: nearly all are multiples of one number `D`, which needs no fit and no criterion. The criterion hardly falls, because the noise
+//! acts as dither and makes the mean reading nearly linear in the level, and rounding acts as a
 //! further noise of variance `D^2/12`.
 //!
 //! **Reference**: B. Widrow, I. Kollar, Quantization Noise, Cambridge 2008, ch. 4 and 19.
@@ -20,8 +20,8 @@ use crate::{
     },
 };
 
-/// Rounding is named where its variance is this part of the mean squared error that is left. Where it is clearly more than that error, the
-/// level rests, or the grid is not that of a converter.
+/// Rounding is named if its variance is this share of the mean squared residual. If it clearly exceeds the residual, the level is constant,
+/// or the grid is not that of a converter.
 const SHARE: RangeInclusive<f64> = 1.0 / 3.0..=1.1;
 
 /// A model with rounding, and what rounding makes of the error.

@@ -1,4 +1,4 @@
-//! The fit of the believed model, from many starts.
+//! Fit of the believed model, from many starts.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -78,8 +78,8 @@ pub(crate) fn base<'a>(
         starts *= 2;
     };
     setup.choose_substeps(&fit.x)?;
-    // Levels that are not measured are known now: ranges and operating levels follow them, and the parameters that are relative to
-    // these have to follow, whatever the time.
+    // Levels that are not measured are estimated now: ranges and operating levels depend on them, and the parameters relative to these have
+    // to be updated, whatever the time limit is.
     if let Some(limit) = &setup.time_limit {
         limit.allow(share + FOLLOW);
     }

@@ -40,8 +40,8 @@ impl Problem {
     }
 }
 
-/// The first place at which only one of two records has an output, or one has an output that the other has elsewhere: their names
-/// may differ where there is one.
+/// The first difference in the outputs of two records: an output that only one has, or that the other has at another position. A single
+/// output may have different names.
 fn difference<'a>(
     own: &'a [Channel],
     first: &'a [Channel],

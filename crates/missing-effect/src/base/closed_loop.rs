@@ -17,8 +17,8 @@ use crate::{
 
 /// Significance level of the feedback test.
 const FEEDBACK: f64 = 1e-4;
-/// A controller whose command differs from the measured one by more than this part of what that moves is another one.
-/// What it differs by less is known, and simulated with the loop.
+/// Largest relative difference between the controller's command and the measured one. A controller with a larger difference is not used; a
+/// smaller difference is simulated as a known input of the loop.
 const OTHER_CONTROLLER: f64 = 0.05;
 
 /// Consequence of running a model on the measured command of a loop.
@@ -150,8 +150,8 @@ fn feedback_p(node: &Node) -> Result<f64, Error> {
     Ok((least * residuals.len() as f64).min(1.0))
 }
 
-/// Standard errors that allow for a bias from feedback: the fits in the metric of white noise and of the noise that was
-/// found are both right where no noise comes back, and differ by about the bias where it does.
+/// Standard errors that allow for a bias from feedback: the fits with white-noise weighting and with the noise model are both consistent
+/// without feedback, and differ by about the bias with feedback.
 pub(crate) fn widened(
     node: &Node,
     std_errors: Vec<Option<f64>>,

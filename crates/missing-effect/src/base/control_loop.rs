@@ -10,7 +10,7 @@ use crate::{Error, fit::node::Node};
 /// A loop that grows e-fold so often over the longest record cannot have produced it.
 const GROWTH: f64 = 1.0;
 
-/// Refuses a controller that makes the fitted plant unstable at its operating point.
+/// Rejects a controller that makes the fitted plant unstable at its operating point.
 ///
 /// The sampled loop is linearised; what an effect adds as memory (dead time, lags) is left out.
 pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), Error> {
@@ -54,7 +54,7 @@ pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), E
     Ok(())
 }
 
-/// The slowest time constant of a fitted plant at its operating point \[s\]; infinite for one that integrates.
+/// The slowest time constant of a fitted plant at its operating point \[s\]; infinite for an integrating plant.
 ///
 /// What an effect adds as memory is left out.
 pub(crate) fn slowest_time_constant(node: &Node) -> Result<f64, Error> {

@@ -223,7 +223,7 @@ mod tests {
             .collect();
         let before = |gain| feedback_p(&input, &late, gain);
         assert!(!shown(Some(1.0)));
-        // The correlation is there, and has not the sign of a controller.
+        // The correlation is significant, but does not have the sign of a controller.
         assert!(before(None) < SAID && before(Some(1.0)) > SAID);
     }
 

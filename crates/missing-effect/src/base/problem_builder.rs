@@ -73,7 +73,7 @@ impl ProblemBuilder {
         self
     }
 
-    /// Records that take no part in any fit or choice and are only scored.
+    /// Held-out records, which are scored but not used for fits or selection.
     pub fn test(mut self, records: impl Into<Vec<Record>>) -> Self {
         self.problem.test = records.into();
         self

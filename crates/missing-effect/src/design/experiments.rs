@@ -60,7 +60,7 @@ pub(crate) type Tried = (Candidate, Sequence);
 pub(crate) struct Before {
     pub known: [Triangle; 2],
     noise_free: [Vec<Record>; 2],
-    /// `misfit[i]`: of the other to what `i` shows.
+    /// `misfit[i]`: misfit of the other model to the response of model `i`.
     pub misfit: [f64; 2],
     /// Smallest and largest level of each vessel, by either.
     levels: Vec<(f64, f64)>,

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::{Problem, numbers::significant};
 
-/// A range reaches so many times as far from zero as the records at most.
+/// Largest distance of a range from zero, as a multiple of that of the records.
 const WIDEST: f64 = 1e6;
 
 /// The value rounded up to three digits.
@@ -71,19 +71,19 @@ pub enum Refused {
         /// Second end.
         high: f64,
     },
-    /// The range leaves what can be computed with.
+    /// The range is too large for the computation.
     #[error(
         "--range {low:e} {high:e} goes beyond {most:.2e}, a million times what the records visited; stay within it"
     )]
     TooWide {
-        /// As given.
+        /// Lower end as given.
         low: f64,
         /// As given.
         high: f64,
         /// Largest distance of either end from zero.
         most: f64,
     },
-    /// The range leaves what the plant can do.
+    /// The range exceeds the plant's limits.
     #[error(
         "--range {} {} leaves {} .. {}, {what}; stay within it",
         shown(*low),

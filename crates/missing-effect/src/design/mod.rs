@@ -43,8 +43,8 @@ use experiments::Search;
 use separation::Metric;
 use simulated::Loop;
 
-/// An effect, and the vessel it is to act in; `None`: of those in which it explains the records well, the one in which it comes
-/// nearest to the other effect.
+/// An effect, and the vessel it acts in; `None`: among the vessels in which it fits the records well, the one in which it is closest to the
+/// other effect.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidacy {
     /// The effect.
@@ -149,7 +149,7 @@ pub fn design(
         between: [0, 1].map(|i| alternative(&fitted, i)),
         bic_ahead: search.ahead(),
         prospect: match effect_search::design::prospect(&found.best.power) {
-            // A power that no refit has confirmed is a promise.
+            // A power without confirmation by a refit is only a prediction.
             Prospect::Decides if !found.best.refitted => Prospect::May,
             prospect => prospect,
         },

@@ -42,11 +42,11 @@ pub struct Reach {
 pub struct Candidate {
     /// Kind of the sequence.
     pub kind: Kind,
-    /// Its smallest value.
+    /// Smallest value.
     pub low: f64,
-    /// Its largest value.
+    /// Largest value.
     pub high: f64,
-    /// How long a level is held \[s\].
+    /// Duration of each level \[s\].
     pub clock: f64,
     /// Levels of a staircase.
     pub levels: Option<usize>,
@@ -54,7 +54,7 @@ pub struct Candidate {
     pub draw: Option<u64>,
     /// Largest change per second, if it is smaller than the limits require in order to keep a controller off its limits.
     pub slew: Option<f64>,
-    /// What it gives.
+    /// Power of the experiment.
     pub power: Power,
     /// The power is that of a refit; otherwise that of the models linearised at their fits.
     pub refitted: bool,
@@ -63,7 +63,7 @@ pub struct Candidate {
     /// Largest excursion of a level outside its range in the records, as a share of that range: outside the range neither model is
     /// validated.
     pub excursion: f64,
-    /// In a loop: the controller comes to a limit, where the loop is open.
+    /// In a loop: whether the controller reaches a limit, where the loop is open.
     pub at_limit: bool,
 }
 
@@ -87,7 +87,7 @@ pub struct SecondSensor {
     pub existing_without: Power,
     /// For records like the existing ones, with both levels measured.
     pub existing_with: Power,
-    /// In the best experiment, both levels measured there.
+    /// For the best experiment, with both levels measured.
     pub best_with: Power,
 }
 

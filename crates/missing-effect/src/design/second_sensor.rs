@@ -33,7 +33,7 @@ fn with_sensor(structure: &Structure) -> Option<Structure> {
     Some(with)
 }
 
-/// Records with a further output, of which no sample is there yet.
+/// Records with a further output, which has no samples yet.
 fn with_output(records: &[Record]) -> Vec<Record> {
     let mut records = records.to_vec();
     for record in &mut records {

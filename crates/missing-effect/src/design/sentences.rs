@@ -22,7 +22,7 @@ fn sized(alternative: &Alternative, domain: Domain) -> String {
     format!("{}{size}", named(alternative, domain))
 }
 
-/// An effect, with the tank where there are two.
+/// An effect, with its tank if there are two.
 pub(super) fn named(alternative: &Alternative, domain: Domain) -> String {
     match &alternative.place {
         Some(place) => {

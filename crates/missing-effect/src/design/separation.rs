@@ -26,7 +26,7 @@ use crate::{
     fit::node::{FINE, Node},
 };
 
-/// Starts around B's fit beside itself.
+/// Starts around B's fit, in addition to the fit itself.
 const STARTS_AROUND: usize = 4;
 
 /// The metric in which both are compared.

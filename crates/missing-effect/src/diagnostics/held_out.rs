@@ -73,7 +73,7 @@ pub(crate) fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, 
             }
             count += pairs.len();
         }
-        // NaN of an output of which nothing is left to be scored.
+        // NaN for an output without scored samples.
         let [rmse, offset, gain, shape] = parts.map(|sum| (sum / count as f64).sqrt());
         let error = HeldOutError {
             offset,

@@ -118,8 +118,8 @@ pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
         }))
 }
 
-/// p-value of the test that the command itself does not show in a node's residual at an output; of several records the smallest,
-/// corrected for having taken it.
+/// p-value of the test that a model's residual at an output does not depend on the command; of several records the smallest, corrected for
+/// the selection.
 pub(crate) fn input_p(node: &Node, output: usize) -> Result<f64, Error> {
     Ok(least_p(node, Some(output), |u| vec![u.to_vec()])?.0)
 }

@@ -50,7 +50,7 @@ pub(crate) fn parameters(setup: &Setup, fit: &Fit, std_errors: &[Option<f64>]) -
         .collect()
 }
 
-/// A test; `None` where too few pairs of samples are there for it.
+/// A test result; `None` if there are too few pairs of samples.
 fn testable<T>(test: Result<T, ct_signals::Error>) -> Result<Option<T>, ct_signals::Error> {
     match test {
         Err(ct_signals::Error::TooFewSamples { .. }) => Ok(None),

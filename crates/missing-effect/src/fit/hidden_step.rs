@@ -24,8 +24,8 @@ const TURN: f64 = 0.25;
 const FINER: usize = 16;
 /// The fewest and the most steps between the lowest and the highest reading.
 const STEPS: (f64, f64) = (2.0, 300.0);
-/// Steps that are looked at times samples, at most. Readings far from zero turn often from one step to the next, and long records
-/// take long: then only coarse steps are looked for.
+/// Largest number of tested steps times samples. Readings far from zero pass many periods from one step to the next, and long records take
+/// long: then only coarse steps are tested.
 const LOOKED_AT: f64 = 3e8;
 
 /// Position of a sensor's quantisation step in the parameter vector.

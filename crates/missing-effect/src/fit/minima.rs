@@ -34,7 +34,7 @@ pub(crate) fn around(node: &mut Node, count: usize, noise: &Noise, seed: u64) ->
 
 /// Compares the minimum with those that each of these effects reaches from its own starts, the other effects unchanged.
 ///
-/// While a set grows, an effect takes the place that is free. On the measured Cascaded Tanks data that is a leak a little
+/// While a set grows, an effect first explains the remaining error. On the measured Cascaded Tanks data that is a leak a little
 /// below the rim; once the sensor's play and limit are there, one near the bottom lowers the error by an eighth.
 pub(crate) fn begun_again(node: &mut Node, effects: &[Placed], noise: &Noise) -> Result<(), Error> {
     let starts = effects.iter();

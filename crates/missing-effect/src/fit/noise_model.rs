@@ -43,8 +43,8 @@ pub(crate) fn residual_colour(setup: &Setup, residuals: &[Vec<f64>]) -> Result<N
     Ok(noise.map_err(greybox::Error::from)?)
 }
 
-/// The criterion of a node as it is fitted, its residual whitened by an autoregressive model of its own: that of the fit in
-/// that metric is a little lower.
+/// The criterion of a model with its present parameters, with its residual whitened by an AR model: a fit with this weighting would give a
+/// slightly lower value.
 pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
     let residuals = node.setup.disturbance(&node.fit.x)?;
     let noise = residual_colour(&node.setup, &residuals)?;

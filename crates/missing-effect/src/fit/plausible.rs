@@ -1,5 +1,5 @@
-//! Whether a fitted set of effects is credible: sizes inside their bounds, levels that are physical, and what an effect says of the
-//! readings to be seen in them.
+//! Whether a fitted set of effects is credible: sizes inside their bounds, physical levels, and predicted features of the readings that are
+//! visible in the record.
 
 use ct_signals::Channel;
 use plants::{Outlet, Placed};
@@ -11,7 +11,8 @@ const HIGHEST: f64 = 100.0;
 /// ... and one this many times that height where the height is known: a small error of an area shifts levels that are not measured.
 const ABOVE_RIM: f64 = 1.5;
 
-/// A sensor at the end of its range: its reading is said to rise beyond from this correlation with the level on, over so many samples.
+/// A sensor at the end of its range: the reading counts as increasing further from this correlation with the level on, over this number of
+/// samples.
 const LIMIT: &str = "sensor_saturation";
 const RISES: f64 = 0.5;
 const BEYOND: usize = 50;
@@ -29,8 +30,8 @@ const CLEAR: f64 = 4.0;
 const EDGE: f64 = 1e-6;
 
 impl Node<'_> {
-    /// The size of every added effect lies inside its plausible range, neither absent nor at the far end, and no level is beyond
-    /// what is physical.
+    /// Whether the size of every added effect is inside its plausible range, neither absent nor at the far end, and every level is
+    /// physical.
     pub fn plausible(&self) -> bool {
         !self.added.iter().any(|placed| self.at_the_edge(*placed)) && self.credible()
     }

@@ -18,7 +18,7 @@ const PROMISE_DAMPING: f64 = 1e-6;
 /// Starts of a new effect that are followed down, the most promising of its grid.
 const FOLLOWED: usize = 2;
 
-/// Starts of an effect beside two others or more.
+/// Distance of starts on the coarser grid for an effect in addition to two or more others.
 const COARSE: usize = 10;
 
 /// Largest number of functions of time in a set. Two of them with opposite signs (the outlet opens while the pump gains) have a flexible
@@ -27,8 +27,8 @@ const BY_CLOCK: usize = 1;
 
 /// The cost after one step from a start, as its linearised model predicts.
 ///
-/// The step is hardly damped: an effect that the other parameters nearly imitate takes long steps in both, and a damped one would
-/// leave the start's own error in the promise.
+/// The step has little damping: for an effect that is nearly collinear with other parameters, both take
+/// long steps, and damping would leave the error of the start in the prediction.
 fn promise(setup: &Setup, x: &[f64], triangle: &Triangle) -> f64 {
     let free: Vec<usize> = (0..setup.free().len()).collect();
     let scale: Vec<f64> = free.iter().map(|&j| triangle.column_norm(j)).collect();
@@ -167,7 +167,7 @@ fn widened<'a>(node: Node<'a>, noise: &Noise, stopping: Stopping) -> Node<'a> {
     let again = || {
         let placed = *node.added.last()?;
         let (size, at) = node.size_of(placed)?;
-        // At the absent value there is nothing to widen.
+        // At the absent value no widening is needed.
         let absent = (node.fit.x[at] - size.absent).abs() <= 1e-6 * (size.upper - size.lower);
         if absent || !node.at_the_edge(placed) || node.setup.out_of_time() {
             return None;

@@ -55,7 +55,7 @@ pub struct Effort {
 pub struct Diagnosis {
     /// Version of this layout.
     pub schema: u32,
-    /// The finding; after a comparison, which searches nothing, `Unexplained` where the model lacks something.
+    /// The verdict; after a comparison, which searches nothing, `Unexplained` if the model is incomplete.
     pub verdict: Verdict,
     /// Format of the times of the records.
     #[serde(skip, default = "plain_clock")]

@@ -3,7 +3,7 @@
 use ct_signals::Record;
 use serde::{Deserialize, Serialize};
 
-/// A record as the report shows it.
+/// A record for the report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Shown {
     /// Name.

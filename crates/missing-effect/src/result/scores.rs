@@ -50,12 +50,12 @@ pub struct Acceptance {
     /// Least `share` of a set whose residual is more than noise.
     #[serde(deserialize_with = "crate::result::number")]
     pub required: f64,
-    /// Least `share` of a partial answer.
+    /// Least `share` of a partial explanation.
     #[serde(deserialize_with = "crate::result::number")]
     pub required_partial: f64,
     /// Standard deviation of the noise that is no excess, by output \[output unit\].
     pub floor: PerOutput,
-    /// Fall of the criterion (BIC), each model under the noise model of its own residual.
+    /// Fall of the criterion (BIC), each model with the noise model of its own residual.
     pub bic_fall: Option<f64>,
     /// Least fall for acceptance.
     #[serde(deserialize_with = "crate::result::number")]

@@ -100,7 +100,7 @@ pub struct Step {
     pub parameters: Vec<Parameter>,
     /// Number of starts.
     pub starts: usize,
-    /// How many of them ended in the best minimum.
+    /// Number of starts that ended in the best minimum.
     pub starts_agree: usize,
     /// Results at each output, in order.
     pub outputs: Vec<OutputStep>,

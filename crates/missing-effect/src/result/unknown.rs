@@ -36,7 +36,7 @@ pub struct Share {
     /// `level`, `rate` or `input`.
     #[serde(deserialize_with = "variable_name")]
     pub variable: Name,
-    /// Share of the fall of the squared error that is reached on parts of the data that were not fitted; one is all of it.
+    /// Share of the fall of the squared error that is reached on parts of the data that were not fitted; 1 means all of it.
     #[serde(deserialize_with = "crate::result::number")]
     pub share: f64,
     /// Standard error of the share, from its variation between the parts.
@@ -74,7 +74,7 @@ pub struct Window {
     pub mean: f64,
 }
 
-/// What is missing where the catalogue does not explain it.
+/// The unexplained error, if the catalogue does not explain it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unknown {
     /// Place of the term: `actuator`, `vessel` (of several by its name, `upper` or `T1`) or `sensor`.
@@ -86,7 +86,7 @@ pub struct Unknown {
     /// The first record's time, by its own clock \[s\].
     #[serde(deserialize_with = "crate::result::numbers")]
     pub time: Vec<f64>,
-    /// The missing term beside the fitted model.
+    /// The missing term in addition to the fitted model.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub value: Vec<f64>,
     /// Standard errors.
@@ -113,7 +113,7 @@ pub struct Unknown {
     /// Knots of the shape, in the variable's unit; time since the record began.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub knots: Vec<f64>,
-    /// The shape at the knots, without what the plant's own parameters imitate.
+    /// The function at the knots, without the part that the plant's own parameters explain.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub ordinates: Vec<f64>,
     /// Standard errors of the ordinates.

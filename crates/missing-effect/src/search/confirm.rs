@@ -1,4 +1,4 @@
-//! Confirmation: which effects of a set stay when the noise may explain what they explain.
+//! Backward elimination: removes effects of a set that the noise explains as well.
 
 use greybox::Noise;
 use rayon::prelude::*;
@@ -17,7 +17,7 @@ const EXCHANGES: usize = 6;
 /// ... a swap to the same number of effects is accepted if the criterion falls by this.
 const CLEARLY: f64 = 1.0;
 
-/// Takes out, one by one, what the noise explains as well, first what is worth least.
+/// Removes, one by one, effects that the noise explains as well, the least significant first.
 pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     loop {
         // Each effect is tested with a share of the significance level: a significant weakest effect does not imply that the others are
@@ -33,11 +33,10 @@ pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>,
     }
 }
 
-/// Exchanges effects for others while that makes another one superfluous, or the whole better.
+/// Swaps effects for others while this makes another effect superfluous, or lowers the criterion.
 ///
-/// Of sets that take the same out of a residual the search follows one, and an alternative that is nearly right calls for a further effect
-/// that mends it: on the emulated rig of a closed loop a raised outlet stood for the pump's dead zone, and a bent pump for the difference.
-/// With the dead zone in its place the bend is not needed.
+/// Among sets that explain the same part of a residual the search extends one, and a nearly right effect needs a further effect as a correction: on the emulated rig of a
+/// closed loop a raised outlet replaced the pump's dead zone, and a nonlinear pump the difference. With the dead zone the nonlinearity is not needed.
 pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     // Every round ends with fewer effects, or with a lower criterion of as many.
     while node.added.len() > 1 {

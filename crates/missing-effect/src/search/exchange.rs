@@ -22,7 +22,7 @@ const QUICKLY: usize = 16;
 /// A swap that is worse by more than this share of an effect's own gain after a few steps is dropped.
 const OUT_OF_REACH: f64 = 0.5;
 
-/// The node with one of its effects exchanged for each other candidate, refitted, best first.
+/// Swap steps: the set with one of its effects replaced by each other candidate, refitted, best first.
 ///
 /// `singles`: what [`singles`](crate::fit::proposal::singles) gives in the same metric. It holds the exchanges of an only effect.
 pub(crate) fn exchanges<'a>(

@@ -1,4 +1,4 @@
-//! Whether a set of effects leaves nothing to explain: then larger sets need no search.
+//! Whether the residual of a set is noise: then larger sets need no search.
 
 use greybox::{Setup, coloured};
 

@@ -47,8 +47,8 @@ fn key(added: &[Placed]) -> Vec<(&'static str, usize)> {
 
 /// The best distinct sets, best first.
 ///
-/// Two sets that take nearly the same out of the base's residual are one under two names (a dead zone and a leak, say), and
-/// what is added to the one makes what is added to the other. Grown side by side they would fill the beam.
+/// Two sets that explain nearly the same part of the base's residual are equivalent (a dead zone and a leak,
+/// say), and so are their extensions. Extended separately, equivalent sets would fill the beam.
 fn distinct<'n, 'a>(
     base: &Node<'a>,
     nodes: &'n [Node<'a>],
@@ -135,8 +135,8 @@ impl<'a> Grown<'a> {
 
 /// Forward search: grows sets of effects from a base.
 ///
-/// The growth ends after two sizes that are not `worth` it beside the best set so far, and at once where the best set leaves noise. Where
-/// an only effect leaves coloured noise, which may hold a second one, it goes on if some pair is worth it.
+/// The search ends after two sizes that are not `worth` it compared with the best set so far, and at once if the residual of the best set is noise. If a single effect leaves coloured noise, which may contain a second
+/// effect, the search continues if some pair is `worth` it.
 pub(crate) fn grow<'a>(
     base: &Node<'a>,
     noise: &Noise,

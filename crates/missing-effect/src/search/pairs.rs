@@ -31,7 +31,7 @@ const RIDGE: f64 = 1e-9;
 /// A candidate at a point.
 struct Linearised<'a> {
     placed: Placed,
-    /// The effect's parameters there, and the vector whole.
+    /// The effect's parameters at the point, and the complete vector.
     x: Vec<f64>,
     setup: Setup<'a>,
     /// Whitened: the effect's columns, then what the effect changes in the residual.

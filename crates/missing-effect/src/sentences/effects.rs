@@ -1,4 +1,4 @@
-//! The effects of an answer: group, place, size, acceptance.
+//! The accepted effects: group, place, size, acceptance.
 
 use plants::{Domain, EffectInfo};
 

@@ -1,4 +1,4 @@
-//! What was done about gaps in records.
+//! Handling of gaps in records.
 
 use ct_signals::{Gaps, duration};
 

@@ -96,7 +96,7 @@ pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
 /// The held-out error is this many times the fitted one where what was fitted does not carry over.
 const CARRIES_OVER: f64 = 2.0;
 
-/// Whether what was fitted holds on another record.
+/// Remark: whether the fitted model holds for another record.
 pub(crate) fn of_held_out(diagnosis: &Diagnosis) -> Option<String> {
     let step = diagnosis.steps.last()?;
     let times = step.weighted_rmse_test? / step.weighted_rmse;

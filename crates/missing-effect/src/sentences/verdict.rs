@@ -36,7 +36,7 @@ pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<St
     }]
 }
 
-/// The sizes from which on the likeliest effects would have been seen.
+/// The minimum detectable sizes of the most likely effects.
 fn visible(diagnosis: &Diagnosis) -> String {
     let sizes: Vec<String> = diagnosis
         .scores

@@ -83,7 +83,7 @@ impl<'a> Core<'a> {
         })
     }
 
-    /// Builds what runs from the present numbers and the kept rows.
+    /// Builds the running model from the present numbers and the stored rows.
     pub(super) fn build(&mut self) -> Option<()> {
         let from = self.now.kept.len().saturating_sub(RUN_UP);
         let first = self.now.kept.get(from)?;

@@ -50,7 +50,7 @@ impl Core<'_> {
         })
     }
 
-    /// Gathers a row to learn from; a fit is tried at `next` rows. `span`: so many seconds are known to be needed.
+    /// Collects a row for learning; a fit is tried at `next` rows. `span`: required time in seconds, if known.
     pub(super) fn gather(&mut self, sample: Sample, next: usize, span: Option<f64>) -> Fed {
         let time = sample.time;
         self.now.kept.push_back(Kept {
@@ -83,7 +83,7 @@ impl Core<'_> {
                 if span < needed {
                     let full = self.now.kept.len() == KEPT;
                     let rows = self.now.kept.len() as f64 * needed / span;
-                    // A little more, for the estimate of the time constant moves.
+                    // Slightly more, because the estimate of the time constant changes.
                     self.later((1.02 * rows).ceil() as usize, Some(needed), halve);
                     if full {
                         self.now.every = (2 * self.now.every).min(LONGEST_BLOCK);

@@ -38,7 +38,7 @@ const OTHER_NUMBERS: &str = "its numbers do not belong to this model";
 pub(crate) enum Phase {
     /// Rows are gathered; at `next` a fit is tried. The one before has found that `span` seconds are needed.
     Learning { next: usize, span: Option<f64> },
-    /// The learned model is watched.
+    /// Monitoring with the learned model.
     Watching,
     /// The model does not fit, and keeps its learned parameters until it fits again.
     Alarmed(Following),
@@ -259,7 +259,7 @@ impl<'a> Core<'a> {
         Some((bank.largest(&running.covariance), running.threshold))
     }
 
-    /// The output at which a change shows most.
+    /// The output with the largest deviation.
     fn most_at(&self) -> Option<usize> {
         let (bank, running) = (self.now.bank.as_ref()?, self.running.as_ref()?);
         Some(bank.most_at(&running.covariance))

@@ -85,7 +85,7 @@ impl Core<'_> {
         } else {
             self.now.judged = (self.now.judged + 1).min(self.now.kept.len());
         }
-        // A row without a reading says nothing.
+        // A row without a reading contains no information.
         if settling == 0 && said.any() {
             let share = match self.now.phase {
                 Phase::Alarmed(_) => QUIET,
@@ -219,7 +219,7 @@ impl Core<'_> {
         (alarm, None)
     }
 
-    /// Looks which effect the latest rows are consistent with.
+    /// Determines the effects that the latest rows are consistent with.
     fn look(&mut self, stage: Stage, time: f64) -> Option<Alarm> {
         let Phase::Alarmed(following) = self.now.phase else {
             return None;

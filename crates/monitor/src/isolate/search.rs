@@ -67,7 +67,7 @@ impl Search<'_> {
             }
         }
         let (_, at, _) = best.as_ref()?;
-        // Half-way to the next onset on either side, again and again.
+        // Repeatedly halves the distance to the next onset on either side.
         let position = lengths.iter().position(|length| length == at)?;
         let below = position.checked_sub(1).map_or(FEWEST, |i| lengths[i]);
         let above = lengths.get(position + 1).copied().unwrap_or(n);

@@ -22,7 +22,7 @@ pub struct Estimate {
 pub enum Progress {
     /// The monitor learns, and has collected this number of rows (or blocks of rows).
     Learning(usize),
-    /// The learned model is watched: the largest score now and the threshold.
+    /// Monitoring: the largest present score and its threshold.
     Watching {
         /// The largest score, by magnitude.
         score: f64,

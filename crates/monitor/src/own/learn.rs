@@ -20,7 +20,7 @@ const LANES: usize = 4;
 /// An eigenvalue closer to one does not decay within the stored rows.
 const SETTLES: f64 = 1e-7;
 
-/// The fit, and the states at the first row; in words why there is none.
+/// The fit, and the states at the first row; or the reason in words why there is none.
 pub(super) fn learn(
     own: &OwnModel,
     samples: &[Sample],

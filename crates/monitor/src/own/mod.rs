@@ -1,4 +1,4 @@
-//! A user's own model as it is watched.
+//! A user's own model for the monitor.
 //!
 //! The parameters that are watched are those that the text declares as `parameter`, in its order; constants and `final parameter`s stay as
 //! they are. Those that the model file knows are not fitted, and watched all the same: they may change.
@@ -38,7 +38,7 @@ pub struct OwnModel<'a> {
     pub known: BTreeMap<String, f64>,
     /// Priors of parameters, by name.
     pub priors: BTreeMap<String, PriorValue>,
-    /// What the inputs do between rows.
+    /// Hold of the inputs between rows.
     pub hold: Hold,
     /// Seconds in one unit of the model's time, above zero.
     pub time_unit: f64,

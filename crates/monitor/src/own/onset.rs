@@ -21,7 +21,7 @@ use crate::{Each, isolate::Kept, learn::Learned};
 const ONSETS: [f64; 14] = [
     0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0,
 ];
-/// Rows count until so many slowest time constants after the alarm.
+/// Rows are used until this number of slowest time constants after the alarm.
 const BEHIND: f64 = 1.0;
 /// An onset has at least so many rows after it.
 const FEWEST: usize = 2;

@@ -1,4 +1,4 @@
-//! `nonlinearity(u)`: a bend over the visited range.
+//! `nonlinearity(u)`: a parabola over the visited range.
 
 use crate::effects::{Effect, Place, Role, Starts};
 

@@ -1,4 +1,4 @@
-//! `nonlinearity(y)`: the sensor's characteristic bends.
+//! `nonlinearity(y)`: the sensor's characteristic is not linear.
 
 use crate::effects::{Effect, Place, input::nonlinearity};
 

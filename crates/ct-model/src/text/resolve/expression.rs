@@ -1,4 +1,4 @@
-//! Expressions of a text: names looked up, and what may stand where.
+//! Expressions of a text: resolution of names, and checks of allowed variables.
 
 use super::{Builder, Holds};
 use crate::expression::{Condition, Expression, Function, Variable};

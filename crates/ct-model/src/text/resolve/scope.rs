@@ -9,7 +9,7 @@ use crate::text::error::TextError;
 use crate::text::names::{Names, differentiated};
 use crate::text::syntax::Equation;
 
-/// Expressions that stand outside a text, in the words of a model.
+/// Parser for expressions outside a model text, with the names of a model.
 pub(crate) struct Scope<'a> {
     spec: &'a ModelSpec,
 }

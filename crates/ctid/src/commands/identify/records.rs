@@ -1,4 +1,4 @@
-//! The records, as `--columns` and `--model` say.
+//! Records for `--columns` and `--model`.
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ impl Identify {
         record
     }
 
-    /// A record as `--columns` and `--model` say.
+    /// Reads a record for `--columns` and `--model`.
     pub(super) fn read(&self, path: &Path, (columns, hold, own): Layout) -> Result<Reading, Error> {
         let options = ReadOptions {
             hold,

@@ -53,7 +53,7 @@ pub(super) enum Column {
 }
 
 impl OwnModelFile {
-    /// Reads the text of a model file, and the model that it names, which is looked for beside the file.
+    /// Reads the text of a model file, and the model that it names, with a path relative to the file.
     ///
     /// # Errors
     /// One line that names the file, the line, what is wrong and the correction.
@@ -126,8 +126,8 @@ impl OwnModelFile {
         })
     }
 
-    /// A model with what is said of it in place of a model file; `name` stands for the file in messages. Columns that are not named are those
-    /// of the model's own names.
+    /// A model with settings instead of a model file; `name` is its name in messages. Columns without a name have the names of the model's
+    /// signals.
     ///
     /// # Errors
     /// Where a name is none of a parameter, an effect cannot act in the model, or the numbers of columns are not those of its signals.

@@ -1,4 +1,4 @@
-//! Variants of the sample: a comparison, a partial answer, awkward names and numbers.
+//! Variants of the sample: a comparison, a partial explanation, awkward names and numbers.
 
 use missing_effect::{
     Acceptance, Diagnosis, Effort, HeldOutError, OutputStep, PerOutput, PlaceScore, Rankings,
@@ -37,8 +37,8 @@ pub(crate) fn comparison_of(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis
 }
 
-/// The overflow alone, as a part of the answer: what the acceptance test, the places, the rankings, the held-out error and the limit
-/// on the time have to say.
+/// The overflow alone, as a partial explanation: texts of the acceptance test, the places, the rankings, the held-out error and the time
+/// limit.
 pub(crate) fn partial() -> Diagnosis {
     partial_of(two_tanks())
 }

@@ -7,7 +7,7 @@ use crate::findings;
 use crate::report::data::step_label;
 use crate::report::text::{code, escape, significant, unit, with_error};
 
-/// The parameters of every step side by side, with what the fit reached.
+/// The parameters of every step side by side, with the error of the fit.
 pub(crate) fn parameters(diagnosis: &Diagnosis) -> String {
     let steps = &diagnosis.steps;
     let heads: String = last_first(steps)

@@ -96,7 +96,7 @@ fn cells_figure(study: &Study, number: usize) -> Figure {
     }
 }
 
-/// A gain's colour and dash, the same in both figures.
+/// Colour and dash of a gain, the same in both figures.
 fn look(kind: GainKind) -> (Colour, &'static str) {
     match kind {
         GainKind::BlockDiagonal => (Colour::Of(0), "solid"),

@@ -76,7 +76,7 @@ impl Session {
     }
 }
 
-/// Whether two files say the same of what is fitted.
+/// Whether two files have the same fitted content.
 pub(crate) fn same(a: &ModelFile, b: &ModelFile) -> bool {
     let bare = |model: &ModelFile| ModelFile {
         waiting: Vec::new(),
@@ -85,7 +85,7 @@ pub(crate) fn same(a: &ModelFile, b: &ModelFile) -> bool {
     bare(a) == bare(b)
 }
 
-/// The model without effects and terms and what is said of their parameters.
+/// The model without effects, terms, and settings of their parameters.
 pub(super) fn without_effects(model: &ModelFile) -> ModelFile {
     let mut bare = model.clone();
     let effects = model.effects.iter().map(|placed| placed.effect.id);

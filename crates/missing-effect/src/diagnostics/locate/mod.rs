@@ -14,7 +14,7 @@ use crate::{Bin, Failures};
 
 /// Windows and bins of one kind.
 const BINS: usize = 12;
-/// Bins with fewer samples are not judged.
+/// Bins with fewer samples are not tested.
 const FEWEST: usize = 8;
 
 /// One record with the signals of a model; all series are as long as `time`.

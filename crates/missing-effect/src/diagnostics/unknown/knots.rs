@@ -1,4 +1,4 @@
-//! The knots of a polyline: where the records hold values of a variable.
+//! Knots of a polyline: distributed over the values of a variable in the records.
 
 use greybox::{at_rest, commands};
 use plants::{Simulator, Variable};

@@ -28,8 +28,8 @@ const BAND: f64 = 1.96;
 const MOVES: f64 = 5.0;
 /// Places with log-likelihoods within this distance of the best are not distinguished.
 pub(crate) const SAME_PLACE: f64 = 10.0;
-/// A variable is named where it predicts clearly more than this share of the missing term on unseen data: what depends on it
-/// alone is predicted nearly in full, and a record that holds few values of the command ties each of them to a time ...
+/// A variable is named if it predicts clearly more than this share of the missing term on unseen data: a function of this variable alone is
+/// predicted nearly in full, and in a record with few values of the command each value belongs to a certain time ...
 const NAMED: f64 = 0.8;
 /// ... by this number of standard errors.
 const CLEARLY: f64 = 1.64;
@@ -220,7 +220,7 @@ fn report(
     }
 }
 
-/// Stretches in which the band does not hold zero, the strongest first.
+/// Intervals in which the band excludes zero, the strongest first.
 fn windows(begin: f64, time: &[f64], value: &[f64], error: &[f64]) -> Vec<Window> {
     let mut windows: Vec<(f64, Window)> = Vec::new();
     let clear = |i: usize| value[i].abs() > BAND * error[i];

@@ -46,7 +46,7 @@ pub(super) struct Shape {
     pub knots: Vec<f64>,
     /// Ordinates without the part that the plant's own parameters explain.
     pub ordinates: Vec<f64>,
-    /// The inverse of the ordinates' covariance; singular where the plant's parameters imitate them.
+    /// The inverse of the ordinates' covariance; singular in directions that the plant's parameters explain.
     pub information: DMatrix<f64>,
     pub covariance: DMatrix<f64>,
     /// Share of the missing term that it predicts on unseen data, with its standard error.
@@ -88,7 +88,7 @@ pub(super) fn shape(
         .with_structure(node.setup.structure.with_term(term)?)?;
     let mut start = node.fit.x.clone();
     start.splice(own..own, vec![0.0; k]);
-    // An ordinate is as large as the smoothed term is, give or take.
+    // An ordinate has about the size of the smoothed term.
     let (mut sum, mut count) = (0.0, 0.0);
     for value in smoothed.paths.iter().flat_map(|path| &path.value) {
         sum += value * value;
@@ -299,7 +299,7 @@ pub(super) fn fit(
 /// The predicted share of the missing term on parts that are left out in turn, and its standard error.
 ///
 /// The model is linear about its fit. An ordinate that only the left-out part has visited is near its neighbours'; initial
-/// states stay. A part counts for nothing at worst: what no other part has visited is no evidence against a variable.
+/// states stay. A part counts as zero at worst: values that no other part has visited are no evidence against a variable.
 /// `possible`: the residual with the most likely forcing; `states`: from which column on there are initial states.
 fn unseen(
     node: &Node,

@@ -32,7 +32,7 @@ const INSTANTS: usize = 96;
 const SAMPLES_PER_INSTANT: usize = 4;
 /// Times that the model is linearised about the path.
 const ROUNDS: usize = 3;
-/// The likelihood is searched over so many decades of lambda either way.
+/// Number of decades of lambda in either direction of the likelihood search.
 const DECADES: i32 = 8;
 
 /// A place of the chain.

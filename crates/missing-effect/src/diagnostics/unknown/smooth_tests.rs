@@ -274,7 +274,7 @@ fn the_band_of_a_shape_holds_the_truth_as_often_as_it_says() {
             let shape = shape(&node, &smoothed, Variable::Level, path)
                 .unwrap()
                 .unwrap();
-            // The truth too without what the plant's own parameters imitate.
+            // The true function too without the part that the plant's own parameters explain.
             let truth = nalgebra::DVector::from_iterator(
                 shape.knots.len(),
                 shape.knots.iter().map(|h| wave(*h)),

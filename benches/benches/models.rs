@@ -1,4 +1,5 @@
-//! Time per sample of models as text: the plants next to their kernels, and models that are stiff, swing, meet a limit, stick or have delays.
+//! Time per sample of models as text: the plants next to their kernels, and models that are stiff, swing, meet a limit, stick or have
+//! delays.
 #![allow(missing_docs)]
 
 use std::hint::black_box;

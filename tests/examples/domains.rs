@@ -1,5 +1,5 @@
-//! Records of nine models in which effects are hidden, from `../shared/domains` beside the checkout: what `ctid` says of each, and the answer
-//! where it lies beside.
+//! Records of nine models in which effects are hidden, from `../shared/domains` beside the checkout: what `ctid` says of each, and the
+//! answer where it lies beside.
 //!
 //! ```sh
 //! cargo build --release && cargo run --release -p ctid-tests --example domains [-- [--seeds N] CASE...]

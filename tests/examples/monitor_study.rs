@@ -1,11 +1,10 @@
 //! Detection rate and false alarm rate of the monitor.
 //!
-//! `cargo run --release -p ctid-tests --example monitor_study -- [LOOPS] [--ratio R] [--quiet-rows N]`: 30 loops drawn at
-//! random in which an effect of five kinds begins half-way, 1500 rows before and 1500 after, and 30 in which
-//! none does, 20 000 rows each. Plants, controllers and set points are drawn, the noise is white in every other loop and
-//! correlated in the others; the size is such that the believed model, refitted to the whole record without noise, misses it by `R` times the
-//! noise. `--lost S` takes the share S of the readings away, at random or, with `--at-steps`, in bursts where the set point steps;
-//! `--open` opens the loops in which nothing begins.
+//! `cargo run --release -p ctid-tests --example monitor_study -- [LOOPS] [--ratio R] [--quiet-rows N]`: 30 loops drawn at random in which
+//! an effect of five kinds begins half-way, 1500 rows before and 1500 after, and 30 in which none does, 20 000 rows each. Plants,
+//! controllers and set points are drawn, the noise is white in every other loop and correlated in the others; the size is such that the
+//! believed model, refitted to the whole record without noise, misses it by `R` times the noise. `--lost S` takes the share S of the
+//! readings away, at random or, with `--at-steps`, in bursts where the set point steps; `--open` opens the loops in which nothing begins.
 
 use clap::Parser;
 use ctid_tests::Drive;

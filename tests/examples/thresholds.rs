@@ -4,8 +4,8 @@
 //! cargo run --release -p ctid-tests --example thresholds -- --records 24
 //! ```
 //! Records are drawn as `library_study` draws them: single effects of the catalogue, candidates of a user's own, nothing, and what neither
-//! holds, in equal parts; the structural error is 1 or 3 times the noise, which is white or coloured. A record takes part where its diagnosis
-//! with the default thresholds ends within a quarter of the time limit, so that the limit decides nothing.
+//! holds, in equal parts; the structural error is 1 or 3 times the noise, which is white or coloured. A record takes part where its
+//! diagnosis with the default thresholds ends within a quarter of the time limit, so that the limit decides nothing.
 //!
 //! A column has three values: with half the threshold, with its default and with twice of it. Whole numbers are rounded, and at least 1.
 //! A record that comes from outside is not counted where an effect that was named describes it as well.
@@ -54,8 +54,8 @@ const WITHIN: f64 = 0.25;
 /// Factors of a threshold, in addition to its default.
 const FACTORS: [f64; 2] = [0.5, 2.0];
 
-/// Runs tasks on all processors. Each has a pool of one thread: a diagnosis that waits in a common pool takes up another record, and its time
-/// passes.
+/// Runs tasks on all processors. Each has a pool of one thread: a diagnosis that waits in a common pool takes up another record, and its
+/// time passes.
 fn in_parallel<T: Send>(tasks: usize, run: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let work = || {

@@ -51,8 +51,8 @@ const STEPS: usize = 20;
 /// Moves the estimates to the nearest point that satisfies all `rows`; weights have no influence. Returns whether the estimates changed.
 ///
 /// # Errors
-/// [`Error::NoCommonPoint`] where the rows contradict each other, [`Error::NotFinite`] where `f' theta` leaves the floating-point range, and
-/// [`Error::Rls`] where `P` is not positive definite, which [`ExactHold`](ct_rls::ExactHold) excludes; nothing is changed then.
+/// [`Error::NoCommonPoint`] where the rows contradict each other, [`Error::NotFinite`] where `f' theta` leaves the floating-point range,
+/// and [`Error::Rls`] where `P` is not positive definite, which [`ExactHold`](ct_rls::ExactHold) excludes; nothing is changed then.
 pub fn project<const P: usize, const R: usize, I: Integrator>(
     rls: &mut ContinuousRls<P, I>,
     rows: &[Row<P>; R],
@@ -78,8 +78,8 @@ pub fn project<const P: usize, const R: usize, I: Integrator>(
 /// Where `P` is so nearly singular that rounding hides which point is nearest, each entry goes to its nearer bound.
 ///
 /// # Errors
-/// [`Error::Bounds`], [`Error::NotFinite`] where a violation leaves the floating-point range, and [`Error::Rls`] where `P` is not positive definite, which [`ExactHold`](ct_rls::ExactHold) excludes;
-/// nothing is changed then.
+/// [`Error::Bounds`], [`Error::NotFinite`] where a violation leaves the floating-point range, and [`Error::Rls`] where `P` is not positive
+/// definite, which [`ExactHold`](ct_rls::ExactHold) excludes; nothing is changed then.
 pub fn project_box<const P: usize, I: Integrator>(
     rls: &mut ContinuousRls<P, I>,
     lower: &SVector<f64, P>,

@@ -86,8 +86,8 @@ impl<const P: usize> Row<P> {
     /// `gamma = w`. Unit of the weight; at least 0, below `2 w`, and 0 where `w` is: then `V` falls, (3.8).
     ///
     /// With a `gamma` other than `w` no criterion is minimised, not even (3.5), and the row needs
-    /// [`ConstrainedRls::with_free_gamma`](crate::ConstrainedRls::with_free_gamma). Below `w` the row keeps its influence for longer than its information, which is useful
-    /// for a varying `chi`; above `w` its information exceeds its influence.
+    /// [`ConstrainedRls::with_free_gamma`](crate::ConstrainedRls::with_free_gamma). Below `w` the row keeps its influence for longer than
+    /// its information, which is useful for a varying `chi`; above `w` its information exceeds its influence.
     ///
     /// # Errors
     /// [`Error::Gamma`] out of this range; [`Error::PenaltyGamma`] for an inequality and a `gamma` other than 0.

@@ -1,7 +1,7 @@
 //! The state variable filter of an output of which readings may be missing, for regressions that have no model to put in their place.
 //!
-//! Method: between its readings the output is taken to run on lines, as [`Hold::First`](crate::Hold::First) has it between samples in any case: where
-//! readings are missing the line is longer, and the filter's step with it, exactly. Rows without a reading are none.
+//! Method: between its readings the output is taken to run on lines, as [`Hold::First`](crate::Hold::First) has it between samples in any
+//! case: where readings are missing the line is longer, and the filter's step with it, exactly. Rows without a reading are none.
 //!
 //! A line over a time that is long beside the filter's is not what the plant did: after a gap of more than `1/lambda`, `lambda =
 //! (e_0/e_n)^(1/n)`, rows are left out until the filter has forgotten it, down to 1 % by the response of `1/(p + lambda)^n`: for n = 1 to 4
@@ -9,8 +9,8 @@
 //!
 //! Cost: that of [`StateVariableFilter`]; where no reading is missing its values are the same, bit for bit.
 //!
-//! Reference: H. Garnier, L. Wang (eds.), Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 1 and 4, for filters
-//! over steps that differ.
+//! Reference: H. Garnier, L. Wang (eds.), Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 1 and 4, for
+//! filters over steps that differ.
 
 use crate::{Error, StateVariableFilter};
 
@@ -48,8 +48,8 @@ impl ReadingFilter {
         }
     }
 
-    /// Takes a reading, NaN where it is missing, `step` after the last row \[time\], and gives the filtered output and its derivatives there;
-    /// nothing where the reading is missing or the filter has not forgotten a long gap.
+    /// Takes a reading, NaN where it is missing, `step` after the last row \[time\], and gives the filtered output and its derivatives
+    /// there; nothing where the reading is missing or the filter has not forgotten a long gap.
     ///
     /// # Errors
     /// As of [`StateVariableFilter::update`].

@@ -99,9 +99,9 @@ impl Model {
 }
 
 impl Model {
-    /// The matrices of the model about a point, by exact derivatives; `state_offset` is the slope of each state there, `output_offset` each output
-    /// there, so that `d(x - x0)/dt = A (x - x0) + B (u - u0) + state_offset`. Branches are those that hold there; plays stand where they are. `None`
-    /// where the model delays something, or has no finite value or slope there.
+    /// The matrices of the model about a point, by exact derivatives; `state_offset` is the slope of each state there, `output_offset` each
+    /// output there, so that `d(x - x0)/dt = A (x - x0) + B (u - u0) + state_offset`. Branches are those that hold there; plays stand where
+    /// they are. `None` where the model delays something, or has no finite value or slope there.
     ///
     /// `parameters`, `states` and `inputs` in the order of the text, each in its unit; `time` in the model's unit.
     ///

@@ -1,7 +1,7 @@
 //! Where units do not fit together: dimensions through every expression.
 //!
-//! A number that stands in a text has any dimension in a sum and a comparison (`T + 273.15`), and none in a product. What has no unit, or one
-//! that is not understood, fits everything. Sizes are not compared: `kW` and `W` are both power.
+//! A number that stands in a text has any dimension in a sum and a comparison (`T + 273.15`), and none in a product. What has no unit, or
+//! one that is not understood, fits everything. Sizes are not compared: `kW` and `W` are both power.
 
 use ct_signals::{Dimension, Unit};
 

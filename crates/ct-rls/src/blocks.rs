@@ -13,9 +13,9 @@
 //! theta_i+ = theta_i + P_i phi_i eps(0) int_0^h c_i e^{eta_i t} (eps(t)/eps(0))/d_i dt
 //! P_i+     as of one block
 //! ```
-//! The integrals have no closed form that keeps its digits; with `c = gamma` Gauss and Legendre's rule of 8 points in
-//! `ln(1 + (s_1 + s_2) b)` gives them to 7e-7 for `b s` up to 100, to 1e-12 below 0.1. Updating one block after the other instead has an error
-//! of a third if the step is stiff. For `gamma < c` the range is cut into pieces; for `gamma = 0` in both there is a closed form.
+//! The integrals have no closed form that keeps its digits; with `c = gamma` Gauss and Legendre's rule of 8 points in `ln(1 + (s_1 + s_2)
+//! b)` gives them to 7e-7 for `b s` up to 100, to 1e-12 below 0.1. Updating one block after the other instead has an error of a third if
+//! the step is stiff. For `gamma < c` the range is cut into pieces; for `gamma = 0` in both there is a closed form.
 //!
 //! Convergence: **not** that of one block. `V = sum delta_i'P_i^-1 delta_i` may grow for every `gamma > 0`; with `gamma = 0` and
 //! `eta = 0` in both it falls, `dV/dt = -2 c eps^2` for `c_1 = c_2`.

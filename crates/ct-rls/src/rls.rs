@@ -40,7 +40,8 @@ impl<const P: usize> Sample<P> {
 
 /// Recursive least squares in continuous time, `P` parameters, no allocation.
 ///
-/// Equations, assumptions and convergence: those of the integrator, [`ExactHold`] unless another is named, which also says what is forgotten.
+/// Equations, assumptions and convergence: those of the integrator, [`ExactHold`] unless another is named, which also says what is
+/// forgotten.
 ///
 /// ```
 /// use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, Weights};

@@ -1,7 +1,7 @@
 //! An estimator as it stands, saved and restored: after that the next updates give the same numbers to the bit.
 //!
-//! `theta`, the factors of `P`, the settings, and what the guards have counted are written, alike for [`ContinuousRls`] and `DynamicRls`, so
-//! that each reads what the other has saved. `P` is written as `U` and `D`: it is symmetric whatever is read. What is read is checked
+//! `theta`, the factors of `P`, the settings, and what the guards have counted are written, alike for [`ContinuousRls`] and `DynamicRls`,
+//! so that each reads what the other has saved. `P` is written as `U` and `D`: it is symmetric whatever is read. What is read is checked
 //! like what a constructor is given: sizes, numbers that are not finite, pivots that are not above 0.
 
 use core::fmt::{Formatter, Result as Written};

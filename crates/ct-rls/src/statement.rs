@@ -25,8 +25,8 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
         self.absorb_with(f, chi, information, 1.0)
     }
 
-    /// [`absorb`](Self::absorb) with `ratio = gamma/w`, 0 or more and below 2: `P^-1` grows by `ratio information f f'`, and
-    /// `f' theta` goes towards `chi` by the share `1 - (1 + ratio information f'P f)^(-1/ratio)`. 1 is least squares, 0 leaves `P` as it is.
+    /// [`absorb`](Self::absorb) with `ratio = gamma/w`, 0 or more and below 2: `P^-1` grows by `ratio information f f'`, and `f' theta`
+    /// goes towards `chi` by the share `1 - (1 + ratio information f'P f)^(-1/ratio)`. 1 is least squares, 0 leaves `P` as it is.
     ///
     /// Returns as [`absorb`](Self::absorb), and `None` for a ratio out of its range.
     pub fn absorb_with(
@@ -63,8 +63,8 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
 /// - `epsilon`: `chi - f1' theta1 - f2' theta2`, which the caller knows.
 /// - `information`, `ratio`: of either block, as of [`ContinuousRls::absorb_with`]; both informations above 0.
 ///
-/// The two share the error, as in [`update_blocks`](crate::update_blocks). With both ratios 0 the step is exact whatever the rule. `None`, and nothing is done, where a number is out of range or a
-/// run has stopped.
+/// The two share the error, as in [`update_blocks`](crate::update_blocks). With both ratios 0 the step is exact whatever the rule. `None`,
+/// and nothing is done, where a number is out of range or a run has stopped.
 pub fn absorb_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     (first, f1): (&mut ContinuousRls<A, I>, &SVector<f64, A>),
     (second, f2): (&mut ContinuousRls<B, I>, &SVector<f64, B>),

@@ -173,9 +173,9 @@ impl Record {
         self.inputs.iter().any(|u| u.missing() > 0) || self.missing_rows() > 0
     }
 
-    /// The record without gaps, as the head of this file says: inputs are held for at most `longest` \[s\] (from 0 on, infinite: for as long
-    /// as it takes), and the parts between longer gaps are records of their own, under one name and on one clock. A missing row that is
-    /// held through becomes a row without outputs. A reference is held for as long as it takes, as a set point is.
+    /// The record without gaps, as the head of this file says: inputs are held for at most `longest` \[s\] (from 0 on, infinite: for as
+    /// long as it takes), and the parts between longer gaps are records of their own, under one name and on one clock. A missing row that
+    /// is held through becomes a row without outputs. A reference is held for as long as it takes, as a set point is.
     ///
     /// A record without gaps comes back as it is. No part comes back where no row has all inputs.
     #[must_use]

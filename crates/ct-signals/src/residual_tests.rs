@@ -42,9 +42,9 @@ pub fn autocorrelation(x: &[f64], max_lag: usize) -> Vec<f64> {
 /// -1..1. 0 at lags that the record is too short for, and at all when one of the two does not vary.
 /// Of two series of different lengths the end of the longer is left out.
 ///
-/// Where samples are missing (NaN) it is, at each lag, the correlation over the pairs that are there, times
-/// `(N - lag)/N` for the series' length `N`, as that of a whole series has it. Its standard deviation is then about `(N - lag)/N` over the root of
-/// the number of [`pairs`], for white series.
+/// Where samples are missing (NaN) it is, at each lag, the correlation over the pairs that are there, times `(N - lag)/N` for the series'
+/// length `N`, as that of a whole series has it. Its standard deviation is then about `(N - lag)/N` over the root of the number of
+/// [`pairs`], for white series.
 pub fn cross_correlation(u: &[f64], e: &[f64], max_lag: usize) -> Vec<f64> {
     let n = u.len().min(e.len());
     let (u, e) = (centred(&u[..n]), centred(&e[..n]));
@@ -118,12 +118,11 @@ pub fn ljung_box(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Error> {
 /// Whether the residual `e` is independent of the input's past: the correlation at lags `0..=lags`
 /// and the probability `p` of lags `1..=lags` under that hypothesis.
 ///
-/// The correlation of two smooth signals is large by chance alone, so both are first made white,
-/// each by an autoregressive filter fitted to it (Haugh's test). The order is at most 20, by BIC,
-/// and 0 for a residual that is white already. The share of `e` that its regression on `u` at lags `1..=lags` explains, times `n`, is then
-/// chi-square with as many degrees of freedom as lags are distinct. Haugh's sum of squared correlations is the same where `u` is white; a filter
-/// leaves the moves of an input that steps at regular times periodic, and its correlations at lags a period apart are then one and
-/// the same.
+/// The correlation of two smooth signals is large by chance alone, so both are first made white, each by an autoregressive filter fitted to
+/// it (Haugh's test). The order is at most 20, by BIC, and 0 for a residual that is white already. The share of `e` that its regression on
+/// `u` at lags `1..=lags` explains, times `n`, is then chi-square with as many degrees of freedom as lags are distinct. Haugh's sum of
+/// squared correlations is the same where `u` is white; a filter leaves the moves of an input that steps at regular times periodic, and its
+/// correlations at lags a period apart are then one and the same.
 ///
 /// Lag 0 is reported but does not count: `y[k]` is read before `u[k]` acts, so the input cannot
 /// show there, while a controller that reads `y[k]` can.

@@ -83,8 +83,8 @@ impl Rows {
     /// The second value is whether the line is a row, to be read by [`Rows::read`] too.
     ///
     /// # Errors
-    /// As of [`read_csv`](crate::read_csv) for a header; [`Error::NoOrder`] for numbers that are neither time, input and outputs nor these with
-    /// a reference. There is one output where `columns` name none.
+    /// As of [`read_csv`](crate::read_csv) for a header; [`Error::NoOrder`] for numbers that are neither time, input and outputs nor these
+    /// with a reference. There is one output where `columns` name none.
     pub fn begin(
         file: &str,
         row: u64,
@@ -293,7 +293,8 @@ impl Rows {
     }
 }
 
-/// Whether the cells of a first line are a row, and no names: numbers alone, or a time, whole or the end of one, and what may stand for samples.
+/// Whether the cells of a first line are a row, and no names: numbers alone, or a time, whole or the end of one, and what may stand for
+/// samples.
 fn is_row(cells: &[String], columns: &Columns) -> bool {
     let format = columns.time_format.as_deref();
     let is_time = |cell: &str| {

@@ -16,7 +16,8 @@
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
 //! | what is written, and what is not overwritten | [`output`] |
 //!
-//! The algorithms are in the crates below, the search in `missing-effect`, linear models in `linear-identification`, the papers' tables in `paper-tables`; here is only what surrounds them.
+//! The algorithms are in the crates below, the search in `missing-effect`, linear models in `linear-identification`, the papers' tables in
+//! `paper-tables`; here is only what surrounds them.
 
 mod atomic;
 pub mod catalogue;

@@ -6,8 +6,9 @@
 //! vessel,level,8.2,-0.3,0.2
 //! vessel,level,11.0,-4.1,0.3
 //! ```
-//! `place` is `actuator` (of two pumps the first), `sensor` (of several `sensor upper`), `vessel`, or of several vessels the name of one; `variable` is `level`, `rate` (the
-//! vessel's net inflow), `input` or `time` (since the record began). The standard errors are for the reader alone.
+//! `place` is `actuator` (of two pumps the first), `sensor` (of several `sensor upper`), `vessel`, or of several vessels the name of one;
+//! `variable` is `level`, `rate` (the vessel's net inflow), `input` or `time` (since the record began). The standard errors are for the
+//! reader alone.
 
 use std::path::Path;
 
@@ -127,7 +128,8 @@ pub fn text(unknown: &Unknown) -> String {
     )
 }
 
-/// The file of a curve: its place and variable, the units of the variable and of the term, and where it is, its value and its standard error.
+/// The file of a curve: its place and variable, the units of the variable and of the term, and where it is, its value and its standard
+/// error.
 pub(crate) fn of_curve(
     (place, variable): (&str, &str),
     (at, of): (&str, &str),

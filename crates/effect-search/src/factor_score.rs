@@ -1,8 +1,8 @@
 //! The score of a candidate whose absence is a limit: an RC pair is not there at no value of its resistance and capacity.
 //!
-//! A factor before its terms ([`Candidate::with_factor`]) takes it out of the model. The score is the step of Gauss-Newton by this factor and
-//! all other parameters, from zero, over the starts of the candidate's own parameters. The fit has no factor: it begins where these parameters
-//! give, to the order of a product or a quotient, what the factor of the step gives.
+//! A factor before its terms ([`Candidate::with_factor`]) takes it out of the model. The score is the step of Gauss-Newton by this factor
+//! and all other parameters, from zero, over the starts of the candidate's own parameters. The fit has no factor: it begins where these
+//! parameters give, to the order of a product or a quotient, what the factor of the step gives.
 
 use std::sync::Arc;
 

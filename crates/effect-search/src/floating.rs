@@ -1,9 +1,9 @@
 //! Sets of effects that grow from what earlier searches found: one effect more at a time, then swap steps while they lower the
 //! error (floating search).
 //!
-//! The effects of a measured record act together: two heaters on one board couple, their supply sags under both, and their sensors lag; any one
-//! of these explains little without the others. A beam of the best pairs drops such a set in favour of functions of time, which fit any slow error.
-//! Here sets are compared by their simulation error, without functions of time.
+//! The effects of a measured record act together: two heaters on one board couple, their supply sags under both, and their sensors lag; any
+//! one of these explains little without the others. A beam of the best pairs drops such a set in favour of functions of time, which fit any
+//! slow error. Here sets are compared by their simulation error, without functions of time.
 //!
 //! **Reference**: P. Pudil, J. Novovicova, J. Kittler, Pattern Recognition Letters 15 (1994) 1119-1125 (floating search).
 

@@ -109,8 +109,8 @@ impl Context<'_> {
     }
 
     /// Whether a set explains most of what another one does of what a third leaves, and leaves what may be noise of another spectrum: with
-    /// a noise model of its own, what the other one gains is not beyond chance. Users propose the likely physics of their model, and a measured record usually contains more:
-    /// a more flexible effect of the catalogue would win by fitting the rest.
+    /// a noise model of its own, what the other one gains is not beyond chance. Users propose the likely physics of their model, and a
+    /// measured record usually contains more: a more flexible effect of the catalogue would win by fitting the rest.
     fn explains_most(
         &self,
         (set, last): (&Node, &Node),

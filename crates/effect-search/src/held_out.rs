@@ -1,8 +1,8 @@
 //! Errors on held-out records: their initial states are fitted on the first samples, all else stays, and the rest is scored.
 //!
-//! The first five samples, as the benchmark of the cascaded tanks has it, wherever they determine the states well enough. A speed that is not
-//! measured, say, follows from five noisy positions so badly that its error alone decides the score: then the samples are doubled until what is
-//! not known of the states moves the outputs by no more than their noise.
+//! The first five samples, as the benchmark of the cascaded tanks has it, wherever they determine the states well enough. A speed that is
+//! not measured, say, follows from five noisy positions so badly that its error alone decides the score: then the samples are doubled until
+//! what is not known of the states moves the outputs by no more than their noise.
 
 use ct_signals::Record;
 use estimation::Fit;

@@ -1,7 +1,7 @@
 //! Joint scores of all pairs of candidates: the fall of the cost that both predict together, from one linearisation of each.
 //!
-//! A candidate's columns are its derivatives at its best start and, where it is not absent there, the change of the outputs. All columns are
-//! whitened and projected off those of the believed model; a pair then costs one solution of a small system.
+//! A candidate's columns are its derivatives at its best start and, where it is not absent there, the change of the outputs. All columns
+//! are whitened and projected off those of the believed model; a pair then costs one solution of a small system.
 
 use estimation::{Noise, Rows, rows};
 use nalgebra::{DMatrix, DVector};

@@ -1,11 +1,11 @@
 //! Partial explanation: the largest part of the error that effects explain, if the residual is slower than noise that a search can model.
 //!
-//! Measured records hold several causes, and disturbances that are nearly integrated. A noise model with a long memory uses changes from sample to sample only: it treats every slow
-//! effect as noise, and a fit with this weighting lets the simulation drift. In this case sets are compared by their simulation
-//! error. A set is a partial explanation if
-//! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an effect
-//!   that follows time alone, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and without others
-//!   beside it, as those then bend to any disturbance;
+//! Measured records hold several causes, and disturbances that are nearly integrated. A noise model with a long memory uses changes from
+//! sample to sample only: it treats every slow effect as noise, and a fit with this weighting lets the simulation drift. In this case sets
+//! are compared by their simulation error. A set is a partial explanation if
+//! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an
+//!   effect that follows time alone, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and
+//!   without others beside it, as those then bend to any disturbance;
 //! - several effects are called for where each model has a noise model of its own, of limited memory;
 //! - it predicts the next sample as well as the model without it, each beside a noise model of its own;
 //! - what is fitted to three quarters of the records predicts the fourth (cross-validation);

@@ -113,8 +113,8 @@ impl ProblemBuilder {
     ///
     /// # Errors
     /// [`Error::TimeUnit`]; [`Error::Fit`] where there is no record, a record is not sound or has not the channels of the model, or where
-    /// the model has no parameter of a name, or a prior is no number with an error. Of a model with effects the names are looked at when these
-    /// are in it, by [`diagnose`](crate::diagnose).
+    /// the model has no parameter of a name, or a prior is no number with an error. Of a model with effects the names are looked at when
+    /// these are in it, by [`diagnose`](crate::diagnose).
     pub fn build(self) -> Result<Problem, Error> {
         let problem = self.problem;
         let seconds = problem.time_unit;

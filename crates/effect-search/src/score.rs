@@ -4,8 +4,8 @@
 //! its starts. One linearisation weighted by the noise model gives the cost after the step, all parameters free: the score test, and its
 //! extension to thresholds.
 //!
-//! **Reference**: C. R. Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50-57 (score test); S. A. Billings, M. Korenberg, S. Chen, Int. J. Systems
-//! Science 19 (1988) 1559-1568 (orthogonal forward regression).
+//! **Reference**: C. R. Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50-57 (score test); S. A. Billings, M. Korenberg, S. Chen, Int. J.
+//! Systems Science 19 (1988) 1559-1568 (orthogonal forward regression).
 
 use std::sync::Arc;
 

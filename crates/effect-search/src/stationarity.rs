@@ -4,8 +4,8 @@
 //! which an autoregressive model takes for a broad resonance, is in another band in each part. The power of each band is compared over the
 //! parts (Bartlett's test of equal variances); each part is scaled to its own variance, so that noise whose size alone changes is the same.
 //!
-//! **References**: M. B. Priestley, T. Subba Rao, J. Royal Statistical Society B 31 (1969) 140-149 (the test of an evolving spectrum by time
-//! and frequency); M. S. Bartlett, Proc. Royal Society A 160 (1937) 268-282.
+//! **References**: M. B. Priestley, T. Subba Rao, J. Royal Statistical Society B 31 (1969) 140-149 (the test of an evolving spectrum by
+//! time and frequency); M. S. Bartlett, Proc. Royal Society A 160 (1937) 268-282.
 
 use ct_signals::ArModel;
 use realfft::RealFftPlanner;

@@ -1,9 +1,9 @@
 //! The shape of what no candidate explains: where a missing term acts, what it depends on, and how.
 //!
-//! At every port a smooth function ([`ct_model::effects::shapes_keeping`]) of every state and input is added to the model and fitted with all
-//! other parameters. A function bends to whatever there is, so ports and variables are compared by the error that each leaves on quarters of
-//! the records that it was not fitted to, against that of the model without it on all it was fitted to. Where none lowers that error, functions
-//! of time take part too, and the criterion decides.
+//! At every port a smooth function ([`ct_model::effects::shapes_keeping`]) of every state and input is added to the model and fitted with
+//! all other parameters. A function bends to whatever there is, so ports and variables are compared by the error that each leaves on
+//! quarters of the records that it was not fitted to, against that of the model without it on all it was fitted to. Where none lowers that
+//! error, functions of time take part too, and the criterion decides.
 
 use std::collections::BTreeMap;
 

@@ -29,8 +29,8 @@ pub struct Fit {
     pub noise: Noise,
     /// Weights of the rows of each output, in addition to whitening ([`crate::Squares::weights`]).
     pub weights: Vec<f64>,
-    /// Minus twice the logarithm of the Gaussian likelihood, the innovations' variance of each output at its best; priors are part of it, but
-    /// for what does not change.
+    /// Minus twice the logarithm of the Gaussian likelihood, the innovations' variance of each output at its best; priors are part of it,
+    /// but for what does not change.
     pub deviance: f64,
     /// Fitted numbers, those of the noise included.
     pub parameters: usize,
@@ -250,8 +250,8 @@ fn begun(model: &impl Residuals, given: &[f64], noise: &Noise) -> Vec<f64> {
     }
 }
 
-/// Fits from the given starts, in parallel, in the metric of a given noise, of which the colour counts alone. The best one is given, and how
-/// many agree with it.
+/// Fits from the given starts, in parallel, in the metric of a given noise, of which the colour counts alone. The best one is given, and
+/// how many agree with it.
 ///
 /// # Errors
 /// Where the model is not finite at any start.

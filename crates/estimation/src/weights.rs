@@ -1,16 +1,16 @@
 //! Weights of outputs with unknown noise variances.
 //!
-//! **Model**: the whitened residuals of output `o`, `N_o` of them, have the unknown variance `s_o^2`. At its best for a sum of squares `C_o`
-//! it is `C_o/N_o`, and minus twice the logarithm of the likelihood is, but for constants,
+//! **Model**: the whitened residuals of output `o`, `N_o` of them, have the unknown variance `s_o^2`. At its best for a sum of squares
+//! `C_o` it is `C_o/N_o`, and minus twice the logarithm of the likelihood is, but for constants,
 //! ```text
 //! sum_o N_o log(C_o/N_o) = N log(C/N),   C = N prod_o (C_o/N_o)^(N_o/N),   N = sum_o N_o
 //! ```
 //! So `C`, N times the weighted geometric mean of the variances, is to several outputs what the sum of squares is to one: the smaller the
 //! more likely, and `N log(C_a/C_b)` compares two models. Of one output it is the sum of squares.
 //!
-//! **Weights**: `dC = sum_o w_o^2 dC_o` with `w_o^2 = (C/N)/(C_o/N_o)`, so rows of output `o` times `w_o` have the gradient of `C`; and since a
-//! geometric mean is at most the arithmetic one, a step that lowers the weighted sum of squares lowers `C` by at least as much. The weights
-//! are those of iteratively reweighted least squares.
+//! **Weights**: `dC = sum_o w_o^2 dC_o` with `w_o^2 = (C/N)/(C_o/N_o)`, so rows of output `o` times `w_o` have the gradient of `C`; and
+//! since a geometric mean is at most the arithmetic one, a step that lowers the weighted sum of squares lowers `C` by at least as much. The
+//! weights are those of iteratively reweighted least squares.
 //!
 //! **Known variances** leave the plain weighted sum of squares, in units of that of the first output.
 //!

@@ -7,10 +7,12 @@
 //! explains, filtered by a ladder of lags `1/(1 + T p)`, less what noise of that colour would show. A wrong gain, sign
 //! or unit of time shows there; noise does not, because r knows nothing of it.
 //!
-//! Assumptions: r does what its hold says; y runs in straight lines between samples, or is held, whichever fits better. Where readings of y are missing it runs in lines between
-//! those that are there: what the controller did with the readings that the record lacks adds to the mismatch, and is little beside 10 % of u unless gaps are long and many.
+//! Assumptions: r does what its hold says; y runs in straight lines between samples, or is held, whichever fits better. Where readings of y
+//! are missing it runs in lines between those that are there: what the controller did with the readings that the record lacks adds to the
+//! mismatch, and is little beside 10 % of u unless gaps are long and many.
 //!
-//! Limits: what is wrong only at frequencies below lambda is not seen; a controller that is sampled much more slowly than the record's dynamics is not the continuous one, and shows.
+//! Limits: what is wrong only at frequencies below lambda is not seen; a controller that is sampled much more slowly than the record's
+//! dynamics is not the continuous one, and shows.
 
 use ct_lti::{Hold, Polynomial, Simulator, StateSpace, TransferFunction};
 use ct_signals::ArModel;

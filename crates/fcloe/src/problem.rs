@@ -5,8 +5,8 @@
 //! a record's offsets are estimated, `y^ = c_y + T(p) (r - c_r)` with `T = B R/P`, and its two levels join the
 //! parameters, with the sensitivities `1` and `-T 1`.
 //!
-//! The sums are held as the triangle R of [`estimation::Triangle`]: `J'' = 2 R'R`, `J' = -2 R'z`, z its last column, so that the condition of
-//! the sensitivities is not squared; [`Problem`] is one of [`estimation::Residuals`].
+//! The sums are held as the triangle R of [`estimation::Triangle`]: `J'' = 2 R'R`, `J' = -2 R'z`, z its last column, so that the condition
+//! of the sensitivities is not squared; [`Problem`] is one of [`estimation::Residuals`].
 //!
 //! Readings of y may be missing: the simulation runs on, and their rows have no residual and do not count.
 //!

@@ -156,8 +156,8 @@ impl LoopRecord {
         }
     }
 
-    /// Checks the step, the lengths and that all numbers are finite; readings of y may be missing (NaN), but not all of them, nor all of those that say where
-    /// zero is.
+    /// Checks the step, the lengths and that all numbers are finite; readings of y may be missing (NaN), but not all of them, nor all of
+    /// those that say where zero is.
     ///
     /// # Errors
     /// [`Error::Setting`], [`Error::SignalLength`], [`Error::NotFinite`], [`Error::NoReading`].
@@ -228,8 +228,8 @@ impl LoopRecord {
         Ok((r, self.r_hold))
     }
 
-    /// The levels that are subtracted: where [`Offsets::Estimated`], those of the first row (of y of the first reading), as a start. 0 for a
-    /// signal that is not there. Missing readings are left out of means.
+    /// The levels that are subtracted: where [`Offsets::Estimated`], those of the first row (of y of the first reading), as a start. 0 for
+    /// a signal that is not there. Missing readings are left out of means.
     pub fn operating_point(&self) -> OperatingPoint {
         let level = |signal: Option<&[f64]>| {
             let signal = signal.unwrap_or_default();

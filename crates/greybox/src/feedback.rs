@@ -7,11 +7,11 @@
 //! ```text
 //! y - ym = v / (1 + P C),   v = (1 + P C) (y - ym)
 //! ```
-//! An integral in `C` takes the slow part out of `y - ym`, and the information on static parameters with it. So what the loop did
-//! is undone: `y - ym + P0 (um - u)`, at every output, `P0` the plant linearised once at a first fit, is `v` itself, limits or not, of which a noise
-//! model is then made. Without limits this is the filter `1 + P0 C` of `y - ym`. The derivatives are filtered alike, and hold no
-//! noise: the estimate is the one of an instrumental variable, unbiased whatever the colour of `v` and whatever `P0`, which
-//! only the variance hangs on. The determinant of what makes `v` of `y` is one, so likelihoods compare.
+//! An integral in `C` takes the slow part out of `y - ym`, and the information on static parameters with it. So what the loop did is
+//! undone: `y - ym + P0 (um - u)`, at every output, `P0` the plant linearised once at a first fit, is `v` itself, limits or not, of which a
+//! noise model is then made. Without limits this is the filter `1 + P0 C` of `y - ym`. The derivatives are filtered alike, and hold no
+//! noise: the estimate is the one of an instrumental variable, unbiased whatever the colour of `v` and whatever `P0`, which only the
+//! variance hangs on. The determinant of what makes `v` of `y` is one, so likelihoods compare.
 //!
 //! **Assumptions**: `y[k]` is read before `u[k]` acts; the command is held; the reference is not constant; nothing of `v`
 //! is in `r`.

@@ -23,8 +23,9 @@ const QUICKER: [f64; 3] = [0.3, 3.0, 9.0];
 
 /// Plants that are quicker or slower than one, in front of which something sticks or saturates; none for other effects.
 ///
-/// A model without the effect responds to commands that do not move the real actuator. Its fit compensates for this by a small gain and another time
-/// constant, a much longer one or none at all. For tanks the gain and the outflows are scaled together, so that the levels do not change.
+/// A model without the effect responds to commands that do not move the real actuator. Its fit compensates for this by a small gain and
+/// another time constant, a much longer one or none at all. For tanks the gain and the outflows are scaled together, so that the levels do
+/// not change.
 #[must_use]
 pub fn with_other_speeds(setup: &Setup, placed: Placed, x: &[f64]) -> Vec<Vec<f64>> {
     let plant = setup.structure.plant;

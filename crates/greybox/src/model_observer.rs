@@ -1,8 +1,9 @@
 //! Starts from fits beside an observer: the readings pull the states that they read.
 //!
-//! The simulation error of a model that oscillates, or that a loop drives, has many local minima: a slightly wrong frequency is out of phase
-//! after a few periods. Where each state that is read follows its reading at a rate, errors do not add up, and the criterion is nearly that of
-//! equation errors: it has few minima, and its bias does not matter for a start. The rate is lowered in steps, until the model runs freely.
+//! The simulation error of a model that oscillates, or that a loop drives, has many local minima: a slightly wrong frequency is out of
+//! phase after a few periods. Where each state that is read follows its reading at a rate, errors do not add up, and the criterion is
+//! nearly that of equation errors: it has few minima, and its bias does not matter for a start. The rate is lowered in steps, until the
+//! model runs freely.
 //!
 //! **Reference**: L. Ljung, System Identification, 2nd ed. (1999), sections 4.3 (predictors with an observer) and 10.5 (initial values);
 //! H. G. Bock, in: Modelling of Chemical Reaction Systems, Springer (1981), 102-125 (shooting that is tied to the readings).

@@ -250,8 +250,8 @@ impl<'a> ModelSetup<'a> {
         }
     }
 
-    /// Fits from many starts. Of several outputs each counts by its noise, which is what the past of its residual does not explain: where the
-    /// model fails at one output, that does not make the others' readings worth more.
+    /// Fits from many starts. Of several outputs each counts by its noise, which is what the past of its residual does not explain: where
+    /// the model fails at one output, that does not make the others' readings worth more.
     ///
     /// # Errors
     /// Where no start gives a finite simulation.
@@ -284,8 +284,8 @@ impl<'a> ModelSetup<'a> {
         Ok(fit)
     }
 
-    /// The uncertainty of a fit under the noise of its residual, of order zero to `order` at each output ([`estimation::robust`]): [`Self::fit`]
-    /// takes the noise for white.
+    /// The uncertainty of a fit under the noise of its residual, of order zero to `order` at each output ([`estimation::robust`]):
+    /// [`Self::fit`] takes the noise for white.
     ///
     /// # Errors
     /// Where the simulation is not finite at the fit.

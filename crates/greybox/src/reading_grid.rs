@@ -5,10 +5,10 @@
 //! ([`ReadingGrid::coarseness`]).
 //!
 //! # Method
-//! Differences of neighbours among the sorted levels, and of readings that follow each other, are multiples of `D`. Quantiles of
-//! either, and these over small whole numbers, are candidates. A candidate is refined by least squares, `d = k D`, over
-//! differences of levels that stand 1, 2, 4, ... places apart: each doubling may trust its `k`, since the one before has made `D`
-//! as much more precise. The largest candidate on whose grid nearly all readings lie is the answer, unless as many levels lie there by chance.
+//! Differences of neighbours among the sorted levels, and of readings that follow each other, are multiples of `D`. Quantiles of either,
+//! and these over small whole numbers, are candidates. A candidate is refined by least squares, `d = k D`, over differences of levels that
+//! stand 1, 2, 4, ... places apart: each doubling may trust its `k`, since the one before has made `D` as much more precise. The largest
+//! candidate on whose grid nearly all readings lie is the answer, unless as many levels lie there by chance.
 
 use ct_signals::Record;
 

@@ -204,8 +204,8 @@ fn mean_level(setup: &Setup, vessel: usize) -> Option<f64> {
     Some(sum / count).filter(|mean| *mean > 0.0)
 }
 
-/// The initial states of the records of a setup from their first readings, for these parameters: a level that is not read, and lags, at rest
-/// under the first command.
+/// The initial states of the records of a setup from their first readings, for these parameters: a level that is not read, and lags, at
+/// rest under the first command.
 #[must_use]
 pub fn levels_from_readings(setup: &Setup, parameters: &[f64]) -> Vec<f64> {
     let mut x = parameters.to_vec();

@@ -12,8 +12,8 @@ const DOUBLINGS: usize = 24;
 /// Levels are at rest if they change by less than this share of the largest level over two steps.
 const STILL: f64 = 1e-12;
 
-/// The initial states of the first record of a setup at rest under its first inputs \[units of the levels\], for these parameters; `None` where
-/// the plant comes to no rest.
+/// The initial states of the first record of a setup at rest under its first inputs \[units of the levels\], for these parameters; `None`
+/// where the plant comes to no rest.
 #[must_use]
 pub fn steady_state(setup: &Setup, parameters: &[f64]) -> Option<Vec<f64>> {
     let record = setup.records.first()?;

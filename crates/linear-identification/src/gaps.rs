@@ -1,7 +1,7 @@
 //! Records in which rows or samples of the input are missing, as the methods take them.
 //!
-//! As everywhere else ([`ct_signals::Gaps`]) the input is held through a gap of at most a tenth of the plant's fastest time constant, which a first
-//! fit says (SRIVC of the order that is asked for). At a longer gap the record is cut.
+//! As everywhere else ([`ct_signals::Gaps`]) the input is held through a gap of at most a tenth of the plant's fastest time constant, which
+//! a first fit says (SRIVC of the order that is asked for). At a longer gap the record is cut.
 //!
 //! | methods | what they take |
 //! |---|---|
@@ -54,7 +54,8 @@ struct TimeConstants {
 /// The fitted records, and others of the same plant, without gaps, for models of at most this order.
 ///
 /// # Errors
-/// [`Error::Signals`] and [`Error::NoSignal`] for a record that is none, [`Error::NoStretch`] where nothing is left of a record, [`Error::FirstFit`] where its first fit fails.
+/// [`Error::Signals`] and [`Error::NoSignal`] for a record that is none, [`Error::NoStretch`] where nothing is left of a record,
+/// [`Error::FirstFit`] where its first fit fails.
 pub fn mend(
     fitted: Vec<Record>,
     others: Vec<Record>,

@@ -6,10 +6,11 @@
 //! ```text
 //! z_i <- l z_i + sum_o s_io e_o      v_i <- l^2 v_i + sum_o s_io^2      c_i <- l c_i + sum_o s_io s_po      score_i = z_i/sqrt(v_i + c_i' P c_i)
 //! ```
-//! is the score statistic of a change of direction `i` within the window (M. Basseville, I. V. Nikiforov, Detection of Abrupt
-//! Changes, 1993, ch. 8: the local approach), `s_p` the parameters' derivatives and `P` the covariance with which they were learned: an error
-//! of learning leaves `c_i' dp` in `z_i`. The noises of the outputs are independent. The sum is a martingale in a loop too, where `s`
-//! depends on the past noise. So the score is standard normal where nothing has changed. `e_o` is cut at 4, so that a few wild readings do not raise an alarm.
+//! is the score statistic of a change of direction `i` within the window (M. Basseville, I. V. Nikiforov, Detection of Abrupt Changes,
+//! 1993, ch. 8: the local approach), `s_p` the parameters' derivatives and `P` the covariance with which they were learned: an error of
+//! learning leaves `c_i' dp` in `z_i`. The noises of the outputs are independent. The sum is a martingale in a loop too, where `s` depends
+//! on the past noise. So the score is standard normal where nothing has changed. `e_o` is cut at 4, so that a few wild readings do not
+//! raise an alarm.
 //!
 //! Cost: windows x directions x (parameters + 4) x outputs multiplications a sample; the product with `P` only where `z_i^2/v_i` passes.
 

@@ -1,9 +1,8 @@
 //! Isolation: which effect of the catalogue began, and when, explains the latest rows.
 //!
-//! An effect that begins at row `k` is fitted to the rows of all outputs from `k` on by `greybox`, in the metric of the learned noise: every
-//! parameter of the plant as it was learned, the levels at `k` as the learned model has them, only the effect's own
-//! parameters free. Onsets lie on a grid that is finer towards now, and then between its neighbours. With the innovations
-//! `e` of the learned model,
+//! An effect that begins at row `k` is fitted to the rows of all outputs from `k` on by `greybox`, in the metric of the learned noise:
+//! every parameter of the plant as it was learned, the levels at `k` as the learned model has them, only the effect's own parameters free.
+//! Onsets lie on a grid that is finer towards now, and then between its neighbours. With the innovations `e` of the learned model,
 //! ```text
 //! evidence = sum_o (sum_{j >= k} e_jo^2 - cost_o/sigma_o^2) - (parameters + 1) ln n
 //! ```

@@ -17,7 +17,8 @@ const STILL: f64 = 1e-9;
 /// Fewest rows with a reading of each output, as a part of all.
 pub(crate) const READ: f64 = 0.5;
 
-/// Fits in turn with what is expected of lost readings: each leaves of the error of the one before the share of the information that is lost.
+/// Fits in turn with what is expected of lost readings: each leaves of the error of the one before the share of the information that is
+/// lost.
 const ROUNDS: usize = 2;
 
 const NO_NOISE: &str =

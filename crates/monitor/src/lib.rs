@@ -9,14 +9,14 @@
 //! | What if it is stopped? | save [`Monitor::state`]; [`Monitor::restore`] continues without a difference |
 //!
 //! It learns first: the believed model is fitted to the first rows (a thousand and twenty time constants at least), with the spectrum of
-//! the noise at each output. From then on the learned model is simulated in parallel with the plant on the measured command, and does not adapt: a change that feedback hides in the reading is then visible
-//! through the command, and a slow change does not become normal. After an alarm the learned model is kept
-//! until it fits again. Memory is constant, and a row of up to eight inputs, outputs and states each allocates nothing, but
-//! for one in 2048 (a checkpoint) and the looks after an alarm.
+//! the noise at each output. From then on the learned model is simulated in parallel with the plant on the measured command, and does not
+//! adapt: a change that feedback hides in the reading is then visible through the command, and a slow change does not become normal. After
+//! an alarm the learned model is kept until it fits again. Memory is constant, and a row of up to eight inputs, outputs and states each
+//! allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
 //!
-//! **Several outputs.** Readings are given in the order of [`plants::Known::measured`], or of the outputs of the text. Each output has a noise of its own, independent of the
-//! others, and may lack readings for itself. One model runs beside all of them: scores, tracker and isolation take each innovation in units
-//! of its own standard deviation, and an alarm that speaks of a sensor says of which.
+//! **Several outputs.** Readings are given in the order of [`plants::Known::measured`], or of the outputs of the text. Each output has a
+//! noise of its own, independent of the others, and may lack readings for itself. One model runs beside all of them: scores, tracker and
+//! isolation take each innovation in units of its own standard deviation, and an alarm that speaks of a sensor says of which.
 //!
 //! **Users' own models** have any number of inputs, outputs and states. For these models no effect is named: an alarm gives the
 //! time since when the model does not fit.

@@ -265,8 +265,8 @@ impl<'a> Monitor<'a> {
 
     /// Processes a row.
     ///
-    /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command, and no test uses a missing
-    /// reading.
+    /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command,
+    /// and no test uses a missing reading.
     ///
     /// # Errors
     /// [`Refused`]: time or command cannot be used, and the row is not.

@@ -1,5 +1,5 @@
-//! A frame of measured data as the program reads its records: written as CSV in memory, and read by the same reader, so that samples, gaps and
-//! dates mean the same, and messages name the row and the column. Row 1 is the header, as in a file.
+//! A frame of measured data as the program reads its records: written as CSV in memory, and read by the same reader, so that samples, gaps
+//! and dates mean the same, and messages name the row and the column. Row 1 is the header, as in a file.
 
 use std::fmt::Write;
 

@@ -83,8 +83,8 @@ fn with_offset<const N: usize, const P: usize>(
 /// Recursive output error in continuous time, `A(s) y = B(s) u`, with a filter of its error that is adapted beside it.
 ///
 /// `order`: `(n, m)`, n from 1 to 3 and m below n. `theta0`: `a_1..a_n, b_0..b_m`, and an offset where there is one; A has to be stable.
-/// `forgetting`: rate in 1/s. `bandwidth`: of the filters that make the derivatives, in 1/s, 2 to 10 times that of the plant. `P0`, `P0_filter`: how
-/// little is known, on the diagonals. `filter0`: start of the filter's coefficients, without it those of A.
+/// `forgetting`: rate in 1/s. `bandwidth`: of the filters that make the derivatives, in 1/s, 2 to 10 times that of the plant. `P0`,
+/// `P0_filter`: how little is known, on the diagonals. `filter0`: start of the filter's coefficients, without it those of A.
 ///
 /// Raises `ctid.ModelError`.
 #[pyclass(module = "ctid._ctid")]

@@ -137,8 +137,8 @@ fn online(theta: &[f64], p: &[Vec<f64>], weights: Weights) -> PyResult<Box<dyn O
 
 /// Recursive least squares in continuous time with forgetting, whose matrix stays positive definite.
 ///
-/// `theta0`: first guess, one number for each parameter. `P0`: how little is known, symmetric and positive definite. `forgetting`: rate in 1/s, the
-/// memory is its inverse; `c` and `gamma`: weights of the step and of the information, 1 of least squares.
+/// `theta0`: first guess, one number for each parameter. `P0`: how little is known, symmetric and positive definite. `forgetting`: rate in
+/// 1/s, the memory is its inverse; `c` and `gamma`: weights of the step and of the information, 1 of least squares.
 ///
 /// Raises `ctid.ModelError` where these do not go together.
 #[pyclass(module = "ctid._ctid")]
@@ -230,8 +230,8 @@ impl ContinuousRls {
         Ok(innovation.epsilon)
     }
 
-    /// Takes in many samples: `phi` a row for each, `y` and `dt` a number for each, or one `dt` for all. Returns the estimates after each, a row
-    /// for each sample, and the innovations; without `trajectory` the innovations alone.
+    /// Takes in many samples: `phi` a row for each, `y` and `dt` a number for each, or one `dt` for all. Returns the estimates after each,
+    /// a row for each sample, and the innovations; without `trajectory` the innovations alone.
     #[pyo3(signature = (phi, y, dt, *, trajectory=true))]
     fn run<'py>(
         &mut self,

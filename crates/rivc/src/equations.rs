@@ -31,7 +31,8 @@ pub(crate) struct Equations {
     measured_squares: f64,
     /// Sum of squared residuals, whitened if there is a noise model.
     residual_squares: f64,
-    /// The residual of each record, NaN where the reading is missing; where the filter is that of the model `y - y^` on the measured inputs.
+    /// The residual of each record, NaN where the reading is missing; where the filter is that of the model `y - y^` on the measured
+    /// inputs.
     pub(crate) residuals: Vec<Vec<f64>>,
 }
 

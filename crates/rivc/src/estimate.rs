@@ -8,12 +8,13 @@
 //! cov(x) = sigma^2 G^-1 [sum (L z)(L z)'] G^-T        G = sum (L z)(L phi)'
 //! cov(x) = G^-1 [sum_{k,l} R(k-l) z_k z_l'] G^-T      SRIVC: R the autocovariance of the residual, an autoregression
 //! ```
-//! and filter, instruments and L are computed again until the estimates have converged. A delay that is estimated takes part by its derivative. Of several
-//! records each has a model of its noise, or a variance, of its own, and counts accordingly.
+//! and filter, instruments and L are computed again until the estimates have converged. A delay that is estimated takes part by its
+//! derivative. Of several records each has a model of its noise, or a variance, of its own, and counts accordingly.
 //!
-//! Readings of the output may be missing, anywhere: their rows do not count, what the model says stands for them in the filters of y (`pass.rs`), L and R are those of
-//! autoregressions over the readings that are there, exactly ([`ArModel::fit`], [`ct_signals::Whitener`]). The limit is that of maximum likelihood from these readings. Where an input is not known for a while,
-//! the parts of the record are [`Data`] that continue: they share offset and noise, and begin with states of their own.
+//! Readings of the output may be missing, anywhere: their rows do not count, what the model says stands for them in the filters of y
+//! (`pass.rs`), L and R are those of autoregressions over the readings that are there, exactly ([`ArModel::fit`],
+//! [`ct_signals::Whitener`]). The limit is that of maximum likelihood from these readings. Where an input is not known for a while, the
+//! parts of the record are [`Data`] that continue: they share offset and noise, and begin with states of their own.
 //!
 //! Assumptions: the plant is stable, but for an integrator; the noise owes nothing to the inputs, in a loop nothing to the reference; in a
 //! loop the input is what its hold says, as of a controller that is sampled: after a continuous one it is not, and the estimates are biased
@@ -23,7 +24,8 @@
 //! Convergence: no proof for finite records; [`Estimate::converged`] says whether the estimates have converged. For white noise (SRIVC), or
 //! autoregressive noise (RIVC), the limit has the least possible variance in open loop, as far as y is a line between its samples.
 //!
-//! Cost: one pass an iteration, about `2 p^2 + (3 + 2 inputs) n^2` products a sample; up to 8 passes for each of some 10 bandwidths to start.
+//! Cost: one pass an iteration, about `2 p^2 + (3 + 2 inputs) n^2` products a sample; up to 8 passes for each of some 10 bandwidths to
+//! start.
 //!
 //! References: P. C. Young, A. Jakeman, International Journal of Control 31 (1980) 741-764; M. Gilson, H. Garnier, P. C. Young, P. Van den
 //! Hof, in H. Garnier, L. Wang (eds.), Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 5, for the loop;

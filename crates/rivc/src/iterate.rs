@@ -10,8 +10,8 @@ use crate::model::Model;
 use crate::prepared::Prepared;
 use crate::problem::{Delayed, HALVINGS, Problem};
 
-/// The estimates have converged where none would move by more than this share of its standard error, or of itself, and the output error by no
-/// more than this share: standard errors alone say nothing where they are very large.
+/// The estimates have converged where none would move by more than this share of its standard error, or of itself, and the output error by
+/// no more than this share: standard errors alone say nothing where they are very large.
 const SHARE_OF_ERROR: f64 = 1e-3;
 const SHARE_OF_ITSELF: f64 = 1e-9;
 const SHARE_OF_SQUARE: f64 = 1e-5;
@@ -21,8 +21,8 @@ const SHARE_OF_DELAY: f64 = 0.02;
 /// Largest relative increase of the output error over the least one among the iterates, in open loop and in a loop: with coloured noise,
 /// the solution of the equations is not exactly the minimum of the output error, in particular with feedback.
 const GROWTH: [f64; 2] = [0.02, 1.0];
-/// The models of the noise are estimated again while an estimate moves by more than this share of its standard error, or a standard deviation
-/// of the noise by more than that share, so many times at most.
+/// The models of the noise are estimated again while an estimate moves by more than this share of its standard error, or a standard
+/// deviation of the noise by more than that share, so many times at most.
 const SHARE_FOR_NOISE: f64 = 0.1;
 const SHARE_OF_SIGMA: f64 = 1e-3;
 const NOISE_UPDATES: usize = 12;

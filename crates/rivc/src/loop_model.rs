@@ -1,8 +1,8 @@
 //! The input of a loop as its reference explains it: the first of two steps, which makes instruments without knowing the controller.
 //!
-//! Model: `u[k] = sum_i a_i u[k-i] + sum_i b_i r[k-i] + c + e[k]`, i to q, by least squares; the order q has the least
-//! `N log sum e^2 + k log N` of those that are stable. Its simulation from r alone is free of the noise, but for what k coefficients can fit
-//! of it, k/N of its power.
+//! Model: `u[k] = sum_i a_i u[k-i] + sum_i b_i r[k-i] + c + e[k]`, i to q, by least squares; the order q has the least `N log sum e^2 + k
+//! log N` of those that are stable. Its simulation from r alone is free of the noise, but for what k coefficients can fit of it, k/N of its
+//! power.
 //!
 //! Assumptions: r owes nothing to the noise; the loop is linear. A loop that is not, or noise that is, costs efficiency, and no bias.
 //!

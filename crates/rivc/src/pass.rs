@@ -5,12 +5,15 @@
 //! p^n y_f = phi' x + e
 //! phi = [-p^i y_f, p^i u_f(t - d), change of the delays, 1_f, p^i pulse_f]
 //! ```
-//! The column of a delay is `-sum_i beta_i p^{i+1} u_f(t - d)`, the derivative of the equation. y is interpolated linearly between samples. A missing reading is replaced in `y_f` by the model's output on the
-//! measured inputs, or by linear interpolation in a first regression without a model; the row is not used. At `E = A` the residual of every other row is `y - y^` whatever stands there, so that the equations hold where they are those of the readings that are
-//! there: those of output error (for white noise) or of generalised least squares over these readings, to which a missing one adds nothing.
+//! The column of a delay is `-sum_i beta_i p^{i+1} u_f(t - d)`, the derivative of the equation. y is interpolated linearly between samples.
+//! A missing reading is replaced in `y_f` by the model's output on the measured inputs, or by linear interpolation in a first regression
+//! without a model; the row is not used. At `E = A` the residual of every other row is `y - y^` whatever stands there, so that the
+//! equations hold where they are those of the readings that are there: those of output error (for white noise) or of generalised least
+//! squares over these readings, to which a missing one adds nothing.
 //!
-//! The instruments z are the same of an output that is simulated, and in a loop of an input that the reference explains. Where E is the A of
-//! that simulation, `p^n y_f - phi' x = y - y^` whatever y does between samples, so that the lines bias nothing once the estimates have converged.
+//! The instruments z are the same of an output that is simulated, and in a loop of an input that the reference explains. Where E is the A
+//! of that simulation, `p^n y_f - phi' x = y - y^` whatever y does between samples, so that the lines bias nothing once the estimates have
+//! converged.
 
 use crate::bank::Bank;
 use crate::grid::{Path, Stretch};

@@ -36,8 +36,8 @@ impl Plant {
     /// (least squares over the readings that are there). Before the first sample the inputs are taken to have stood.
     ///
     /// # Errors
-    /// [`Error::OrderZero`], [`Error::Improper`], [`Error::Length`], [`Error::NotFinite`], [`Error::NoReading`], [`Error::Time`]; [`Error::Diverges`] where the
-    /// output is not finite.
+    /// [`Error::OrderZero`], [`Error::Improper`], [`Error::Length`], [`Error::NotFinite`], [`Error::NoReading`], [`Error::Time`];
+    /// [`Error::Diverges`] where the output is not finite.
     pub fn fitted(&self, record: &Data) -> Result<Vec<f64>, Error> {
         let n = self.a.len().saturating_sub(1);
         let mut structure = Structure::new(

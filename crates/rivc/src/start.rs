@@ -112,8 +112,8 @@ impl Problem<'_> {
         Ok(starts)
     }
 
-    /// A start from the best plant of the next lower order, by one more pole that is fast: it fits as well, where starts of an order that the
-    /// record does not carry may lead nowhere.
+    /// A start from the best plant of the next lower order, by one more pole that is fast: it fits as well, where starts of an order that
+    /// the record does not carry may lead nowhere.
     fn of_lower_order(&self, delays: &[f64], bandwidths: &[f64]) -> Option<Start> {
         let n = self.structure.n.checked_sub(1).filter(|n| *n > 0)?;
         let lower = Structure {

@@ -15,8 +15,8 @@ pub trait Derivatives<const N: usize> {
     /// `None`, and nothing is changed, where the sample cannot be used at all.
     fn take(&mut self, sample: &Self::Sample, since: f64, inputs: &mut [f64]) -> Option<f64>;
 
-    /// The output at the sample taken last is missing, and the model has `y_m` and `(y_m', .., y_m^(n))` there. A scheme with filters of the output runs them
-    /// on what the model says instead.
+    /// The output at the sample taken last is missing, and the model has `y_m` and `(y_m', .., y_m^(n))` there. A scheme with filters of
+    /// the output runs them on what the model says instead.
     fn missed(&mut self, _y_m: f64, _model: &[f64; N]) {}
 
     /// `(e', .., e^(n))` at the sample taken last, from `e = y - y_m` and `model = (y_m', .., y_m^(n))` there.

@@ -8,8 +8,9 @@
 //! dtheta^/dt =  c_p P1 phi_m eps~       dP1/dt = eta1 P1 - gamma1 P1 phi_m phi_m' P1
 //! dc^/dt     = -c_p P2 e1 eps~          dP2/dt = eta2 P2 - gamma2 P2 e1 e1' P2
 //! ```
-//! The regressor is `(phi_m, -e1)`; with the `+` of [U] 4.9a and 4.11a every run of its experiment ends at the bound of `c^`
-//! (`cargo test -p stabilized-oe --test all printed_sign::`). Rows `F theta + F_c c = chi` or `<= chi` add their errors, [U] 4.14 to 4.18: [`CoupledRow`].
+//! The regressor is `(phi_m, -e1)`; with the `+` of [U] 4.9a and 4.11a every run of its experiment ends at the bound of `c^` (`cargo test
+//! -p stabilized-oe --test all printed_sign::`). Rows `F theta + F_c c = chi` or `<= chi` add their errors, [U] 4.14 to 4.18:
+//! [`CoupledRow`].
 //!
 //! Assumptions: the gain's step holds `phi_m`, `e` and `e1` over a sample, the model's runs the input as the scheme of derivatives says.
 //! `u` excites persistently. Noise on `y` is independent of `u`.
@@ -106,8 +107,9 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
     /// An estimator with the start values of its gain, a model at rest, and no bounds on `c^`.
     ///
     /// `theta^` is kept where `A^` is Hurwitz, with `a_i` above a thousandth of `dt^i` and `a_n` above `dt^n` or `0.05 dt a_{n-1}(0)`,
-    /// whichever is less, for the shortest step so far. A shorter lag cannot be identified; but the model's highest derivative is divided by `a_n`. If `a_n` comes near 0, a few samples make `P` so small that
-    /// `theta^` does not change any more. With Euler's rule a model that is faster than a step is unstable: there `a_n >= dt^n`, with the present step.
+    /// whichever is less, for the shortest step so far. A shorter lag cannot be identified; but the model's highest derivative is divided
+    /// by `a_n`. If `a_n` comes near 0, a few samples make `P` so small that `theta^` does not change any more. With Euler's rule a model
+    /// that is faster than a step is unstable: there `a_n >= dt^n`, with the present step.
     ///
     /// # Errors
     /// [`Error::StartNotHurwitz`].

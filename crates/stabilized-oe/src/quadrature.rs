@@ -42,8 +42,8 @@ const GONE: f64 = 45.0;
 /// Pieces for each `e`-fold of `1 + (rates) t`: with 2 the integrals are right to 1e-9.
 const PIECES: f64 = 2.0;
 
-/// Over `dt` seconds, `int c_i e^{eta_i t}/d_i x dt` of both blocks and `int x dt`, where `x = eps(t)/eps(0)` and the constant gain lets the
-/// error decay at the rate `l`, 1/s.
+/// Over `dt` seconds, `int c_i e^{eta_i t}/d_i x dt` of both blocks and `int x dt`, where `x = eps(t)/eps(0)` and the constant gain lets
+/// the error decay at the rate `l`, 1/s.
 pub(crate) fn shares(blocks: [Block; 2], l: f64, dt: f64) -> [f64; 3] {
     let at = |t: f64| {
         let ((one, decay1), (two, decay2)) = (blocks[0].at(t), blocks[1].at(t));

@@ -9,8 +9,8 @@
 //! E_C E + x O_C O - d (E^2 + x O^2) > 0
 //! ```
 //! At each frequency a box of coefficients makes `(E, O)` fill a rectangle, whose corners are Kharitonov's four polynomials at every
-//! frequency. The left side is linear in `(E_C, O_C)` and, for `d >= 0`, concave in `(E, O)`: it is lowest at corners. So 16 pairs decide for
-//! the whole of both boxes, and four polynomials for the stability of all `A0`; each by [`ct_lti::TransferFunction::exceeds`], exactly.
+//! frequency. The left side is linear in `(E_C, O_C)` and, for `d >= 0`, concave in `(E, O)`: it is lowest at corners. So 16 pairs decide
+//! for the whole of both boxes, and four polynomials for the stability of all `A0`; each by [`ct_lti::TransferFunction::exceeds`], exactly.
 //!
 //! For `d = 0`: n = 1, `c_1 >= 0`; n = 2, `c_2 >= 0` and `a_1 c_1 > (sqrt a_2 - sqrt c_2)^2`.
 //!

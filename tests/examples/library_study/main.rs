@@ -3,8 +3,8 @@
 //! ```sh
 //! cargo run --release -p ctid-tests --example library_study -- --sample 60
 //! ```
-//! Every effect at every port, alone and in pairs, the candidates of a user's own beside decoys, nothing, and what neither the catalogue nor
-//! a candidate holds. The truth is the model's own text with parameters of its own and the effect; the noise is scaled so that what the
+//! Every effect at every port, alone and in pairs, the candidates of a user's own beside decoys, nothing, and what neither the catalogue
+//! nor a candidate holds. The truth is the model's own text with parameters of its own and the effect; the noise is scaled so that what the
 //! refitted believed model leaves of the noise-free record is 1 or 3 times the noise (root mean square over the outputs). The believed
 //! parameters are up to 40 % off; some records come in two parts, miss cells, or have a slower output.
 //!

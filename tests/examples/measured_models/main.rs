@@ -5,7 +5,8 @@
 //! cargo build --release && cargo run --release -p ctid-tests --example measured_models [-- --effort thorough] [PART-OF-A-NAME...]
 //! ```
 //! Prints for each case the verdict, the groups, the simulation error on the fitted and on the held-out record model by model, and how long
-//! it took; then how many are right. The models and their model files are those of this folder; [`expected`] says what is looked for, and why.
+//! it took; then how many are right. The models and their model files are those of this folder; [`expected`] says what is looked for, and
+//! why.
 #![allow(clippy::unwrap_used)]
 
 mod expected;

@@ -7,8 +7,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Hidden, Job, outside, own};
 
-/// Records of the models of these names, or of all where none is given: in each what may be hidden in it, in white and coloured noise, in open
-/// and closed loop, with each of these structural errors over the noise. `records`: of each of them.
+/// Records of the models of these names, or of all where none is given: in each what may be hidden in it, in white and coloured noise, in
+/// open and closed loop, with each of these structural errors over the noise. `records`: of each of them.
 pub fn jobs(
     models: &[DrivenModel],
     of: &[String],

@@ -1,4 +1,5 @@
-//! The equality (3.8), `dV/dt = -eta V - eps' (2 W - Gamma) eps`, over a step, and `Gamma` apart from `W`: against a fine integration of (3.9).
+//! The equality (3.8), `dV/dt = -eta V - eps' (2 W - Gamma) eps`, over a step, and `Gamma` apart from `W`: against a fine integration of
+//! (3.9).
 
 use ct_constrained::{ConstrainedRls, Error, Row};
 use ct_rls::{ContinuousRls, Guards, RecursiveEstimator, Sample, Weights};

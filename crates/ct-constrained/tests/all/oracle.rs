@@ -1,7 +1,7 @@
 //! Projections against every choice of active bounds, tried one by one.
 //!
-//! `PROBLEMS=100000 cargo test --release -p ct-constrained --test all oracle::` tries as many feasible problems of each kind, and a fifth as
-//! many that contradict themselves; without it, 4000.
+//! `PROBLEMS=100000 cargo test --release -p ct-constrained --test all oracle::` tries as many feasible problems of each kind, and a fifth
+//! as many that contradict themselves; without it, 4000.
 
 use ct_constrained::{Error, Row, project, project_box};
 use ct_rls::{ContinuousRls, RecursiveEstimator, Weights};

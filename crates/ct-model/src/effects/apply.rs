@@ -39,8 +39,9 @@ pub enum ApplyError {
 /// flows, limits, inputs (delay, nonlinearity, dead zone, saturation, drift of the gain, backlash, lag), outputs (lag, nonlinearity,
 /// saturation, hysteresis, drift, offset, quantisation).
 ///
-/// The candidates are those of this model. Their parameters follow its own, at their absent values, with their bounds; a [`super::Role::Choice`]
-/// is not fitted. What was an output keeps its name and its unit, and is the reading; what is measured is called `y_true`.
+/// The candidates are those of this model. Their parameters follow its own, at their absent values, with their bounds; a
+/// [`super::Role::Choice`] is not fitted. What was an output keeps its name and its unit, and is the reading; what is measured is called
+/// `y_true`.
 ///
 /// # Errors
 /// Where an effect is given twice, belongs to another model, or closes a circle.

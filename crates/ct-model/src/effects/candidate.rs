@@ -78,8 +78,9 @@ impl Candidate {
     /// The candidate with a factor before every term, which is zero where the effect is not there and one where it is; `None` where the
     /// parameters of the candidate have such values themselves.
     ///
-    /// No values of resistance and capacity take an RC pair out of a model: only their limit does. The factor makes the score test possible; it
-    /// is not fitted, and stands in no model but that of the score. It is the last parameter, and may be negative where another one may.
+    /// No values of resistance and capacity take an RC pair out of a model: only their limit does. The factor makes the score test
+    /// possible; it is not fitted, and stands in no model but that of the score. It is the last parameter, and may be negative where
+    /// another one may.
     #[must_use]
     pub fn with_factor(&self, spec: &ModelSpec) -> Option<Self> {
         let mut roles = self.parameters.iter().map(|parameter| parameter.role);

@@ -76,9 +76,9 @@ pub enum Starts {
 ///
 /// Its text is a model: the inputs are the port (their names say which part of it: [`Place`]), the output `v` is what the effect gives, the
 /// value of a parameter is the absent one, and a `final parameter` is a [`Role::Choice`]. Constants of these names take the values that the
-/// data visit: `low`, `high`, `middle`, `width`, `first` (of the signal), `begin`, `duration`, `interval` (of the record), `zero` (of a temperature's unit above absolute zero), `balance` (the
-/// largest term of the equation). In units `port` (or `signal`), `value`, `time` and `balance`
-/// stand for those of the signal, of the parameter or flow, of the time and of the equation.
+/// data visit: `low`, `high`, `middle`, `width`, `first` (of the signal), `begin`, `duration`, `interval` (of the record), `zero` (of a
+/// temperature's unit above absolute zero), `balance` (the largest term of the equation). In units `port` (or `signal`), `value`, `time`
+/// and `balance` stand for those of the signal, of the parameter or flow, of the time and of the equation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
     /// Name of the effect: `lag`.

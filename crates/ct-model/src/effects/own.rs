@@ -12,8 +12,8 @@ use crate::expression::{Expression, Variable};
 use crate::spec::{About, Given, ModelSpec, Parameter, State};
 use crate::text::{Scope, TextError, is_reserved};
 
-/// Parameters of an effect that is absent only in a limit start so many times smaller and larger too: a time constant that is a product or a
-/// quotient of two is then scored over four decades.
+/// Parameters of an effect that is absent only in a limit start so many times smaller and larger too: a time constant that is a product or
+/// a quotient of two is then scored over four decades.
 const DECADE: f64 = 10.0;
 
 /// A candidate as the model file has it.

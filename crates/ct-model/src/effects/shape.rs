@@ -1,8 +1,8 @@
 //! Smooth functions of what a model visits: no physics, but the shape of a term that no effect of the catalogue holds.
 //!
-//! `shape` depends on a state or an input, `course` on time. A function is a sum of bells (Gaussian radial basis) at equal distances over the
-//! visited range, as wide as their distance: linear in its parameters, smooth, and of any form that is not much narrower than a bell. These
-//! are no candidates of a search: one of them bends to whatever there is.
+//! `shape` depends on a state or an input, `course` on time. A function is a sum of bells (Gaussian radial basis) at equal distances over
+//! the visited range, as wide as their distance: linear in its parameters, smooth, and of any form that is not much narrower than a bell.
+//! These are no candidates of a search: one of them bends to whatever there is.
 //!
 //! **Reference**: S. Chen, S. A. Billings, P. M. Grant, Int. J. Control 55 (1992) 1051-1070 (radial basis functions in identification).
 

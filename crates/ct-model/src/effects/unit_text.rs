@@ -1,7 +1,7 @@
 //! Quotients of units as texts: `m/s2` over `m/s` is `1/s`.
 //!
-//! A unit is a product of symbols with whole powers, and what two have in common cancels. Symbols are not converted into each other: `m/s` over
-//! `h` is `m/(s.h)`. In a quotient a temperature is a difference, so `degC` is `K`.
+//! A unit is a product of symbols with whole powers, and what two have in common cancels. Symbols are not converted into each other: `m/s`
+//! over `h` is `m/(s.h)`. In a quotient a temperature is a difference, so `degC` is `K`.
 
 /// Symbols with their powers, in the order in which they were met.
 #[derive(Debug, Clone, Default, PartialEq)]

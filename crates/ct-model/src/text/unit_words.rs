@@ -16,8 +16,8 @@ const PREFIXES: [&str; 14] = [
     "da", "n", "u", "\u{b5}", "\u{3bc}", "m", "c", "d", "h", "k", "M", "G", "T", "p",
 ];
 
-/// The words in units of a model's text that are no units, with their places: a slip of the pen as a rule. Such a unit fits everything, so that
-/// nothing is checked or converted by it.
+/// The words in units of a model's text that are no units, with their places: a slip of the pen as a rule. Such a unit fits everything, so
+/// that nothing is checked or converted by it.
 ///
 /// # Errors
 /// As [`crate::ModelSpec::parse`].

@@ -72,7 +72,8 @@ end Behind;"#;
     case.check_derivatives(1e-5);
 }
 
-/// `tau x' = K u(t - d) - x`, `4 w' = x(t - e) - w - 0.1 w^2` by the classical Runge-Kutta method in steps that divide rows and both delays.
+/// `tau x' = K u(t - d) - x`, `4 w' = x(t - e) - w - 0.1 w^2` by the classical Runge-Kutta method in steps that divide rows and both
+/// delays.
 fn late_reference(inputs: &[f64], parts: usize, (d, e): (usize, usize)) -> Vec<f64> {
     let h = 1.0 / parts as f64;
     let (k, tau) = (2.0, 7.0);

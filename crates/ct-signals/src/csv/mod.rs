@@ -3,8 +3,8 @@
 //!
 //! Understood: commas, semicolons or tabs (found from the header); a decimal comma where commas do not separate; a byte-order mark, CRLF,
 //! blank lines, lines that begin with `#`, and blanks around a cell; times as numbers in a unit, or as dates and times; words such as `Bad`
-//! and `null`, and empty cells, where a sample is missing; rows that are missing; units that are not those of the model. Only the columns in
-//! use are read. Nothing is ever written.
+//! and `null`, and empty cells, where a sample is missing; rows that are missing; units that are not those of the model. Only the columns
+//! in use are read. Nothing is ever written.
 
 mod cells;
 mod checks;

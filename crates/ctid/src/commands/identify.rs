@@ -71,7 +71,8 @@ pub(super) struct Identify {
     /// How the operating point (zero of the signals) is chosen, for ls, iv, fcloe and recursive-fcloe
     #[arg(long, value_enum, default_value_t = LevelChoice::Auto)]
     levels: LevelChoice,
-    /// Delay of the inputs [s], for srivc and rivc: a number, auto to estimate it up to a tenth of the record, or 0..S to estimate it up to S
+    /// Delay of the inputs [s], for srivc and rivc: a number, auto to estimate it up to a tenth of the record, or 0..S to estimate it up to
+    /// S
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     delay: Option<DelayChoice>,
     /// The plant integrates, A(0) = 0; for srivc and rivc

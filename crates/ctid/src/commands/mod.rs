@@ -82,8 +82,8 @@ struct Add {
     /// Model file
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
-    /// Of a plant the shape of a term of your own, as `ctid diagnose --unknown` writes it; of a model of your own the result that `ctid diagnose --json`
-    /// wrote, of which the effect's sizes and the numbers of its record are kept
+    /// Of a plant the shape of a term of your own, as `ctid diagnose --unknown` writes it; of a model of your own the result that `ctid
+    /// diagnose --json` wrote, of which the effect's sizes and the numbers of its record are kept
     #[arg(long, value_name = "F", conflicts_with = "place")]
     from: Option<PathBuf>,
     /// The vessel it acts in, or the pump, where the plant has several

@@ -64,8 +64,8 @@ fn with_known(file: &OwnModelFile) -> ModelSpec {
 }
 
 impl FittedModel {
-    /// The model's text with its fitted values, and their standard errors in comments; it begins where the first record does. `source`: where
-    /// the model is from, for the first line.
+    /// The model's text with its fitted values, and their standard errors in comments; it begins where the first record does. `source`:
+    /// where the model is from, for the first line.
     ///
     /// # Errors
     /// Where the simulation is not finite at the fit.

@@ -50,8 +50,8 @@ pub(super) fn blamed(problem: &Problem, error: &effect_search::Error) -> Error {
 }
 
 impl OwnModelFile {
-    /// The model with its effects in it. With records the effects are fitted to them one after the other, and parameters begin there; what the
-    /// file does not keep of an earlier record is taken from these. Without any the file has to say all of it.
+    /// The model with its effects in it. With records the effects are fitted to them one after the other, and parameters begin there; what
+    /// the file does not keep of an earlier record is taken from these. Without any the file has to say all of it.
     ///
     /// # Errors
     /// Where the records do not allow a fit, or without any where the file lacks a number.

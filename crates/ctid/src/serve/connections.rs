@@ -1,7 +1,8 @@
 //! Connections: their number is limited, and an idle connection does not block others.
 //!
-//! A new connection has not sent the access key yet. Such connections have a separate limit, so that other users of the machine cannot use up the owner's connections; without the key they end with their
-//! first answer, an error. If the limit is reached, a new connection is accepted and the one that was idle for the longest time is closed; among connections without the key, the oldest one.
+//! A new connection has not sent the access key yet. Such connections have a separate limit, so that other users of the machine cannot use
+//! up the owner's connections; without the key they end with their first answer, an error. If the limit is reached, a new connection is
+//! accepted and the one that was idle for the longest time is closed; among connections without the key, the oldest one.
 
 use std::convert::Infallible;
 use std::io::{self, IoSlice};

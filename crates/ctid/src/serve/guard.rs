@@ -1,8 +1,7 @@
 //! Access control: requests need the access key of this run, and have to come from pages of this server.
 //!
-//! Every address begins with the access key, which is only in the printed address: other
-//! users of the machine can connect, but get no answer without the key. It is no cookie, which a browser would also send to the servers of others at
-//! other ports of this machine.
+//! Every address begins with the access key, which is only in the printed address: other users of the machine can connect, but get no
+//! answer without the key. It is no cookie, which a browser would also send to the servers of others at other ports of this machine.
 //!
 //! A page of another site that is open in the same browser can send requests to any local server. Its requests have its own `Origin`,
 //! which is rejected. A host name that it resolves to 127.0.0.1 later is in `Host`, which is rejected too.

@@ -40,9 +40,10 @@
 //! | `GET /api/model?session=&id=` | the number of a fit or of the diagnosis | its curves, parameters and sentences |
 //! | `GET /api/file?session=&of=` | `model`, `text`, `report` or `experiment` | the file |
 //!
-//! The state is `{version, own, file, text, model_error, settings, effects, waiting, records, warnings, headings, guessed, current, trail, models,
-//! chains, loop, diagnosis, design, job, failure}`: `current` is the number of the fit of the model as it stands, `trail` the fits of its first
-//! effects, `job` `{what, phase, done, total, seconds, limit, ending}` while something is computed. A fit stops where the model becomes another.
+//! The state is `{version, own, file, text, model_error, settings, effects, waiting, records, warnings, headings, guessed, current, trail,
+//! models, chains, loop, diagnosis, design, job, failure}`: `current` is the number of the fit of the model as it stands, `trail` the fits
+//! of its first effects, `job` `{what, phase, done, total, seconds, limit, ending}` while something is computed. A fit stops where the
+//! model becomes another.
 //!
 //! # What is bounded
 //! Eight tabs. 64 connections on which the secret was known, and 128 others whose request begins within ten seconds and which end with

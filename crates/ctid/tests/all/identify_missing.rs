@@ -1,5 +1,5 @@
-//! Records in which readings of the output are missing, or rows: what each method finds in them, and what is refused. `RECORDS=400` runs more
-//! records than a test needs.
+//! Records in which readings of the output are missing, or rows: what each method finds in them, and what is refused. `RECORDS=400` runs
+//! more records than a test needs.
 
 use crate::common::Place;
 use crate::identify::{Plant, SECOND};

@@ -254,8 +254,8 @@ fn what_no_candidate_holds_is_not_called_noise() {
     assert!(diagnosis.left.is_some());
 }
 
-/// The gain at one block rises and falls with the temperature of the other: effects of the catalogue imitate a part of it, and a noise model
-/// takes the rest.
+/// The gain at one block rises and falls with the temperature of the other: effects of the catalogue imitate a part of it, and a noise
+/// model takes the rest.
 #[test]
 fn a_function_that_no_candidate_has_is_found_in_what_the_noise_model_takes_for_noise() {
     for correlation in [0.0, 0.8] {

@@ -73,8 +73,8 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// Outputs with noise of standard deviations 0.3, 0.06 .. and this correlation from sample to sample; priors of two entries, one of which is
-/// as good as the record, read with their own errors.
+/// Outputs with noise of standard deviations 0.3, 0.06 .. and this correlation from sample to sample; priors of two entries, one of which
+/// is as good as the record, read with their own errors.
 fn drawn(seed: u64, outputs: usize, correlation: f64, third: f64) -> Curves {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut curves = Curves {

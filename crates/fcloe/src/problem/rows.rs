@@ -8,7 +8,8 @@ use crate::simulation::BLOCK;
 use crate::{ClosedLoop, Error, LoopSimulator, PlantModel};
 
 impl Problem {
-    /// J and its derivatives at x, or the residual's column alone, unless J is above a limit: that is known before the last sample as a rule.
+    /// J and its derivatives at x, or the residual's column alone, unless J is above a limit: that is known before the last sample as a
+    /// rule.
     pub(crate) fn evaluate(
         &self,
         x: &[f64],
@@ -78,8 +79,9 @@ impl Problem {
         places
     }
 
-    /// Simulates all records at x and shows the index of the record, its readings (NaN where they are missing) and, if asked for, the columns of its sensitivities (theta, then its
-    /// levels), the residual's last, up to [`BLOCK`] samples at a time, until `see` has seen enough; whether it has seen all.
+    /// Simulates all records at x and shows the index of the record, its readings (NaN where they are missing) and, if asked for, the
+    /// columns of its sensitivities (theta, then its levels), the residual's last, up to [`BLOCK`] samples at a time, until `see` has seen
+    /// enough; whether it has seen all.
     fn visit(
         &self,
         closed: &ClosedLoop,
@@ -192,8 +194,8 @@ impl Problem {
     }
 }
 
-/// The residual `y - y^` of all records as one output, NaN where the reading is missing; its entries are theta, and each estimated level's distance from where it started (drive, then y,
-/// record by record). It is not finite where the loop is not stable.
+/// The residual `y - y^` of all records as one output, NaN where the reading is missing; its entries are theta, and each estimated level's
+/// distance from where it started (drive, then y, record by record). It is not finite where the loop is not stable.
 impl Residuals for Problem {
     fn free(&self) -> &[usize] {
         &self.free

@@ -246,10 +246,10 @@ impl RecursiveEstimator for RecursiveFcloe {
     type Covariance = DMatrix<f64>;
     type Error = Error;
 
-    /// Updates the estimates with y at this sample, then simulates the model over dt with the drive held.
-    /// If y is missing (NaN) or implausible, the model is simulated without an update; if the drive is not finite, the last value is held. If the model's states overflow, the
-    /// model restarts from rest; the outcome shows how the sample was used. Steps are 1e-40 to
-    /// 1e30 of the time's unit, and no longer than 10 000 time constants of the fastest root.
+    /// Updates the estimates with y at this sample, then simulates the model over dt with the drive held. If y is missing (NaN) or
+    /// implausible, the model is simulated without an update; if the drive is not finite, the last value is held. If the model's states
+    /// overflow, the model restarts from rest; the outcome shows how the sample was used. Steps are 1e-40 to 1e30 of the time's unit, and
+    /// no longer than 10 000 time constants of the fastest root.
     fn update(&mut self, sample: &LoopSample, dt: f64) -> Innovation {
         let point = self.settings.operating_point;
         let level = if self.controller.is_open_loop() {

@@ -68,7 +68,8 @@ impl Default for PipelineSettings {
 /// 10 over the longest record's duration to half the sampling rate, three to a decade.
 ///
 /// # Errors
-/// [`Error::NoRecord`]; [`Error::Setting`] for a sampling interval, or where the records are longer than the largest number; [`Error::Lti`].
+/// [`Error::NoRecord`]; [`Error::Setting`] for a sampling interval, or where the records are longer than the largest number;
+/// [`Error::Lti`].
 pub fn lambda_ladder(
     records: &[LoopRecord],
     controller: &Controller,
@@ -98,8 +99,8 @@ pub fn lambda_ladder(
 /// Candidates for the batch fit, the best first, none twice; the recursive estimator takes the first.
 ///
 /// # Errors
-/// Those of [`LoopRecord::validate`]; [`Error::NoRecord`]; [`Error::RegressionWithoutInput`], [`Error::MissingReference`]; [`Error::Setting`];
-/// [`Error::NoStart`] where no plant that was tried has a stable loop.
+/// Those of [`LoopRecord::validate`]; [`Error::NoRecord`]; [`Error::RegressionWithoutInput`], [`Error::MissingReference`];
+/// [`Error::Setting`]; [`Error::NoStart`] where no plant that was tried has a stable loop.
 pub fn pipeline(
     records: &[LoopRecord],
     controller: &Controller,

@@ -93,8 +93,8 @@ impl Signals {
         self
     }
 
-    /// Shows the number of the sample, and y_f and u_f with their derivatives, 0 to n, at each sample; not where a reading is missing, nor where the filter has not forgotten
-    /// a long gap ([`ReadingFilter`]).
+    /// Shows the number of the sample, and y_f and u_f with their derivatives, 0 to n, at each sample; not where a reading is missing, nor
+    /// where the filter has not forgotten a long gap ([`ReadingFilter`]).
     pub(super) fn filtered(
         &self,
         filter: &Polynomial,

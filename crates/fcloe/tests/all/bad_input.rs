@@ -108,7 +108,8 @@ fn a_controller_that_does_not_match() {
     assert!(refusal(exchanged, &pi()).contains("not R/S"));
 }
 
-/// Noise that the controller never saw follows r by chance, and by about as much as is told: in a quarter of the records it does so by more.
+/// Noise that the controller never saw follows r by chance, and by about as much as is told: in a quarter of the records it does so by
+/// more.
 #[test]
 fn what_follows_r_by_chance_is_taken_off() {
     let r: Vec<f64> = drive(40).iter().flat_map(|r| [*r; 10]).collect();

@@ -94,8 +94,8 @@ impl<'a> ModelSetup<'a> {
         Some(())
     }
 
-    /// [`Residuals::each_row`]; no generic function, so that simulations with derivatives are compiled here and not again in every crate that
-    /// fits.
+    /// [`Residuals::each_row`]; no generic function, so that simulations with derivatives are compiled here and not again in every crate
+    /// that fits.
     #[inline(never)]
     fn show_rows(&self, x: &[f64], each: &mut dyn FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
         // A record has the parameters and its own states.

@@ -136,7 +136,8 @@ fn with_effects(rig: &Rig, setup: &Setup, records: usize) -> Vec<f64> {
     let mut x = near_truth(rig, 0);
     for &placed in setup.structure.effects() {
         for info in setup.structure.effect_parameters(placed) {
-            // At the first start of a rim the level just touches it, within the steps of the differences: across a corner they are no slope.
+            // At the first start of a rim the level just touches it, within the steps of the differences: across a corner they are no
+            // slope.
             let index = usize::from(info.name == "rim");
             x.push(info.starts[index]);
         }

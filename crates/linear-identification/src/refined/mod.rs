@@ -35,7 +35,8 @@ const PART: f64 = 0.1;
 /// Instruments from a reference that explains less of the input are weak.
 const EXPLAINED: f64 = 0.2;
 
-/// The plant alone, of one order, without a delay, and whether it is determined: the iteration has converged, and the highest coefficient of A differs from zero.
+/// The plant alone, of one order, without a delay, and whether it is determined: the iteration has converged, and the highest coefficient
+/// of A differs from zero.
 pub(super) fn plant(records: &[Mended], request: &Request) -> Result<(rivc::Plant, bool), Error> {
     let (structure, settings) = asked(records, request);
     let (parts, _) = parts(records, &structure);

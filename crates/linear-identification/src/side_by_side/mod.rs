@@ -1,8 +1,8 @@
 //! Several methods and orders on one record, by the same measures.
 //!
-//! Methods have different criteria; they are compared by a common error: the model runs on the input alone, from an initial state and a level
-//! that are fitted to the record (`n + 1` numbers, least squares), on the record it was identified on and on others. A method that cannot be used on the record has
-//! a reason instead of a row.
+//! Methods have different criteria; they are compared by a common error: the model runs on the input alone, from an initial state and a
+//! level that are fitted to the record (`n + 1` numbers, least squares), on the record it was identified on and on others. A method that
+//! cannot be used on the record has a reason instead of a row.
 //!
 //! In a loop the command depends on the noise, and a model that attributes this feedback to the plant simulates better on the
 //! measured command than the true plant: there methods are not ranked by their error, and a note says so.
@@ -16,8 +16,8 @@
 //! - YIC (Young 1989): `log(sigma_e^2/sigma_y^2) + log(mean_i(se_i^2/theta_i^2))`, small where the fit is good and all parameters are
 //!   known; only if the method gives standard errors.
 //!
-//! The order that is shown of a method has the least BIC of those whose parameters all differ significantly from zero, and whose time constants are no
-//! shorter than a step; where there is none, of all.
+//! The order that is shown of a method has the least BIC of those whose parameters all differ significantly from zero, and whose time
+//! constants are no shorter than a step; where there is none, of all.
 //!
 //! Reference: P. C. Young, Recursive estimation, forecasting and adaptive control, in C. T. Leondes (ed.), Control and Dynamic Systems 30,
 //! Academic Press 1989.

@@ -60,7 +60,8 @@ pub struct Outcome {
     pub test_rmse: Option<f64>,
     /// %; nothing where the outputs are constant.
     pub test_fit_percent: Option<f64>,
-    /// Whether all parameters differ significantly from zero, as far as standard errors are known, and no time constant is shorter than a step.
+    /// Whether all parameters differ significantly from zero, as far as standard errors are known, and no time constant is shorter than a
+    /// step.
     pub determined: bool,
     /// Criterion: see the module.
     pub bic: f64,

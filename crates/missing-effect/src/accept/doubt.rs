@@ -109,8 +109,9 @@ pub(crate) fn doubt<'a>(
 /// The best smaller set without effects that follow time alone all of which are called for, and which leaves noise, nearly as little of
 /// it; `None` where there is none.
 ///
-/// In a loop the command depends on every disturbance, and the likelihood of a model that runs on the measured command is biased by as much as a few effects gain. A sticking valve can then
-/// be replaced by a saturating pump and an outlet that changes at the instant of a slip: free instants and limits fit the noise better than the physical law of the valve.
+/// In a loop the command depends on every disturbance, and the likelihood of a model that runs on the measured command is biased by as much
+/// as a few effects gain. A sticking valve can then be replaced by a saturating pump and an outlet that changes at the instant of a slip:
+/// free instants and limits fit the noise better than the physical law of the valve.
 fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Option<Node<'a>> {
     if confirmed
         .setup

@@ -82,8 +82,9 @@ pub(crate) struct Judged<'a> {
 impl<'a> Judge<'_, 'a> {
     /// The accepted set, or the accepted part of it.
     ///
-    /// If the residual is not noise, an effect that a function of time can replace is not accepted: an unknown disturbance may have caused both. This applies to that effect alone. The other
-    /// effects stay if they are significant without it, and are accepted if they explain enough without it: effects that only compensated a rejected one are dropped too.
+    /// If the residual is not noise, an effect that a function of time can replace is not accepted: an unknown disturbance may have caused
+    /// both. This applies to that effect alone. The other effects stay if they are significant without it, and are accepted if they explain
+    /// enough without it: effects that only compensated a rejected one are dropped too.
     pub fn judge(&self, mut set: Node<'a>) -> Result<Judged<'a>, Error> {
         let mut judged = self.as_it_is(&set, None)?;
         loop {

@@ -1,7 +1,8 @@
 //! Level shift: the simplest function of time that no effect describes. From one sample to the next the reading changes by a constant.
 //!
-//! Causes are a recalibration, a sensor that was moved, a cable that was changed. An outlet that opens at that instant explains a part of the level shift, and a wide hysteresis
-//! of the sensor or a leak the rest: down to the noise, with three or four sizes instead of one. So a set of effects has to be better than a level shift.
+//! Causes are a recalibration, a sensor that was moved, a cable that was changed. An outlet that opens at that instant explains a part of
+//! the level shift, and a wide hysteresis of the sensor or a leak the rest: down to the noise, with three or four sizes instead of one. So
+//! a set of effects has to be better than a level shift.
 
 use ct_signals::Record;
 use greybox::{Noise, fit_from};

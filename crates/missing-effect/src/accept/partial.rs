@@ -2,9 +2,9 @@
 //!
 //! Measured records often hold several causes, and noise that is nearly integrated. That no set of effects leaves noise does not mean
 //! that nothing was found: a set is a partial answer where
-//! - it explains [`PART`](crate::accept::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one with an
-//!   effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::accept::judge::WHOLE) of it,
-//!   alone and beyond what a random walk explains;
+//! - it explains [`PART`](crate::accept::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one
+//!   with an effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::accept::judge::WHOLE) of it, alone and
+//!   beyond what a random walk explains;
 //! - of several effects: they are called for where each model has a noise model of its own, of limited memory;
 //! - it predicts the next sample as well as the model without it does, each beside a noise model of its own;
 //! - what is fitted to one half of the record predicts the other (two-fold cross-validation);

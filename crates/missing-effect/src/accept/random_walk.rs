@@ -71,9 +71,9 @@ impl Walk {
     };
 }
 
-/// Residuals whitened by the noise model of their output, over its innovations, beside their derivatives by the free parameters, row by row,
-/// a series for each record and output; the residual is the last column. The first samples of a record are left out: they have no complete past, and are scaled otherwise, so that
-/// a level other than zero would look like a jump.
+/// Residuals whitened by the noise model of their output, over its innovations, beside their derivatives by the free parameters, row by
+/// row, a series for each record and output; the residual is the last column. The first samples of a record are left out: they have no
+/// complete past, and are scaled otherwise, so that a level other than zero would look like a jump.
 struct Whitened {
     columns: usize,
     series: Vec<Vec<f64>>,

@@ -1,8 +1,8 @@
 //! Readings that a converter has rounded together with their noise.
 //!
-//! The readings themselves are the evidence: nearly all are multiples of one number `D`, which needs no fit and no criterion. The criterion hardly falls, because the noise
-//! acts as dither and makes the mean reading nearly linear in the level, and rounding acts as a
-//! further noise of variance `D^2/12`.
+//! The readings themselves are the evidence: nearly all are multiples of one number `D`, which needs no fit and no criterion. The criterion
+//! hardly falls, because the noise acts as dither and makes the mean reading nearly linear in the level, and rounding acts as a further
+//! noise of variance `D^2/12`.
 //!
 //! **Reference**: B. Widrow, I. Kollar, Quantization Noise, Cambridge 2008, ch. 4 and 19.
 

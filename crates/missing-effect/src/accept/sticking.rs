@@ -1,8 +1,8 @@
 //! Signature of valve stiction in a loop: the output is constant while the command changes, then it jumps.
 //!
-//! An integrating controller drives the command across the band of the valve, which follows in one slip: a triangle of the command
-//! beside a rectangle of the output. The instants of the slips depend on the noise, so no simulation from the command predicts all of them, and the error
-//! falls by a part only, even for a clearly sticking valve. The shape is detected without any model.
+//! An integrating controller drives the command across the band of the valve, which follows in one slip: a triangle of the command beside a
+//! rectangle of the output. The instants of the slips depend on the noise, so no simulation from the command predicts all of them, and the
+//! error falls by a part only, even for a clearly sticking valve. The shape is detected without any model.
 //!
 //! **Reference**: M. Kano, H. Maruta, H. Kugemoto, K. Shimizu, Practical model and detection algorithm for valve stiction, Proc. IFAC
 //! DYCOPS 2004, 859-864.

@@ -1,4 +1,5 @@
-//! Records in which rows or samples of an input are missing: how long an input may be held is a matter of the plant, so a first fit says it.
+//! Records in which rows or samples of an input are missing: how long an input may be held is a matter of the plant, so a first fit says
+//! it.
 //!
 //! Through a gap that is short beside the fastest time constant of the plant the input is held; at a longer one the record is cut, and the
 //! simulation starts again after it with states of its own ([`ct_signals::Gaps`]). The parts keep their time stamps and so their clock: a

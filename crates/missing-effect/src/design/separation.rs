@@ -12,8 +12,8 @@
 //! `y_B = P_B C (r - y_B)` and `u_A = C (r - y_A)`.
 //!
 //! **The refit** does without the straight line: B is fitted to A's simulation of the existing records and of the experiment, both free of
-//! noise; from its misfit the one to the existing records alone is taken off. A side measurement (a prior) is there in both, as A would have
-//! it read.
+//! noise; from its misfit the one to the existing records alone is taken off. A side measurement (a prior) is there in both, as A would
+//! have it read.
 
 use std::collections::BTreeMap;
 

@@ -35,8 +35,9 @@ pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>,
 
 /// Swaps effects for others while this makes another effect superfluous, or lowers the criterion.
 ///
-/// Among sets that explain the same part of a residual the search extends one, and a nearly right effect needs a further effect as a correction: on the emulated rig of a
-/// closed loop a raised outlet replaced the pump's dead zone, and a nonlinear pump the difference. With the dead zone the nonlinearity is not needed.
+/// Among sets that explain the same part of a residual the search extends one, and a nearly right effect needs a further effect as a
+/// correction: on the emulated rig of a closed loop a raised outlet replaced the pump's dead zone, and a nonlinear pump the difference.
+/// With the dead zone the nonlinearity is not needed.
 pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     // Every round ends with fewer effects, or with a lower criterion of as many.
     while node.added.len() > 1 {

@@ -24,8 +24,10 @@ const FOLLOWED: usize = 10;
 
 /// Larger sets, grown one effect at a time from each of the best small ones, the best of them improved by swaps.
 ///
-/// Among small sets that explain nearly the same part of a residual, the right one need not be the best while other effects are missing: each set is extended separately. On the measured Cascaded Tanks data a leak of the lower tank replaces
-/// the pump's dead zone, until the end of the sensor's range is in the set. While effects are missing, a size may also reach a bound: the set without such effects is extended and improved by swaps again, within all bounds.
+/// Among small sets that explain nearly the same part of a residual, the right one need not be the best while other effects are missing:
+/// each set is extended separately. On the measured Cascaded Tanks data a leak of the lower tank replaces the pump's dead zone, until the
+/// end of the sensor's range is in the set. While effects are missing, a size may also reach a bound: the set without such effects is
+/// extended and improved by swaps again, within all bounds.
 pub(crate) fn follow<'a>(
     base: &Node<'a>,
     grown: &mut Grown<'a>,

@@ -135,8 +135,8 @@ impl<'a> Grown<'a> {
 
 /// Forward search: grows sets of effects from a base.
 ///
-/// The search ends after two sizes that are not `worth` it compared with the best set so far, and at once if the residual of the best set is noise. If a single effect leaves coloured noise, which may contain a second
-/// effect, the search continues if some pair is `worth` it.
+/// The search ends after two sizes that are not `worth` it compared with the best set so far, and at once if the residual of the best set
+/// is noise. If a single effect leaves coloured noise, which may contain a second effect, the search continues if some pair is `worth` it.
 pub(crate) fn grow<'a>(
     base: &Node<'a>,
     noise: &Noise,

@@ -1,17 +1,18 @@
 //! Isolation at the ports of a user's own model: which effect of the catalogue, or which candidate of the user's own, began, and when,
 //! explains the latest rows.
 //!
-//! An effect that begins at row `j` is fitted to the rows from `j` on, in the metric of the learned noise: every parameter of the model as it
-//! was learned, the states at `j` as the learned model has them, only the effect's own parameters free, and the initial values of the states that
-//! it brings. With `S` the sum of squares, in
-//! the noise's variance, of what is left of the rows from `j` on, without the effect and with it,
+//! An effect that begins at row `j` is fitted to the rows from `j` on, in the metric of the learned noise: every parameter of the model as
+//! it was learned, the states at `j` as the learned model has them, only the effect's own parameters free, and the initial values of the
+//! states that it brings. With `S` the sum of squares, in the noise's variance, of what is left of the rows from `j` on, without the effect
+//! and with it,
 //! ```text
 //! evidence = S_without - S_with - (parameters + 1) ln n
 //! ```
-//! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs. Onsets
-//! are those around the one that a change of unknown direction has ([`super::onset`]).
+//! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs.
+//! Onsets are those around the one that a change of unknown direction has ([`super::onset`]).
 //!
-//! **Cost**: some ten simulations of the rows behind the onset for each effect, port and onset; of a candidate of the user's own up to a hundred.
+//! **Cost**: some ten simulations of the rows behind the onset for each effect, port and onset; of a candidate of the user's own up to a
+//! hundred.
 
 use std::collections::BTreeMap;
 

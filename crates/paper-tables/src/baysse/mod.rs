@@ -1,8 +1,8 @@
 //! Tables I and II and figure 3 of A. Baysse, F. J. Carrillo, A. Habbadi: a tank level in a loop, identified by least squares, by
 //! instruments, and by closed-loop output error.
 //!
-//! Table I is a simulation of the linear loop. Table II is measured on a rig, which is emulated here. What the paper leaves open was found by a
-//! search against its own tables. What it prints is in [`printed`].
+//! Table I is a simulation of the linear loop. Table II is measured on a rig, which is emulated here. What the paper leaves open was found
+//! by a search against its own tables. What it prints is in [`printed`].
 
 mod cell;
 pub mod printed;

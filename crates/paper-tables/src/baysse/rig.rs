@@ -121,8 +121,8 @@ impl Rig {
         })
     }
 
-    /// Records an experiment: command u (V), filtered level y (cm) and set point r (cm), each second. The noise is that of run `run` of a study
-    /// with this seed.
+    /// Records an experiment: command u (V), filtered level y (cm) and set point r (cm), each second. The noise is that of run `run` of a
+    /// study with this seed.
     ///
     /// # Errors
     /// [`Error::Signals`], [`Error::Plant`] or [`Error::Loop`] for settings that no rig can have.

@@ -1,5 +1,5 @@
-//! The experiment of tables 1 to 4: a tank of first order, `tau dy/dt + y = K u`, with white noise on its output; what the paper prints of it,
-//! and what is assumed.
+//! The experiment of tables 1 to 4: a tank of first order, `tau dy/dt + y = K u`, with white noise on its output; what the paper prints of
+//! it, and what is assumed.
 
 use ct_signals::noise;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};

@@ -93,7 +93,8 @@ pub const TABLES: [Table; 4] = [
     },
 ];
 
-/// Names of the cells of a table, in the order of [`Table::cells`]: `E250` is the criterion at 250 s, `P11`, `P12` and `P22` are entries of P1.
+/// Names of the cells of a table, in the order of [`Table::cells`]: `E250` is the criterion at 250 s, `P11`, `P12` and `P22` are entries of
+/// P1.
 pub const CELLS: [&str; 19] = [
     "K avg",
     "K rel.var",

@@ -66,8 +66,8 @@ pub(super) struct Moment {
 /// The cells of a table, as in [`CELLS`]; their units are those of the quantities: 1 for K, s for tau, c and the criterion.
 pub type Cells = [f64; CELLS.len()];
 
-/// One run of a table; `noise` is added to the output, in its unit: a value for each of [`Settings::steps`] and one more for the last sample.
-/// `None` where the run failed: the estimator refused an update, or P was no longer positive definite.
+/// One run of a table; `noise` is added to the output, in its unit: a value for each of [`Settings::steps`] and one more for the last
+/// sample. `None` where the run failed: the estimator refused an update, or P was no longer positive definite.
 ///
 /// # Errors
 /// [`Error::ShortNoise`], [`Error::Span`]; [`Error::Estimator`] for a start that makes no sense.

@@ -1,7 +1,8 @@
 //! `lag(u)`: the actuator follows the command with a time constant.
 //!
-//! Below half an interval between rows a lag differs from a smaller one only by how late it is: there the filter keeps that time constant, and
-//! a share of the input goes past it, so that the mean delay is the time constant. At zero all of it does, and the derivative there is right.
+//! Below half an interval between rows a lag differs from a smaller one only by how late it is: there the filter keeps that time constant,
+//! and a share of the input goes past it, so that the mean delay is the time constant. At zero all of it does, and the derivative there is
+//! right.
 
 use crate::effects::{Effect, Place, Role, Starts};
 

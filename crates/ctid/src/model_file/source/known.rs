@@ -112,8 +112,8 @@ impl Source<'_> {
         Ok(areas)
     }
 
-    /// The vessels whose levels are the outputs, in their order. Without a word it is the last one; of tanks that are joined, and of several
-    /// outputs, it has to be said.
+    /// The vessels whose levels are the outputs, in their order. Without a word it is the last one; of tanks that are joined, and of
+    /// several outputs, it has to be said.
     fn measured(
         &self,
         plant: Plant,

@@ -16,7 +16,8 @@ pub(super) fn records() -> u64 {
     std::env::var("RECORDS").map_or(RECORDS, |records| records.parse().unwrap())
 }
 
-/// The pooled share of covered rows is near 95 %: in 93 to 97 % for 200 fits or more, for fewer as much wider as the mean of fewer scatters.
+/// The pooled share of covered rows is near 95 %: in 93 to 97 % for 200 fits or more, for fewer as much wider as the mean of fewer
+/// scatters.
 fn check(name: &str, shares: &[f64]) {
     let n = shares.len() as f64;
     let mean = shares.iter().sum::<f64>() / n;
@@ -32,8 +33,8 @@ fn covered(mean: &[f64], errors: &[f64], clean: &[f64], quantile: f64) -> f64 {
     inside.count() as f64 / mean.len() as f64
 }
 
-/// Fits a record of a text's model, predicts on other inputs; the share of covered rows by output. `first_rows`: to which initial states are
-/// fitted; none where they are those of the text.
+/// Fits a record of a text's model, predicts on other inputs; the share of covered rows by output. `first_rows`: to which initial states
+/// are fitted; none where they are those of the text.
 fn share(
     text: &str,
     truth: &[f64],

@@ -30,7 +30,7 @@ pub(crate) struct Context<'a> {
     /// Standard deviation of each output's noise, where it is known by now.
     pub scales: Option<Vec<f64>>,
     pub candidates: Vec<Candidate>,
-    /// Smooth functions, for the shape of what no candidate explains.
+    /// Smooth functions, for the shape of the error that no candidate explains.
     pub shapes: Vec<Candidate>,
     pub limit: Limit<'a>,
     pub thresholds: Thresholds,

@@ -86,7 +86,7 @@ fn wave(seed: u64) -> String {
     csv(&rig.run(&mut ChaCha8Rng::seed_from_u64(seed)))
 }
 
-/// The shape of what nothing explains is drawn, kept under a name, taken out and put back.
+/// The shape of the unexplained error is drawn, kept under a name, taken out and put back.
 #[test]
 #[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn the_unexplained_is_kept_by_name() {

@@ -27,7 +27,7 @@ pub(super) struct Compare {
     /// Model file
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
-    /// Held-out record: takes no part in any fit or choice, and is only scored; may be repeated
+    /// Held-out record: only scored, not used for fits or selection; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
     /// In a loop whose [controller] is known: simulate it from its reference, as is done for a plant, or run on the measured command, as is
@@ -56,7 +56,7 @@ enum LoopWay {
 pub(super) struct Diagnose {
     #[command(flatten)]
     compare: Compare,
-    /// Write the shape of what nothing explains as CSV, for `ctid add NAME --from F`
+    /// Write the shape of the unexplained error as CSV, for `ctid add NAME --from F`
     #[arg(long, value_name = "F.csv")]
     unknown: Option<PathBuf>,
     /// Add at most so many effects

@@ -74,8 +74,8 @@ impl Findings {
         self.record_numbers.contains_key(id)
     }
 
-    /// The value of a parameter in the last model that has it, of the shape of what no candidate explains, or, of an effect that is in no
-    /// model, as it was fitted alone.
+    /// The value of a parameter in the last model that has it, of the shape of the error that no candidate explains, or, of an effect that
+    /// is in no model, as it was fitted alone.
     fn value(&self, name: &str) -> Option<f64> {
         let steps = self.steps.iter().rev().chain(&self.unknown);
         let steps = steps.flat_map(|step| &step.parameters);

@@ -72,7 +72,7 @@ impl Document {
     }
 }
 
-/// The shape of what no candidate explains, as it is shown.
+/// The shape of the error that no candidate explains, as it is shown.
 pub(crate) fn missing_term(words: &EffectWords, unknown: &Unknown) -> MissingTerm {
     let shown_term = match words.sites(&unknown.effect) {
         [Site::Input(u), ..] => format!("added to the input {u}"),

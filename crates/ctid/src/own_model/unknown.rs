@@ -1,4 +1,4 @@
-//! The shape of what no candidate explains, as a person reads it and as a file.
+//! The shape of the error that no candidate explains, as a person reads it and as a file.
 
 use effect_search::Unknown;
 

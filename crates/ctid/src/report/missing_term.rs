@@ -110,7 +110,7 @@ pub(super) fn html(term: &MissingTerm) -> String {
     );
     section(
         "unknown",
-        "What nothing explains",
+        "The unexplained error",
         &lead,
         &format!("{picture}{compared}"),
     )

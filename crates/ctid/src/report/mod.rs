@@ -156,7 +156,7 @@ fn trail(diagnosis: &Diagnosis) -> String {
         .collect();
     let held_out = |step: &Step| step.outputs.iter().any(|output| output.rmse_test.is_some());
     let held_out = if diagnosis.steps.iter().any(held_out) {
-        "; below it the same on the held-out data, which took part in no fit and no choice"
+        "; below it the same on the held-out data, which were not used for fits or selection"
     } else {
         ""
     };

@@ -77,8 +77,8 @@ pub(super) fn unknown(diagnosis: &Diagnosis) -> String {
     }
     section(
         "unknown",
-        "What nothing explains",
-        "The term that has to be added to the last model so that it meets the data. <code>ctid diagnose --unknown F.csv</code> writes \
+        "The unexplained error",
+        "The term that has to be added to the last model so that it fits the data. <code>ctid diagnose --unknown F.csv</code> writes \
          its shape, <code>ctid add NAME --from F.csv</code> keeps it as a term of your own.",
         &format!("{figures}{}", tables::shares(unknown)),
     )

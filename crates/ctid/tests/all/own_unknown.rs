@@ -1,4 +1,4 @@
-//! The shape of what no candidate explains: where it acts, what it depends on, as a file, and kept in the model.
+//! The shape of the error that no candidate explains: where it acts, what it depends on, as a file, and kept in the model.
 
 use std::fmt::Write;
 

@@ -51,7 +51,7 @@ fn what_nothing_explains_is_shown_with_its_port_and_units() {
     };
     let html = document.html();
     for part in [
-        "What nothing explains",
+        "The unexplained error",
         "id=\"plot-unknown-shape\"",
         "added to the equation of T, in W",
         "<code>ctid add &#39;shape(T,u)&#39; --model M.toml --from RESULT.json</code>",

@@ -144,7 +144,7 @@ impl Case {
         self.instruments(rivc::Noise::Autoregressive)
     }
 
-    /// A start that both are given whole: the truth, off by a quarter.
+    /// A start for both programs: the true plant with parameters off by a quarter.
     fn near(&self) -> Vec<f64> {
         let factors = [1.25, 0.75, 1.25, 0.75];
         let theta = self.plant.theta().iter().zip(factors);

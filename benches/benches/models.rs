@@ -10,7 +10,7 @@ use plants::{Command, Known, Plant, Scales, Simulator, Structure};
 
 const SAMPLES: usize = 1000;
 
-/// A plant at believable numbers: parameters, first levels, areas, interval \[s\].
+/// A plant with realistic numbers: parameters, first levels, areas, interval \[s\].
 struct Rig {
     plant: Plant,
     theta: &'static [f64],

@@ -93,8 +93,8 @@ fn diagnosed(problem: &Problem) -> Option<Diagnosis> {
     diagnose(problem, &Options::default(), &|_| {}).ok()
 }
 
-/// A rig that nobody chose: any effect of the catalogue, any plant that it may act in, in open loop or in a loop, under white or
-/// coloured noise, with a structural error of one to eight times the noise. `None` where that shows nowhere.
+/// A rig drawn at random: any effect of the catalogue, any plant that it may act in, in open loop or in a loop, under white or coloured
+/// noise, with a structural error of one to eight times the noise. `None` if the effect is not visible in any draw.
 #[must_use]
 pub fn drawn(seed: u64) -> Option<Rig> {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);

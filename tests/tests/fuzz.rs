@@ -7,7 +7,7 @@ use ctid_tests::fuzz::{Kind, as_program, run};
 
 /// Cases of each kind.
 const CASES: u64 = 200;
-/// The smallest and the largest share of cases with a result; others would say that the inputs are all good or all bad.
+/// The smallest and the largest share of cases with a result; a share outside would mean that nearly all inputs are valid or invalid.
 const RESULTS: std::ops::Range<f64> = 0.05..0.95;
 
 fn main() -> ExitCode {

@@ -10,12 +10,12 @@ use crate::{Error, Relation, Row, project_box};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Keep {
-    /// Moved to the nearest point of the box, in the metric of what is known: [`project_box`].
+    /// Projection to the nearest point of the box in the metric of `P`: [`project_box`].
     Projection,
     /// Clipping: each entry outside its bounds is set to the bound, and the others do not change. Literature on simulations uses this rule.
     /// The Lyapunov function may grow, and correlated parameters are not corrected.
     Clamp,
-    /// Pulled back where outside: a row's penalty for each bound that is violated, relaxed exactly over the step.
+    /// A penalty for each violated bound, relaxed exactly over the step.
     Penalty {
         /// Weight of the penalty, as of a [`Row`]: choose it well above the mean squared error of the output. For example 1e3 times this
         /// error works, and 1 times does not.
@@ -91,7 +91,7 @@ impl<const P: usize> Bounds<P> {
             .all(|x| bounds.next().is_some_and(|(l, u)| (l..=u).contains(&x)))
     }
 
-    /// Brings the estimates back after a step of `dt` seconds; returns whether they moved.
+    /// Enforces the box after a step of `dt` seconds; returns whether the estimates changed.
     ///
     /// # Errors
     /// As of [`project_box`].

@@ -90,7 +90,7 @@ impl Window {
 }
 
 impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
-    /// Puts rows on an estimator: least squares, `gamma = c` for the data and `Gamma = W` for the equality rows.
+    /// Adds rows to an estimator: least squares, `gamma = c` for the data and `Gamma = W` for the equality rows.
     ///
     /// # Errors
     /// [`Error::GammaNotWeight`], [`Error::RowGammaNotWeight`].
@@ -225,8 +225,8 @@ impl<const P: usize, const R: usize> RecursiveEstimator for ConstrainedRls<P, R>
     type Covariance = SMatrix<f64, P, P>;
     type Error = Error;
 
-    /// The data, then the rows. A sample that is refused changes nothing, by the rows neither; while the sensor is gone, a silent
-    /// one (`phi = 0`, `y = 0`) lets the rows act alone.
+    /// Uses the data, then the rows. A rejected sample changes nothing, and its rows are not used either; without a sensor signal, a zero
+    /// sample (`phi = 0`, `y = 0`) applies the rows alone.
     fn update(&mut self, sample: &Sample<P>, dt: f64) -> Innovation {
         let weights = self.rls.weights();
         self.step(sample, dt, &weights)

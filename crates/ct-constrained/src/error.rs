@@ -1,13 +1,13 @@
 //! Errors of constraints: each message contains the numbers that disagree and the correction.
 
-/// Everything this crate can refuse.
+/// All errors of this crate.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// An error of the recursive least-squares estimator inside.
     #[error(transparent)]
     Rls(#[from] ct_rls::Error),
-    /// The weights of the data are no least squares, so that constraints would bias the estimates.
+    /// The weights of the data are not those of least squares, so constraints would bias the estimates.
     #[error(
         "gamma is {gamma} with c = {c}, but with constraints the criterion is minimised only for gamma = c; take gamma = {c}, or with_free_gamma, which minimises no criterion"
     )]
@@ -27,7 +27,7 @@ pub enum Error {
         /// Weight of the row.
         weight: f64,
     },
-    /// A row's gamma with which the Lyapunov function could grow.
+    /// A value of gamma with which the Lyapunov function could grow.
     #[error(
         "gamma of the row is {gamma} with the weight {weight}, but must be at least 0 and below twice the weight, {}, or the Lyapunov function can grow", 2.0 * weight
     )]

@@ -27,7 +27,7 @@ pub enum Filter {
         /// `T`, s; above 0.
         time: f64,
     },
-    /// `1/s`: the balance since the start. Of signals with a mean it grows for ever, and counts for more and more.
+    /// `1/s`: the integral since the start. For signals with a mean the integral grows without bound, and so does the weight of the row.
     Integral,
 }
 

@@ -222,7 +222,7 @@ fn nearest<const P: usize, const N: usize, I: Integrator>(
             break;
         }
         let Some(violated) = search.next() else {
-            // for what rounding left
+            // corrects the rounding error
             search.move_onto_active();
             rls.set_theta(search.theta)?;
             return Ok(search.theta != start);

@@ -20,7 +20,7 @@ pub enum Error {
         /// The polynomial or list in question.
         what: &'static str,
     },
-    /// A transfer function that differentiates.
+    /// A transfer function with more zeros than poles.
     #[error(
         "the numerator has degree {numerator}, above the denominator's {denominator}: such a transfer function cannot be sampled; add poles"
     )]
@@ -66,7 +66,7 @@ pub enum Error {
         /// Value of the entry.
         value: f64,
     },
-    /// A filter that does not forget.
+    /// A filter that is not asymptotically stable.
     #[error(
         "{what} has a root with real part {real_part}, but all of them have to be below 0; give another polynomial"
     )]
@@ -96,7 +96,7 @@ pub enum Error {
         /// Imaginary part \[1/time\].
         im: f64,
     },
-    /// Numbers too large for what was asked of them.
+    /// Numbers that overflow.
     #[error("{what} overflows f64 (largest finite number 1.8e308); {mend}")]
     Overflow {
         /// The quantity in question.

@@ -269,7 +269,7 @@ fn gcd(mut a: BigUint, mut b: BigUint) -> BigUint {
 mod tests {
     use super::*;
 
-    /// Half a unit of the last digit and a little more is rounded up, where the little is beyond the 64 leading bits too.
+    /// Half a unit of the last digit plus a small amount is rounded up, also if the small amount is beyond the 64 leading bits.
     #[test]
     fn what_is_dropped_counts_where_a_half_is_rounded() {
         let rounded = |c: u128| {

@@ -17,6 +17,6 @@ pub enum Start {
     /// sample.
     #[default]
     Zero,
-    /// The first sample has stood forever. Right where the process was at rest at its operating point.
+    /// The first sample was held for all earlier times. Correct if the process was at rest at its operating point.
     Rest,
 }

@@ -237,7 +237,7 @@ fn improve(c: &[f64], roots: &mut [Complex64], i: usize, fine: bool) -> bool {
     let repulsion: Complex64 = others.map(|other| ratio(one, z - other)).sum();
     let mut change = step / (one - step * repulsion);
     if !(change.re.is_finite() && change.im.is_finite()) {
-        // P'(z) = 0, or the denominator: leave the spot, by a step that has no symmetry.
+        // P'(z) = 0, or the denominator is 0: move away by a step without symmetry.
         change = z * Complex64::new(3e-3, 7e-3) + Complex64::new(1e-300, 0.0);
     }
     roots[i] = z - change;

@@ -45,7 +45,7 @@ pub enum Function {
     Atan2,
     Min,
     Max,
-    /// `play(x, b)`: a play of half-width `b`; what it gives follows `x` from row to row at a distance of at most `b`.
+    /// `play(x, b)`: backlash of half-width `b`; the result follows `x` from row to row at a distance of at most `b`.
     Play,
     /// `quantise(x, d)`: the multiple of `d` that is nearest to `x`; `x` itself where `d` is zero.
     Quantise,
@@ -135,7 +135,7 @@ pub enum Condition {
     Or(Box<Condition>, Box<Condition>),
 }
 
-/// A number that is computed.
+/// A numeric expression.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Expression {
     /// A constant in the text, zero or above.
@@ -146,13 +146,13 @@ pub enum Expression {
     Variable(Variable),
     /// `-a`.
     Negative(Box<Expression>),
-    /// Two numbers joined.
+    /// Two operands with an operator.
     Binary(Operator, Box<Expression>, Box<Expression>),
     /// A function of its arguments.
     Call(Function, Vec<Expression>),
     /// `if c then a else b`.
     If(Box<Condition>, Box<Expression>, Box<Expression>),
-    /// The expression so long ago \[time\]; before the record it was as at its beginning.
+    /// The expression with a dead time \[time\]; before the record it has its initial value.
     Delay(Box<Expression>, Box<Expression>),
 }
 

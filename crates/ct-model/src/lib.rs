@@ -1,4 +1,4 @@
-//! Lumped models in continuous time as text: what engineers already write their physics in, a flat subset of Modelica.
+//! Lumped models in continuous time as text, in a flat subset of Modelica, the language in which engineers already write physical models.
 //!
 //! ```
 //! use ct_model::ModelSpec;

@@ -25,7 +25,7 @@ enum Degree {
 }
 
 impl ModelSpec {
-    /// Whether the model is linear, so that it can be simulated exactly. What changes with time by itself, other than by a delay, is not.
+    /// Whether the model is linear, so that it can be simulated exactly. An explicit function of time other than a delay is not linear.
     #[must_use]
     pub fn linearity(&self) -> Linearity {
         let mut flows = vec![Degree::Constant; self.flows.len()];
@@ -58,14 +58,14 @@ impl ModelSpec {
 pub(crate) enum ExactSteps {
     /// Not linear, or time-varying.
     No,
-    /// A constant matrix, and any function of the inputs: linear where these are held.
+    /// A constant matrix, and any function of the inputs: linear while the inputs are held.
     HeldInputs,
     /// Linear in the inputs too.
     AllInputs,
 }
 
 impl ModelSpec {
-    /// Whether and when that is so; how outputs depend on them does not matter.
+    /// Condition for linearity of the state equations; the outputs may be nonlinear.
     pub(crate) fn exact_steps(&self) -> ExactSteps {
         let mut flows = vec![Part::Parameters; self.flows.len()];
         for &i in &self.order {

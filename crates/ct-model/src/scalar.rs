@@ -30,7 +30,7 @@ pub trait Scalar:
     fn sin_cos(self) -> (Self, Self);
     /// Whether both have the same derivatives.
     fn same_derivatives(self, other: Self) -> bool;
-    /// A number of that value which hangs on others, given its partial derivatives by them.
+    /// A number with this value that depends on others, given its partial derivatives with respect to them.
     fn with_slopes<const K: usize>(value: f64, of: [(Self, f64); K]) -> Self;
 
     /// The smaller of two by value; the first where they are equal.
@@ -158,7 +158,7 @@ impl<const N: usize> Scalar for Dual<N> {
     }
 }
 
-/// The operators are written as one pass that builds the result in place: by-value edits of a copy cost a `memcpy` each.
+/// The operators build the result in one pass: modifying a copy by value would cost a `memcpy` each.
 macro_rules! operator {
     ($trait:ident, $method:ident, |$a:ident, $b:ident| $re:expr, |$i:ident| $eps:expr) => {
         #[allow(

@@ -71,7 +71,7 @@ pub struct Flow {
     pub about: About,
     /// Right-hand side.
     pub value: Expression,
-    /// A parameter that others define (`final parameter b = 2*a`): it does not change with time.
+    /// A parameter that depends on other parameters (`final parameter b = 2*a`): it does not change with time.
     pub of_parameters: bool,
 }
 

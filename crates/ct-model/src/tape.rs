@@ -1,4 +1,4 @@
-//! A model compiled into a list of operations on numbers, which is what simulates.
+//! A model compiled into a list of operations on numbers, which the simulation runs.
 //!
 //! Every subexpression is one operation, the same one is computed once, and what parameters alone define is computed once per simulation.
 //!
@@ -56,7 +56,7 @@ pub(crate) struct Tape {
     first_operation: Register,
 }
 
-/// A play: `min(max(held, x - b), x + b)`, where `held` is what it gave at the last row.
+/// A backlash: `min(max(held, x - b), x + b)`, where `held` is its output at the last row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Play {
     /// Register of the delay's input.
@@ -85,7 +85,7 @@ pub(crate) struct Registers<T> {
     plain: Vec<bool>,
     /// All inputs are held, and the results that depend on inputs and parameters only are computed.
     pub held: bool,
-    /// Roots, powers and logarithms that have no value are zero: beyond a branch that a step has to end at.
+    /// Roots, powers and logarithms of invalid arguments are zero: they occur only on a branch that ends the step.
     pub extended: bool,
 }
 
@@ -179,7 +179,7 @@ impl Tape {
         }
     }
 
-    /// The operations that results need, in order; what reads a choice reads the one that is chosen.
+    /// The operations that the results depend on, in order; an operation that reads a choice reads the selected register.
     fn needed(
         &self,
         results: &[Register],
@@ -335,7 +335,7 @@ impl Tape {
         self.answers_changed(registers);
     }
 
-    /// The state that a difference is, less or from a number, and its sign.
+    /// If a difference is a state plus or minus a constant: the state and its sign.
     pub fn state_of(&self, difference: Register) -> Option<(usize, f64)> {
         let states = self.state(0)..self.state(self.states);
         let state = |register: Register| {

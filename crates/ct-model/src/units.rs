@@ -94,7 +94,7 @@ fn quotient(a: Known, b: Known) -> Known {
     }
 }
 
-/// The dimension of a unit, as Modelica has it: in a column's head `F` and `C` are temperatures, here farad and coulomb.
+/// The dimension of a unit in Modelica: in a column's header `F` and `C` are temperatures, here they are farad and coulomb.
 fn declared(unit: &str) -> Known {
     let unit = match unit.trim() {
         "F" => "A.s/V",
@@ -105,7 +105,7 @@ fn declared(unit: &str) -> Known {
 }
 
 impl Walk<'_> {
-    /// Notes where two sides differ, and gives what they are together.
+    /// Records a warning if two sides differ, and returns their common dimension.
     fn compare(&mut self, (a, of_a): (&str, Known), (b, of_b): (&str, Known)) -> Known {
         match (of_a, of_b) {
             (Known::Is(own), Known::Is(other)) if own != other => {
@@ -184,7 +184,7 @@ impl Walk<'_> {
                     self.dimension(a);
                     Known::Is(NONE)
                 }
-                // Half a dimension has no name.
+                // A square root of a dimension without a name is not checked.
                 (Function::Sqrt, [a]) => match self.dimension(a) {
                     Known::Is(dimension) => dimension.root().map_or(Known::Open, Known::Is),
                     other => other,

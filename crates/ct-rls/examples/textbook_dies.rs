@@ -1,4 +1,4 @@
-//! Prints after how many samples the textbook's covariance update dies, for the table in the crate's documentation.
+//! Prints the number of samples after which the textbook's covariance update fails, for the table in the crate's documentation.
 #![allow(missing_docs)]
 
 #[path = "../tests/all/support/mod.rs"]

@@ -82,7 +82,7 @@ pub fn update_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
         .grown::<I, _>(&step2, outcome2, &mut second.state);
     let outcome = match (one, two) {
         (Outcome::Capped, _) | (_, Outcome::Capped) => Outcome::Capped,
-        // the second block may be silent for long, as where the model is right
+        // the second block may have no excitation for long, for example if the model is right
         (one, _) => one,
     };
     Innovation {

@@ -1,4 +1,4 @@
-//! Directional forgetting: what is known is only forgotten in the direction of the present regressor.
+//! Directional forgetting: information is only forgotten in the direction of the present regressor.
 //!
 //! Model: `y = theta' phi`, `eps = y - theta^' phi`, with the information `R = P^-1`:
 //! ```text

@@ -2,7 +2,7 @@
 
 use crate::Outcome;
 
-/// Everything this crate can refuse, and why a run has stopped.
+/// All errors of this crate, and the reasons why a run has stopped.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -106,7 +106,7 @@ pub enum Error {
         /// The cap.
         limit: f64,
     },
-    /// `theta(0)`, `P(0)` and the regressor do not belong together (run-time sizes only).
+    /// `theta(0)`, `P(0)` and the regressor have different sizes (run-time sizes only).
     #[error(
         "{what} has {found} entries a side, but {expected} parameters are estimated; give it that size"
     )]

@@ -80,8 +80,8 @@ pub enum Outcome {
     Capped,
     /// The regressor is silent: nothing was forgotten.
     Silent,
-    /// A signal is not finite, or beyond any sense: the regressor is above 1e30, an output error above 1e100; or a step of
-    /// any rule but [`ExactHold`](crate::ExactHold) would, or might, lead beyond the floating-point range. Nothing was done.
+    /// A signal is not finite or too large: the regressor is above 1e30, an output error above 1e100; or a step of any rule but
+    /// [`ExactHold`](crate::ExactHold) would, or might, overflow. The sample was not used.
     NotFinite,
     /// `dt` is not above 0 and at most 1e30 s, or `eta dt` is above 300: nothing was done.
     BadStep,
@@ -116,8 +116,8 @@ impl Outcome {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Health {
-    /// Smallest eigenvalue of the information matrix `P^-1`, unit of `1/theta^2`: what is known about the
-    /// combination of parameters that is known worst. It stays away from 0 while the excitation persists.
+    /// Smallest eigenvalue of the information matrix `P^-1`, unit of `1/theta^2`: the information on the least well determined combination
+    /// of parameters. With persistent excitation it stays above a positive bound.
     pub excitation: f64,
     /// Smallest pivot of `P = U D U'`, unit of `theta^2`: above 0 where `P` is positive definite.
     pub smallest_pivot: f64,

@@ -135,7 +135,7 @@ pub(crate) fn absorb(u: &mut [f64], d: &mut [f64], f: &[f64], a: f64, growth: f6
         let lambda = -a * f[j] * inverse;
         let next = alpha + a * f[j] * g;
         inverse = 1.0 / next;
-        // no underflow to 0, which would make P singular for good
+        // avoids underflow to 0, which would make P singular permanently
         d[j] = (d[j] * growth * (alpha * inverse)).max(f64::MIN_POSITIVE);
         let column = &mut u[j * p..j * p + j];
         for i in 0..j {

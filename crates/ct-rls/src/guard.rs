@@ -37,7 +37,7 @@ pub(crate) struct Counts {
 
 #[cfg(feature = "serde")]
 impl Guard {
-    /// The bound of the trace, and the counts. A factored `P` has no other state: its run does not stop.
+    /// The bound of the trace, and the counts. With a factored `P` there is no other state, because its run does not stop.
     pub fn saved(&self) -> (f64, Counts) {
         let counts = Counts {
             used: self.used,

@@ -44,7 +44,7 @@ pub(crate) mod sealed {
 
     /// Properties of an integration rule that the guards need.
     pub trait Memory {
-        /// Whether a step may raise the trace of `P` above the bound that was known of it.
+        /// Whether a step may raise the trace of `P` above its known bound.
         #[cfg(feature = "serde")]
         const RAISES: bool = true;
         /// Whether the parameters walk at random.
@@ -188,7 +188,7 @@ impl<const P: usize> sealed::Capped for Plain<P> {
 
 impl<const P: usize> sealed::Covariance<P> for Plain<P> {
     fn from_matrix(matrix: &nalgebra::SMatrix<f64, P, P>) -> Result<Self, crate::Error> {
-        // the same demands as of a factored P
+        // the same conditions as for a factored P
         let factor = crate::UdFactor::new(matrix)?;
         Ok(Self(factor.to_matrix().data.0))
     }

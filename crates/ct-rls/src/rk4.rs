@@ -1,8 +1,8 @@
 //! The classical Runge-Kutta rule of fourth order: to compare with.
 //!
-//! Model and assumptions as of [`ExactHold`](crate::ExactHold); `dtheta/dt` and `dP/dt` are evaluated four times per step.
-//! It bears steps little longer than Euler's rule does; where `P` loses its definiteness the step is not made, the run
-//! stops with its estimates, and the health is [`Error::LostDefiniteness`](crate::Error::LostDefiniteness).
+//! Model and assumptions as of [`ExactHold`](crate::ExactHold); `dtheta/dt` and `dP/dt` are evaluated four times per step. The largest
+//! stable step is little longer than for Euler's rule; if `P` would lose its positive definiteness, the step is not made, the run stops
+//! with its estimates, and the health is [`Error::LostDefiniteness`](crate::Error::LostDefiniteness).
 //!
 //! Cost per update: about `14 p^2` multiplications, and `p^3/6` for the check. Reference: A. J. Udink ten Cate, WP-85-54, 1985, (2.14).
 

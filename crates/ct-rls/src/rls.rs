@@ -1,4 +1,4 @@
-//! The estimator for a number of parameters that is known when the program is built.
+//! The estimator for a number of parameters that is known at compile time.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -89,7 +89,8 @@ impl<const P: usize, I: FactoredIntegrator> ContinuousRls<P, I> {
         I::factor(&self.state)
     }
 
-    /// `V = delta' P^-1 delta`, with `delta` from `theta` to the estimates: how far the estimates say it is away.
+    /// `V = delta' P^-1 delta`, with `delta` from `theta` to the estimates: distance of the estimates from `theta`, relative to their
+    /// uncertainty.
     pub fn distance(&self, theta: &SVector<f64, P>) -> f64 {
         self.factor().information_norm(&(theta - self.theta))
     }

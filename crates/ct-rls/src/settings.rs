@@ -112,9 +112,9 @@ pub struct Guards {
     /// As a record `f64::INFINITY` is none, which JSON has no number for.
     #[cfg_attr(feature = "serde", serde(with = "infinite_as_none"))]
     pub trace_limit: f64,
-    /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`.
-    /// At 0, the start, only an exactly silent regressor counts; below 0 none does, and `P` winds up as the paper's. Above 1e30 it
-    /// is 1e30, the limit of a regressor. The intensity of a [`RandomWalk`](crate::RandomWalk) goes on.
+    /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`. At 0, the default, this applies only to
+    /// a regressor that is exactly zero; below 0 it never applies, and `P` winds up as in the paper. Above 1e30 the value is 1e30, the
+    /// limit of a regressor. The intensity of a [`RandomWalk`](crate::RandomWalk) is still added.
     pub silent_below: f64,
 }
 

@@ -17,8 +17,8 @@ use crate::settings::{MAX_EPSILON, MAX_PHI_SQUARED, Step, Weights};
 use crate::{BlockIntegrator, ContinuousRls, Integrator};
 
 impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
-    /// Takes in the statement `f' theta = chi` at once, with the weight `information` (1/unit(chi)^2, at least 0):
-    /// `P^-1` grows by `information f f'`. Above 1e60 it counts as 1e60, which is exact. Not counted, not guarded.
+    /// Uses the constraint `f' theta = chi` at once, with the weight `information` (1/unit(chi)^2, at least 0): `P^-1` grows by
+    /// `information f f'`. Above 1e60 it counts as 1e60, which is exact. Not counted, not guarded.
     ///
     /// Returns `chi - f' theta` before; `None`, and nothing is done, where a number is out of range or the run has stopped.
     pub fn absorb(&mut self, f: &SVector<f64, P>, chi: f64, information: f64) -> Option<f64> {
@@ -58,7 +58,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
     }
 }
 
-/// Takes in the statement `f1' theta1 + f2' theta2 = chi` over two blocks with no covariance between them; (4.18) of the paper for one row.
+/// Uses the constraint `f1' theta1 + f2' theta2 = chi` for two blocks with no covariance between them; (4.18) of the paper for one row.
 ///
 /// - `epsilon`: `chi - f1' theta1 - f2' theta2`, which the caller knows.
 /// - `information`, `ratio`: of either block, as of [`ContinuousRls::absorb_with`]; both informations above 0.
@@ -135,7 +135,7 @@ fn relax_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     Some(epsilon)
 }
 
-/// A step that is as long as the information, where it and the coefficients are in range.
+/// A step of the length of the information, if the length and the coefficients are in range.
 fn length_of(information: f64, squared: f64) -> Option<Step> {
     let fits = information >= 0.0 && squared <= MAX_PHI_SQUARED;
     fits.then(|| Step::remembering_for(information.min(MAX_PHI_SQUARED)))

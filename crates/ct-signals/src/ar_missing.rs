@@ -28,7 +28,7 @@ use crate::{ArModel, StationaryNoise};
 
 /// Step of the differences, in a partial correlation.
 const STEP: f64 = 1e-6;
-/// Steps go at most so far towards the end of a partial correlation's range.
+/// A step covers at most this share of the distance to the end of a partial correlation's range.
 const TO_BOUND: f64 = 0.9;
 /// If less than this share of the samples has a partner at some lag, the pairs of this lag give no start.
 const FEW_PAIRS: f64 = 0.1;
@@ -48,7 +48,7 @@ const PAIRS: [(f64, f64); 12] = [
     (-0.7, -0.3),
     (-0.7, -0.7),
 ];
-/// Starts whose `D` is above that of the order before by more than so many penalties are given up.
+/// A start is dropped if its `D` exceeds that of the previous order by more than this number of penalties.
 const NEAR: f64 = 10.0;
 /// Falls of `D` that end a refinement: of an order that is a candidate, and of the one that was chosen.
 const ROUGH: f64 = 0.3;
@@ -129,7 +129,7 @@ fn of_series(series: &Series<impl Whiten>, max_order: usize) -> ArModel {
         } else {
             series.step(&mut k, &mut at, &[order - 1], SMALL * penalty);
         }
-        // The first order has no others.
+        // For the first order there are no other partial correlations.
         if order > 1 && before - at.deviance > penalty {
             series.refine(&mut k, &mut at, ROUGH);
         }
@@ -217,7 +217,7 @@ impl<W: Whiten> Series<'_, W> {
 
     /// Refines the best of some values of the last partial correlation, of order two together with the first.
     fn search(&self, k: &mut Vec<f64>, at: &mut Whitened) {
-        // Rounding is not a reason.
+        // Changes within rounding are no reason to continue.
         let rounding = 1e-9 * self.n as f64;
         let last = k.len() - 1;
         let pairs = PAIRS.map(|(first, second)| vec![first, second]);

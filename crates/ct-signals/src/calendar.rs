@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Record, Timestamp, Zone};
 
-/// The date and time at which the clock of a record is at zero, and the zone in which people read it.
+/// The date and time at zero of a record's clock, and the zone for display.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calendar {
     /// Date and time at `time` zero.

@@ -18,7 +18,7 @@ const EVEN: f64 = 0.25;
 const MOST: f64 = 0.98;
 /// Rows are missing, and steps are not uneven, if this share of the steps equals one interval.
 const SINGLE: f64 = 0.6;
-/// Rounded stamps make steps of two intervals at more than this share; rows that are lost so often leave longer steps too.
+/// With rounded stamps, more than this share of the steps has two intervals; when rows are lost this often, longer steps occur too.
 const ROUNDED: f64 = 0.05;
 /// With uneven steps, a gap is a step longer than 1.5 times this quantile of the steps.
 const USUAL: f64 = 0.95;
@@ -38,7 +38,7 @@ const SHORTEST: usize = 8;
 pub struct Gaps {
     /// Rows that are missing between the first and the last.
     pub rows: usize,
-    /// Stretches in which rows are missing, or samples of an input.
+    /// Places where rows or samples of an input are missing.
     pub places: usize,
     /// Number of these gaps through which the inputs were held.
     pub held: usize,
@@ -125,7 +125,7 @@ impl Sampling {
     }
 }
 
-/// The longest step of the slowest rate, where most of the steps that are longer than `interval` stand in rows of equal ones.
+/// The longest step of the slowest rate, if most of the steps longer than `interval` occur in sequences of equal steps.
 fn slowest_rate(time: &[f64], interval: f64) -> Option<f64> {
     let steps: Vec<f64> = steps(time).collect();
     let long = |step: f64| step > GAP * interval;

@@ -101,8 +101,8 @@ impl Channel {
     }
 }
 
-/// A series with straight lines, by rows, in place of missing samples (NaN), and the nearest one before the first and after the last that
-/// is there; as it is where none is.
+/// A series with linear interpolation, by rows, of missing samples (NaN), and constant values before the first and after the last sample;
+/// unchanged if all are missing.
 #[must_use]
 pub fn interpolated(values: &[f64]) -> Vec<f64> {
     let mut values = values.to_vec();

@@ -4,7 +4,7 @@ use crate::{Channel, Error, Hold, Record};
 
 /// Most rows of a grid.
 const MOST_ROWS: f64 = 1e7;
-/// A held sample acts for so many sampling intervals at most: what the command did after it is not known.
+/// A held sample is valid for at most this number of sampling intervals: the command after it is not known.
 const ACTS: f64 = 1.5;
 
 impl Record {
@@ -48,7 +48,7 @@ impl Record {
         })
     }
 
-    /// Means of a held channel over the intervals of a grid; missing where a part of it is.
+    /// Means of a held channel over the intervals of a grid; missing if a part of an interval is missing.
     fn means(&self, channel: &Channel, grid: &[f64], interval: f64) -> Vec<f64> {
         let mut k = 0;
         let end = |k: usize| self.time.get(k + 1).copied().unwrap_or(f64::INFINITY);
@@ -81,7 +81,7 @@ impl Record {
             .collect()
     }
 
-    /// A channel read on lines between its samples.
+    /// Linear interpolation of a channel.
     fn readings(&self, channel: &Channel, grid: &[f64], apart: f64) -> Vec<f64> {
         let present = (0..self.len()).filter(|&k| !channel.values[k].is_nan());
         let samples: Vec<(f64, f64)> = present.map(|k| (self.time[k], channel.values[k])).collect();

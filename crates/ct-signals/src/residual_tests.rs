@@ -17,7 +17,7 @@ use crate::{ArModel, Error};
 /// Highest order of the filters that whiten the input and the residual.
 const MAX_PREWHITENING_ORDER: usize = 20;
 
-/// Lags with fewer pairs of samples do not count where samples are missing: their products are far from Gaussian.
+/// With missing samples, lags with fewer pairs are not used: their products are far from Gaussian.
 const FEWEST_PAIRS: usize = 5;
 
 const LJUNG_BOX: &str = "Ljung-Box test";
@@ -35,8 +35,8 @@ pub fn autocorrelation(x: &[f64], max_lag: usize) -> Vec<f64> {
     correlation
 }
 
-/// Correlation of `u[k]` with `e[k + lag]`, means removed, at lags `0..=max_lag`: `u` leads, so a
-/// residual that the input explains shows at lags above 0.
+/// Correlation of `u[k]` with `e[k + lag]`, means removed, at lags `0..=max_lag`: `u` leads, so the effect of an input on a residual is
+/// visible at lags above 0.
 ///
 /// The sum at each lag is divided by the number of samples, as is usual, which keeps values within
 /// -1..1. 0 at lags that the record is too short for, and at all when one of the two does not vary.
@@ -202,7 +202,7 @@ fn regression_on_lags(task: &'static str, u: &[f64], e: &[f64], lags: usize) -> 
         }
     }
     if rank == 0 || squares <= 0.0 {
-        // A series that does not vary is correlated with nothing.
+        // A constant series has no correlation with any series.
         return Ok(1.0);
     }
     exceedance(e.len() as f64 * explained / squares, rank)

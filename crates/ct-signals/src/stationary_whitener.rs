@@ -1,4 +1,4 @@
-//! The filter that whitens signals of any stationary process row by row, missing rows among them.
+//! The filter that whitens signals of any stationary process row by row, with missing rows.
 //!
 //! Model: that of [`StationaryNoise`](crate::StationaryNoise), by its autocovariance alone, `R(0) = r`, `R(j) = c' A^{j-1} g`.
 //!
@@ -18,7 +18,7 @@
 
 use crate::StationaryNoise;
 
-/// The least `r_e` over `r`: less is rounding.
+/// The least ratio of `r_e` to `r`: smaller values are rounding errors.
 const ROUNDING: f64 = 1e-14;
 
 /// Whitens rows of several signals, without allocating; made by [`StationaryNoise::whitener`].

@@ -32,7 +32,7 @@ pub enum RowTimes {
     Dates {
         /// Origin of the times.
         calendar: Calendar,
-        /// The first cell has no offset from UTC: what it means follows from the zone.
+        /// The first cell has no offset from UTC: its instant depends on the zone.
         civil: bool,
     },
 }
@@ -293,8 +293,7 @@ impl Rows {
     }
 }
 
-/// Whether the cells of a first line are a row, and no names: numbers alone, or a time, whole or the end of one, and what may stand for
-/// samples.
+/// Whether the cells of a first line are a row and no names: numbers only, or a complete or partial time, and marks of missing samples.
 fn is_row(cells: &[String], columns: &Columns) -> bool {
     let format = columns.time_format.as_deref();
     let is_time = |cell: &str| {
@@ -314,7 +313,7 @@ fn is_row(cells: &[String], columns: &Columns) -> bool {
     }
 }
 
-/// Whether a cell may be what is left of a date or a time where a stream was joined within a row.
+/// Whether a cell may be the end of a date or a time, if the stream was joined within a row.
 fn is_end_of_time(cell: &str) -> bool {
     let part = |c: char| c.is_ascii_digit() || " -/.:+TZ".contains(c);
     cell.chars().all(part) && cell.ends_with(|c: char| c.is_ascii_digit() || c == 'Z')
@@ -343,7 +342,7 @@ fn cells(line: &str, delimiter: u8) -> Vec<String> {
         .has_headers(false)
         .delimiter(delimiter)
         .trim(Trim::All)
-        // The line was cut at its end, so nothing in it ends it again.
+        // A line without its end, so that no character in it ends the line again.
         .terminator(Terminator::Any(b'\n'))
         .from_reader(line.as_bytes());
     let mut record = StringRecord::new();

@@ -16,7 +16,7 @@ pub fn student_half_width(level: f64, freedom: f64) -> f64 {
     let at = 0.5 + 0.5 * level;
     let freedom = freedom.max(1.0);
     if freedom < MANY {
-        // StudentsT loses its digits for many degrees, and above 1e8 its end.
+        // StudentsT loses accuracy for many degrees of freedom, and above 1e8 its tail.
         return StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(at));
     }
     let z = Normal::standard().inverse_cdf(at);

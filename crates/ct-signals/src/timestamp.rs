@@ -136,7 +136,7 @@ pub struct TimestampReader {
     zone: Zone,
     /// The first cell, for messages.
     first: String,
-    /// Times for which the offset of the zone is known.
+    /// Time intervals for which the offset of the zone is known.
     known: KnownOffset,
     previous: Option<Timestamp>,
     /// Seconds at the last midnight that was passed, where the cells have no date.
@@ -146,7 +146,7 @@ pub struct TimestampReader {
 #[derive(Debug, Clone)]
 enum Written {
     Form(Form),
-    /// Day and month are the same in all cells that were shown, so that it is not known which is which.
+    /// Day and month are equal in all cells so far, so their order is not known.
     Symmetric(Form),
     Format(String),
 }
@@ -246,8 +246,8 @@ impl TimestampReader {
         Ok(instant)
     }
 
-    /// An instant that a person gives as a limit of this column: as [`Zone::bound`], or as the column is written, or a time of day where
-    /// it has no dates.
+    /// An instant that a user gives as a limit of this column: as [`Zone::bound`], in the format of the column, or a time of day if the
+    /// column has no dates.
     ///
     /// # Errors
     /// As of [`Zone::bound`].
@@ -278,7 +278,7 @@ impl TimestampReader {
         }
     }
 
-    /// An instant for people as [`Zone::format`] writes it; without dates the time of day, and how many midnights have passed.
+    /// An instant in the format of [`Zone::format`]; without dates the time of day, and the number of midnights passed.
     #[must_use]
     pub fn format(&self, instant: Timestamp) -> String {
         if self.has_dates() {
@@ -332,7 +332,7 @@ impl TimestampReader {
         }
     }
 
-    /// Seconds since the first midnight. The time has passed another one where it falls by more than half a day.
+    /// Seconds since the first midnight. A fall of the time by more than half a day means another midnight.
     fn time_of_day(&mut self, fields: &Fields) -> Timestamp {
         let mut seconds = self.midnight + fields.seconds;
         if let Some(previous) = self.previous

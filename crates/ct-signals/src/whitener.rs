@@ -13,7 +13,7 @@ use crate::ArModel;
 
 /// Gaps of up to so many rows for each coefficient are passed row by row, which is cheaper.
 const ONE_BY_ONE: usize = 16;
-/// Powers of the state's matrix below this have forgotten the state.
+/// Powers of the state's matrix below this are treated as zero.
 const FORGOTTEN: f64 = 1e-40;
 
 /// Whitens a row of several signals at a time, without allocating; made by [`ArModel::whitener`].
@@ -34,7 +34,7 @@ pub struct Whitener {
     slot: usize,
     /// The slots of the last `p` rows that are lost, the oldest first.
     lost: Vec<usize>,
-    /// Covariance of the lost rows' estimates by slots, `(p + 1) x (p + 1)`, in `sigma^2`; other rows' entries hold nothing.
+    /// Covariance of the lost rows' estimates by slots, `(p + 1) x (p + 1)`, in `sigma^2`; entries of other rows are not used.
     covariance: Vec<f64>,
     /// For each lost row: its covariance with the next row; after the next row, its gain.
     with_next: Vec<f64>,

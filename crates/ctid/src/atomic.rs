@@ -15,7 +15,7 @@ use tempfile::NamedTempFile;
 
 use crate::Error;
 
-/// A lock is held for some milliseconds: so often and after such a pause it is asked for again.
+/// A lock is held for some milliseconds: number of attempts to get it, and the pause between them.
 const TRIES: u32 = 100;
 const PAUSE: Duration = Duration::from_millis(10);
 
@@ -153,14 +153,14 @@ fn write_in_place(path: &Path, content: &[u8]) -> io::Result<()> {
     })
 }
 
-/// The new name is then on the disk too. Some systems cannot do this to a folder; the file is in its place all the same.
+/// Makes the new name durable. Some systems cannot do this for a folder; the file is in its place nevertheless.
 fn sync_folder(path: &Path) {
     if let Ok(folder) = File::open(folder(path)) {
         let _ = folder.sync_all();
     }
 }
 
-/// A file in the same folder that vanishes unless it is renamed.
+/// A file in the same folder that is deleted unless it is renamed.
 pub(crate) fn beside(path: &Path) -> io::Result<NamedTempFile> {
     // Permissions of a new file, reduced by the umask.
     beside_with(path, 0o666)
@@ -174,7 +174,7 @@ fn beside_with(path: &Path, mode: u32) -> io::Result<NamedTempFile> {
     attributes::set_mode(&mut builder, mode);
     for _ in 0..TRIES {
         let file = builder.tempfile_in(&folder)?;
-        // Another run may have taken it for abandoned just before it was locked.
+        // Another run may have deleted it as abandoned just before it was locked.
         let taken = matches!(file.as_file().try_lock(), Err(TryLockError::WouldBlock));
         if !taken && file.path().exists() {
             return Ok(file);
@@ -183,7 +183,7 @@ fn beside_with(path: &Path, mode: u32) -> io::Result<NamedTempFile> {
     Err(io::ErrorKind::ResourceBusy.into())
 }
 
-/// Removes what killed runs have left in a folder: a run locks its file as long as it lives.
+/// Removes temporary files of killed runs from a folder: a running program holds a lock on its file.
 fn remove_abandoned(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else {
         return;

@@ -131,7 +131,7 @@ pub fn describe(id: &str, look: Look) -> Result<String, Error> {
     Ok(text)
 }
 
-/// The traces of all effects as a page of Markdown, for `docs/gallery.md`.
+/// The signatures of all effects as a page of Markdown, for `docs/gallery.md`.
 #[must_use]
 pub fn gallery() -> String {
     let mut text = String::new();
@@ -180,7 +180,7 @@ fn place(effect: &'static EffectInfo) -> String {
     }
 }
 
-/// The parameters that it has on any plant, in any vessel.
+/// The parameters of the effect on any plant, in any vessel.
 fn parameters(effect: &'static EffectInfo, look: Look) -> String {
     let mut all: Vec<ParameterInfo> = Vec::new();
     for plant in applies_to(effect) {

@@ -27,7 +27,7 @@ pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     }
 }
 
-/// Warnings of units that are none, each with its place in the text.
+/// Warnings about unknown units, each with its place in the text.
 fn unknown(path: &Path, look: Look) -> String {
     // A file that cannot be read twice, such as a pipe, was read as a model.
     let Ok(text) = model_file::read_text(path) else {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use ct_signals::escaped;
 
-/// Everything that ends the program with exit code 2.
+/// All errors that end the program with exit code 2.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -69,7 +69,7 @@ pub enum Error {
     /// A linear model in a loop.
     #[error(transparent)]
     Loop(#[from] fcloe::Error),
-    /// Standard output is gone.
+    /// Standard output cannot be written.
     #[error("cannot write to standard output: {0}")]
     Output(#[from] std::io::Error),
 }
@@ -89,7 +89,7 @@ impl From<paper_tables::Error> for Error {
             E::Estimator(error) => Self::Estimator(error),
             E::Linear(error) => Self::Linear(error),
             E::Loop(error) => Self::Loop(error),
-            // The message begins with the argument's name, which is that of the option.
+            // The message begins with the argument's name, which is the name of the option.
             E::TooFewRunsForRange { .. } | E::TooFewRunsForVariance { .. } => {
                 Self::Usage(format!("--{error}"))
             }

@@ -8,7 +8,7 @@ use plants::Domain;
 use crate::effort::{EffortLevel, limit_text};
 use crate::numbers;
 
-/// Effects of each ranking that are shown where two rankings differ.
+/// Number of effects of each ranking that are shown if two rankings differ.
 const COMPARED: usize = 5;
 
 /// Whether this effect, in this tank, was added.
@@ -42,7 +42,7 @@ pub(crate) fn several(diagnosis: &Diagnosis) -> bool {
 /// Unit of numbers that are divided by the noise.
 pub(crate) const TIMES_THE_NOISE: &str = "times the noise";
 
-/// A number of each output: `0.55 V`, of several outputs `0.55 V (upper), 0.20 V (lower)`.
+/// A number for each output: `0.55 V`, with several outputs `0.55 V (upper), 0.20 V (lower)`.
 pub(crate) fn per_output(values: &PerOutput, digits: i32, unit: &str) -> String {
     let several = values.0.len() > 1;
     let of_output = |(name, value): &(String, f64)| {
@@ -57,7 +57,7 @@ pub(crate) fn per_output(values: &PerOutput, digits: i32, unit: &str) -> String 
     all.join(", ")
 }
 
-/// The noise floors as numbers of their outputs.
+/// The noise floors of the outputs as text.
 pub(crate) fn noise_floors(diagnosis: &Diagnosis) -> PerOutput {
     let floors = diagnosis.noise.iter();
     PerOutput(
@@ -308,7 +308,7 @@ pub(crate) fn held_out_error(error: &HeldOutError, unit: &str) -> String {
     if !total.is_finite() || total <= 0.0 {
         return with_unit(&numbers::significant(total, 2), unit);
     }
-    // Parts to the decimals of the whole, so that they can be compared at a glance.
+    // Parts with the number of decimals of the whole, so that they are easy to compare.
     let places = (1 - numbers::exponent(total)).max(0);
     let [total, offset, gain, shape] =
         [total, error.offset, error.gain, error.shape].map(|part| numbers::decimals(part, places));
@@ -324,9 +324,9 @@ pub(crate) const HELD_OUT_PARTS: &str = "Held-out error: its offset is the mean 
 /// How the reader can request more time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reader {
-    /// On the command line, or of its report.
+    /// On the command line, or in its report.
     Commands,
-    /// On the page that is served.
+    /// On the served page.
     Page,
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use console::{Style, Term};
 
-/// The widest a line is made: longer ones are hard to read.
+/// Largest width of a line: longer lines are hard to read.
 const WIDEST: usize = 100;
 const NARROWEST: usize = 48;
 /// Default width for a pipe or a file.
@@ -67,7 +67,7 @@ impl Look {
         self.paint(Style::new().dim(), text)
     }
 
-    /// Good news.
+    /// Text of a positive result.
     pub(crate) fn good(self, text: impl Display) -> String {
         self.paint(Style::new().bold().green(), text)
     }
@@ -113,7 +113,7 @@ pub(crate) enum Side {
     Right,
 }
 
-/// A table without rules: columns two blanks apart, as wide as they need to be.
+/// A table without rules: columns separated by two blanks, as wide as necessary.
 pub(crate) fn table(sides: &[Side], rows: &[Vec<String>]) -> Vec<String> {
     let widths: Vec<usize> = (0..sides.len())
         .map(|column| {

@@ -5,7 +5,7 @@ use plants::{CATALOGUE, EffectInfo};
 
 use crate::Error;
 
-/// `; did you mean X?` where a name of the list is close to what was written, else nothing.
+/// `; did you mean X?` if a name of the list is similar, else empty.
 pub(crate) fn suggestion<'a>(written: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let written = written.to_lowercase().replace('-', "_");
     names

@@ -1,4 +1,4 @@
-//! `--json` and `--report`: checked before anything is computed, written at the end, whole or not at all.
+//! `--json` and `--report`: checked before the computation, written at the end, completely or not at all.
 
 use std::fs;
 use std::io::{BufReader, Read};
@@ -16,7 +16,7 @@ const HEAD: u64 = 4096;
 /// Name of the program in the first key of a file of results.
 const WRITTEN_BY: &str = "ctid";
 
-/// Results as they are written.
+/// Results in the written form.
 #[derive(Serialize)]
 struct Marked<'a, T> {
     written_by: &'static str,
@@ -41,7 +41,7 @@ pub enum Kind {
     Report,
     /// A record as CSV; no file is written without a record.
     Record,
-    /// The shape of what is missing, as CSV; nothing is written where nothing is.
+    /// The unexplained error as CSV; no file is written without it.
     Unknown,
     /// A model's text.
     Model,
@@ -100,8 +100,8 @@ impl Found for Identification {
     }
 }
 
-/// Checks where results may go: not onto an input, not onto each other, not over a file that ctid
-/// did not write, and into a folder that is there and may be written to.
+/// Checks the files of results: not an input, not the same file twice, not over a file of another program, and in an existing writable
+/// folder.
 ///
 /// # Errors
 /// One line that names the file and the correction; nothing has been written.
@@ -184,9 +184,8 @@ impl Output {
     }
 }
 
-/// The first of `report.html`, `report-2.html`, `report-3.html`, ... in a folder that is free, or
-/// that is a report on this record already: nobody asked for that name, so a report on anything
-/// else stays.
+/// The first free name of `report.html`, `report-2.html`, `report-3.html`, ... in a folder, or the name of an earlier report on this
+/// record: the user did not choose this name, so other reports are not overwritten.
 ///
 /// # Errors
 /// Where the folder cannot be written to.
@@ -219,7 +218,7 @@ pub(crate) fn free_record(folder: &Path, stem: &str) -> PathBuf {
     free.unwrap_or(first)
 }
 
-/// A report on this record, as its data name it.
+/// A report on this record, identified by its data.
 fn is_empty_or_shows(record: &str, path: &Path) -> bool {
     let name = format!("\"{record}\"");
     fs::read_to_string(path).is_ok_and(|page| page.is_empty() || page.contains(&name))
@@ -249,14 +248,14 @@ fn standing(kind: Kind, path: &Path) -> Standing {
     if metadata.is_dir() {
         Standing::Folder
     } else if metadata.is_file() && (metadata.len() == 0 || is_ours(kind, path)) {
-        // An empty file has nothing to lose.
+        // An empty file may be overwritten.
         Standing::Ours
     } else {
         Standing::NotOurs
     }
 }
 
-/// ctid wrote it: a page that begins as its pages do, JSON with the mark, or the header of a shape with all its columns.
+/// A file of ctid: a page with the beginning of its pages, JSON with the mark, or a shape with all columns in the header.
 fn is_ours(kind: Kind, path: &Path) -> bool {
     let Ok(file) = fs::File::open(path) else {
         return false;

@@ -25,8 +25,8 @@ pub(crate) struct Curve<'a> {
     pub colour: Color,
 }
 
-/// Draws curves that share their abscissa, which runs evenly from `x.0` to `x.1`; `rows` lines
-/// high, within the width, with the ordinate's limits at the left and `x` in seconds below.
+/// Draws curves with a common abscissa, evenly from `x.0` to `x.1`; `rows` lines high, within the width, with the ordinate's limits at the
+/// left and `x` in seconds below.
 pub(crate) fn plot(
     curves: &[Curve],
     x: (f64, f64),
@@ -111,7 +111,7 @@ fn coloured(cells: &[(u32, Option<Color>)], look: Look) -> String {
     line
 }
 
-/// Points in dots across and parts of the height; of many values in one dot the least and the most.
+/// Points in dots across and shares of the height; for several values in one dot the smallest and the largest.
 fn points(values: &[f64], width: usize, (low, high): (f64, f64)) -> Vec<(f32, f32)> {
     let last = values.len().saturating_sub(1).max(1);
     let at = |k: usize| (k * width) as f64 / last as f64;

@@ -11,14 +11,14 @@ use nix::sys::signal::{SigSet, Signal};
 use crate::look::Look;
 use crate::{Cli, one_line, run};
 
-/// Runs the program on its arguments, of which the first is its name. It starts the threads of the whole process: call it once.
+/// Runs the program with its arguments, of which the first is its name. The function starts the threads of the whole process: call it once.
 pub fn program(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let message = match Cli::try_parse_from(arguments) {
         Ok(cli) => match start_threads().and_then(|()| done(cli)) {
             Ok(()) => return ExitCode::SUCCESS,
             Err(error) => format!("error: {error}"),
         },
-        // Help and version are asked for: they are no errors, and go to standard output.
+        // Help and version were requested: they are no errors, and go to standard output.
         Err(asked) if !asked.use_stderr() => {
             return match asked.print() {
                 Err(error) if error.kind() != io::ErrorKind::BrokenPipe => ExitCode::from(2),

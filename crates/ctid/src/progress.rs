@@ -9,7 +9,7 @@ use missing_effect::Progress;
 
 use crate::interrupt;
 
-/// A bar that names the phase and vanishes at the end.
+/// A bar that names the phase and is removed at the end.
 #[derive(Debug)]
 pub struct Bar {
     bar: ProgressBar,
@@ -64,7 +64,7 @@ impl Bar {
     /// Shows the progress; may be called from any thread.
     pub fn show(&self, progress: Progress) {
         if let Ok(mut phase) = self.phase.lock() {
-            // The threads report in any order: a bar never runs back within a phase.
+            // The threads report in any order: a bar never goes back within a phase.
             if *phase != progress.phase {
                 *phase = progress.phase;
                 self.phase(progress.phase);

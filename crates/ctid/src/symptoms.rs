@@ -6,7 +6,7 @@ use plants::EffectInfo;
 
 use crate::Error;
 
-/// Beginnings of words that mean the same at a plant; the first one names the family.
+/// Beginnings of words with the same meaning at a plant; the first one names the family.
 const FAMILIES: [&[&str]; 12] = [
     &["clog", "foul", "block", "plug", "dirt", "lodged", "narrow"],
     &[

@@ -1,5 +1,5 @@
-//! The shape of a missing term as a CSV file: `ctid diagnose --unknown` writes it, `ctid add NAME --from` reads it, and a
-//! person may draw one by hand.
+//! The shape of a missing term as a CSV file: `ctid diagnose --unknown` writes it, `ctid add NAME --from` reads it, and a user may write
+//! one.
 //!
 //! ```csv
 //! place,variable,at [cm],value [cm^3/s],std_error [cm^3/s]
@@ -116,7 +116,7 @@ pub(crate) fn is_own(text: &str) -> bool {
         && columns.len() == 5
 }
 
-/// The file of what a diagnosis found.
+/// The file for the result of a diagnosis.
 #[must_use]
 pub fn text(unknown: &Unknown) -> String {
     let values = unknown.knots.iter().zip(&unknown.ordinates);
@@ -128,8 +128,7 @@ pub fn text(unknown: &Unknown) -> String {
     )
 }
 
-/// The file of a curve: its place and variable, the units of the variable and of the term, and where it is, its value and its standard
-/// error.
+/// The file of a curve: its place and variable, the units of the variable and of the term, and its points, values and standard errors.
 pub(crate) fn of_curve(
     (place, variable): (&str, &str),
     (at, of): (&str, &str),

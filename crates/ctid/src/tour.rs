@@ -1,4 +1,4 @@
-//! The tour: the bundled record with a hidden effect, from the first comparison to the error that falls.
+//! The tour: the bundled record with a hidden effect, from the first comparison to the fall of the error.
 
 use std::fs;
 use std::io::Write;
@@ -20,7 +20,7 @@ const MODEL: (&str, &str) = ("tour.toml", include_str!("../records/tour.toml"));
 /// Files of the tour.
 #[derive(Debug)]
 pub struct Tour {
-    /// The page that it wrote.
+    /// The page of the tour.
     pub report: PathBuf,
     /// Diagnosis of the tour.
     pub diagnosis: Diagnosis,
@@ -59,7 +59,7 @@ pub fn run(folder: &Path, out: &mut dyn Write, look: Look, bar: &Bar) -> Result<
     })
 }
 
-/// The bundled records and model, read as a user's are: from files.
+/// The bundled records and model, read from files like a user's.
 fn problem() -> Result<Problem, Error> {
     let folder = tempfile::tempdir()?;
     let path = |name: &str| folder.path().join(name);

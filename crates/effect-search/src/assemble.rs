@@ -51,7 +51,7 @@ pub(crate) fn assemble(
     let problem = context.problem;
     let outputs = &problem.records[0].outputs;
     let level = |noise: &ArModel| {
-        // The deviation of what is slower than noise is not known from so short a record.
+        // A short record does not determine the variance of slow disturbances.
         if context.is_slow(&own.noise) {
             noise.sigma()
         } else {
@@ -106,7 +106,7 @@ pub(crate) fn assemble(
         innovation: noise.sigma(),
         coefficients: noise.coefficients().to_vec(),
     });
-    // In the order of the ladder.
+    // In the order of the error ladder.
     let order = &ladder.last().map_or(&last.added, |node| &node.added)[base.added.len()..];
     let groups: Vec<Vec<String>> = order
         .iter()

@@ -108,7 +108,7 @@ pub(crate) fn begin<'a>(
 }
 
 impl Context<'_> {
-    /// A set with one more effect of the model file, fitted from its best start and from the one that the file has.
+    /// A set with one more effect of the model file, fitted from its best start and from the values of the file.
     fn with_listed(&self, node: Node, id: &str) -> Result<Node, Error> {
         let white = Noise::white(self.problem.spec.outputs.len());
         let Some(i) = self.candidates.iter().position(|c| c.id == *id) else {

@@ -175,7 +175,7 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
             let (h, z, slope) = self.split(&g);
             let r = self.combination(h);
             let shares = || self.active().iter().zip(r.map(f64::abs));
-            // An only row is measured by nothing but itself.
+            // For a single row, only the row itself is a scale.
             let least = if self.count == 0 {
                 0.0
             } else {

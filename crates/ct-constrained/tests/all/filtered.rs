@@ -19,7 +19,7 @@ fn estimator() -> ConstrainedRls<2, 1> {
     ConstrainedRls::new(rls, [Row::equal([0.0; 2], 0.0, 0.0).unwrap()]).unwrap()
 }
 
-/// The largest error of the estimates after 400 s, and by how much the truth misses a row at most.
+/// The largest error of the estimates after 400 s, and the largest violation of a row by the true parameters.
 fn run(row: Option<(Filter, f64)>, ripple: f64) -> (f64, f64) {
     let (mut constrained, dt) = (estimator(), 0.02);
     let mut filtered = row.map(|(filter, weight)| FilteredRow::new(filter, weight).unwrap());

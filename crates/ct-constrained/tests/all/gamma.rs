@@ -220,7 +220,7 @@ fn several_rows_with_another_gamma_are_of_first_order() {
     }
 }
 
-/// The condition is needed: with `gamma = 2.5 w` `V` grows in the equations, as (3.8) says, and the constructors refuse it.
+/// The condition is necessary: with `gamma = 2.5 w` `V` grows in the equations, as (3.8) states, and the constructors reject it.
 #[test]
 fn v_grows_where_gamma_is_above_twice_the_weight() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);

@@ -174,7 +174,7 @@ fn rows_around<const P: usize, const R: usize>(
             }
             3 if !rows.is_empty() => {
                 let ((f, low, high), (g, lower, higher)) = (earlier(rng), earlier(rng));
-                // no row that is nothing but rounding
+                // excludes rows of rounding errors only
                 if (f + g).norm() < 1e-3 * f.norm() {
                     continue;
                 }

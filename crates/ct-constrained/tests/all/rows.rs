@@ -82,7 +82,7 @@ fn off_the_inverse<const P: usize, const R: usize>(seed: u64) -> f64 {
 fn rows_one_at_a_time_agree_with_the_matrix_inverse() {
     let mut worst = 0.0_f64;
     for seed in 0..300 {
-        // also more rows than parameters
+        // also with more rows than parameters
         for off in [
             off_the_inverse::<1, 1>(seed),
             off_the_inverse::<2, 5>(seed),

@@ -223,7 +223,7 @@ fn at_zero_and_at_infinity() {
             excess: 0.0
         }
     );
-    // G = d: nowhere above it. A gain alone is what it is.
+    // G = d: nowhere above it. For a constant gain the condition is a comparison of numbers.
     let same = tf(&[2.0, 2.0], &[1.0, 1.0]).exceeds(2.0).unwrap();
     assert_eq!(
         same,

@@ -1,4 +1,4 @@
-//! Roots: backward error, known roots, and what is promised of their form.
+//! Roots: backward error, known roots, and the documented properties.
 
 use ct_lti::{Complex64, Polynomial};
 use proptest::prelude::*;

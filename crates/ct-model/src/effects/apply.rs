@@ -267,7 +267,7 @@ impl Mended {
         }
     }
 
-    /// The reading has the name of the output, and what is measured another one.
+    /// The reading keeps the name of the output, and the measured quantity gets another one.
     fn name_readings(&mut self, spec: &ModelSpec) {
         for (y, &measured) in self.reads.iter().enumerate() {
             let Variable::Flow(reading) = self.spec.outputs[y].variable else {

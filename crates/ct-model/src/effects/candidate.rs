@@ -75,7 +75,7 @@ impl Candidate {
         roles.all(|role| matches!(role, Role::Size | Role::Shape))
     }
 
-    /// The candidate with a factor before every term, which is zero where the effect is not there and one where it is; `None` where the
+    /// The candidate with a factor before every term, which is zero if the effect is absent and one if it is present; `None` if the
     /// parameters of the candidate have such values themselves.
     ///
     /// No values of resistance and capacity take an RC pair out of a model: only their limit does. The factor makes the score test

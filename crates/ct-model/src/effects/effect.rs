@@ -8,11 +8,11 @@ use crate::text::parse_effect;
 /// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Place {
-    /// Between an input and the model: the effect of `u` gives what the model receives.
+    /// Between an input and the model: the effect of `u` supplies the model's input.
     Input,
-    /// Between what is measured and the reading: the effect of `y` gives the reading.
+    /// Between the measured quantity and the reading: the effect of `y` supplies the reading.
     Output,
-    /// In the equation of a state `x`: added to its right-hand side, or, made of `rate`, in its place.
+    /// In the equation of a state `x`: an addition to its right-hand side or, as a function of `rate`, its replacement.
     Balance,
     /// A parameter or a named flow `p`, which the effect replaces.
     Parameter,
@@ -56,7 +56,7 @@ pub enum Role {
 pub enum Starts {
     /// The values themselves.
     Values(&'static [f64]),
-    /// Quantiles of the signal, and at the same shares of its range where no quantiles are known.
+    /// Quantiles of the signal, or the same shares of its range if no quantiles are known.
     Quantiles(&'static [f64]),
     /// Shares of the width of the signal's range.
     Widths(&'static [f64]),
@@ -91,7 +91,7 @@ pub struct Effect {
     pub parameters: &'static [(&'static str, Role, Starts)],
     /// Physics of the effect in a sentence.
     pub physics: &'static str,
-    /// Effects that leave similar traces, as `name(port)`.
+    /// Effects with similar signatures, as `name(port)`.
     pub confused_with: &'static [&'static str],
     /// How to confirm the effect at the plant.
     pub confirm: &'static str,

@@ -7,7 +7,7 @@ use crate::expression::{Expression, Operator, Variable};
 use crate::spec::{Flow, Given, ModelSpec, Parameter, State};
 use crate::text::{TextError, parse_effect};
 
-/// Variables whose positions are below the counts of the model are the model's, the others are own ones.
+/// Variables with positions below the counts of the model are the model's; the others belong to the effect.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Fragment {
     pub parameters: Vec<Parameter>,

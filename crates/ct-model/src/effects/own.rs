@@ -12,16 +12,16 @@ use crate::expression::{Expression, Variable};
 use crate::spec::{About, Given, ModelSpec, Parameter, State};
 use crate::text::{Scope, TextError, is_reserved};
 
-/// Parameters of an effect that is absent only in a limit start so many times smaller and larger too: a time constant that is a product or
-/// a quotient of two is then scored over four decades.
+/// Parameters of an effect that is absent only in a limit also start at values smaller and larger by this factor: a time constant that is a
+/// product or a quotient of two parameters is then scored over four decades.
 const DECADE: f64 = 10.0;
 
-/// A candidate as the model file has it.
+/// A candidate as written in the model file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OwnCandidate {
     /// Parameters of the candidate, by name.
     pub parameters: BTreeMap<String, OwnParameter>,
-    /// States that it brings, by name.
+    /// Additional states, by name.
     pub states: BTreeMap<String, OwnState>,
     /// Terms to add: to the right-hand side of a state equation, to a named flow, or to an output. The key is the name of the state, flow
     /// or output.
@@ -54,7 +54,7 @@ pub struct OwnState {
     pub equation: String,
 }
 
-/// A candidate of the model file that is refused.
+/// Error of a candidate of the model file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}: {what}", place.join("."))]
 pub struct OwnError {
@@ -64,8 +64,8 @@ pub struct OwnError {
     pub what: String,
 }
 
-/// Reads candidates of the model file in the scope of a model, and refuses two that are the same. One that brings a state may stand there
-/// again, under another name: two RC pairs are more than one ([`Candidate::repeats`]).
+/// Reads candidates of the model file in the scope of a model, and rejects two equal ones. A candidate with a state may be repeated under
+/// another name: two RC pairs are more than one ([`Candidate::repeats`]).
 ///
 /// # Errors
 /// The place in the model file and in the expression, what is wrong and the correction.
@@ -352,7 +352,7 @@ fn sizes(
                     Variable::State(i) => (2, i),
                     Variable::Flow(i) => (3, i),
                 };
-                // Numbers with nothing in common, of either sign.
+                // Unrelated numbers of either sign.
                 let turn = 1.7 + f64::from(trial) * 2.39 + f64::from(kind) * 1.13 + i as f64 * 0.71;
                 let size = 1.5 + turn.sin();
                 if kind > 0 && trial.is_multiple_of(2) {

@@ -98,7 +98,7 @@ impl ModelSpec {
     /// state.
     #[must_use]
     pub fn behind<'a>(&'a self, mut expression: &'a Expression) -> &'a Expression {
-        // Flows are sorted: no circle.
+        // Flows are sorted, so there is no loop.
         while let Expression::Variable(Variable::Flow(i)) = expression {
             expression = &self.flows[*i].value;
         }
@@ -114,7 +114,7 @@ impl ModelSpec {
         count
     }
 
-    /// Whether a flow is more than a reading, another name, and a product with a fitted parameter that stands nowhere else.
+    /// Whether a flow is more than a reading, an alias, or a product with a fitted parameter that occurs nowhere else.
     fn is_own_flow(&self, i: usize) -> bool {
         let flow = &self.flows[i];
         let variable = Variable::Flow(i);

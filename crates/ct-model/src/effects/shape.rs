@@ -1,4 +1,4 @@
-//! Smooth functions of what a model visits: no physics, but the shape of a term that no effect of the catalogue holds.
+//! Smooth functions of the model's variables: without physics, for the shape of a term that no effect of the catalogue has.
 //!
 //! `shape` depends on a state or an input, `course` on time. A function is a sum of bells (Gaussian radial basis) at equal distances over
 //! the visited range, as wide as their distance: linear in its parameters, smooth, and of any form that is not much narrower than a bell.
@@ -8,7 +8,7 @@
 
 use super::{Effect, Place, Role, Starts};
 
-/// The value of a sum of bells at a share of the range, of their heights in order.
+/// The value of a sum of Gaussian bells at a share of the range, given their heights in order.
 #[must_use]
 pub fn bells(heights: &[f64], share: f64) -> f64 {
     let z = share * heights.len().saturating_sub(1) as f64;
@@ -16,7 +16,7 @@ pub fn bells(heights: &[f64], share: f64) -> f64 {
     heights.iter().enumerate().map(bell).sum()
 }
 
-/// Heights of bells as parameters, of a unit and within a bound.
+/// Heights of bells as parameters, with a unit and a bound.
 macro_rules! heights {
     ($unit:literal, $bound:literal, $($name:literal),+) => {
         concat!($(
@@ -71,7 +71,7 @@ const NAMES: [&str; 12] = [
     "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11",
 ];
 
-/// The first so many heights, with their starts.
+/// The given number of first heights, with their starts.
 const fn heights<const N: usize>(starts: Starts) -> [(&'static str, Role, Starts); N] {
     let mut all = [("", Role::Size, starts); N];
     let mut k = 0;

@@ -3,7 +3,7 @@
 //! A unit is a product of symbols with whole powers, and what two have in common cancels. Symbols are not converted into each other: `m/s`
 //! over `h` is `m/(s.h)`. In a quotient a temperature is a difference, so `degC` is `K`.
 
-/// Symbols with their powers, in the order in which they were met.
+/// Symbols with their powers, in the order of their first occurrence.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Powers(Vec<(String, i32)>);
 

@@ -89,7 +89,7 @@ impl Span {
 /// Ranges of all variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Visited {
-    /// Inputs, states, flows (and with them outputs) that are known; of others a range from zero to one is taken.
+    /// Ranges of the known inputs, states and flows (including outputs); for others a range from zero to one is assumed.
     pub spans: BTreeMap<Variable, Span>,
     /// Begin of the records on the clock that `time` of the model follows \[its unit\].
     pub begin: f64,

@@ -29,7 +29,7 @@ impl Guard {
         let positive = match self.comparison {
             Comparison::Less | Comparison::LessOrEqual => !answer,
             Comparison::Greater | Comparison::GreaterOrEqual => answer,
-            // Two numbers that change with time are equal at an instant alone.
+            // Two numbers that change with time are equal only at an instant.
             Comparison::Equal | Comparison::NotEqual => return false,
         };
         if positive {

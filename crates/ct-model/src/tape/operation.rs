@@ -30,7 +30,7 @@ pub(super) enum Operation {
     Quantise(Register, Register),
     /// One of two registers, selected by a condition.
     Select(usize, Register, Register),
-    /// The one that a condition has chosen.
+    /// The register selected by a condition.
     Copy(Register),
 }
 
@@ -43,7 +43,7 @@ fn power<T: Scalar>(a: T, b: T) -> T {
     let (x, n) = (a.value(), b.value());
     let value = x.powf(n);
     let finite = |slope: f64| if slope.is_finite() { slope } else { 0.0 };
-    // Below zero only whole powers are numbers, and these do not change.
+    // Below zero only whole powers are defined, and these do not depend on the branch.
     let by_power = if x > 0.0 { value * x.ln() } else { 0.0 };
     T::with_slopes(value, [(a, finite(n * x.powf(n - 1.0))), (b, by_power)])
 }

@@ -54,7 +54,7 @@ fn each_name<'a>(node: &'a Node, each: &mut impl FnMut(&'a str)) {
     }
 }
 
-/// The variable of `der(x)` where a node is that.
+/// The variable x if a node is `der(x)`.
 fn derivative(node: &Node) -> Option<&str> {
     match &node.kind {
         Kind::Call(function, arguments) if function == "der" => match arguments.as_slice() {
@@ -176,7 +176,7 @@ impl Names {
     }
 }
 
-/// Two names that may be one with a slip: a letter more, less or another, or another case.
+/// Two names that may differ by a typing error: one letter more, less or different, or another case.
 pub(super) fn is_near(a: &str, b: &str) -> bool {
     if a.eq_ignore_ascii_case(b) {
         return true;

@@ -24,7 +24,7 @@ use super::{
     syntax::{Attribute, Declaration, Equation, Kept, Kind, Node, Syntax},
 };
 
-/// Expressions that are deeper than so many operators and brackets are refused.
+/// Expressions with deeper nesting of operators and brackets are rejected.
 const DEEPEST: usize = 200;
 /// The longest text \[bytes\], and the most words in it.
 const LONGEST: usize = 1024 * 1024;
@@ -90,7 +90,7 @@ struct Parser<'a> {
     text: &'a str,
     tokens: Vec<Token>,
     at: usize,
-    /// Expressions within each other.
+    /// Depth of nested expressions.
     brackets: usize,
 }
 

@@ -24,7 +24,7 @@ pub(crate) fn resolve_to_simulate(text: &str, syntax: Syntax) -> Result<ModelSpe
     resolve_with(text, syntax, true, true)
 }
 
-/// The text of an effect: it may declare what it does not use.
+/// The text of an effect: unused declarations are allowed.
 pub(crate) fn resolve_effect(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
     resolve_with(text, syntax, false, false)
 }
@@ -62,7 +62,7 @@ struct Builder<'a> {
     used: BTreeSet<Variable>,
     /// Whether every declared variable has to be used.
     all_used: bool,
-    /// A simulation has to begin at the declared starts.
+    /// The simulation has to begin at the declared starts.
     begins: bool,
     spec: ModelSpec,
 }
@@ -84,7 +84,7 @@ impl ModelSpec {
         self.flows.iter().map(of).collect()
     }
 
-    /// Sorts the flows again, after equations have changed; the flows of a circle where there is one.
+    /// Sorts the flows again after a change of equations; returns the flows of a loop if there is one.
     pub(crate) fn sort_flows(&mut self) -> Result<(), Vec<usize>> {
         self.order = sorted(&self.needs())?;
         Ok(())
@@ -124,7 +124,7 @@ impl Builder<'_> {
         }
         for index in self.names.states.clone() {
             let declaration = &declarations[index];
-            // A state is what a derivative is taken of.
+            // A variable with a derivative is a state.
             let Some((coefficient, right)) = differential.remove(&declaration.name) else {
                 continue;
             };
@@ -190,7 +190,7 @@ impl Builder<'_> {
         Ok(self.spec)
     }
 
-    /// A simulation has to begin: no state that starts at zero may be a divisor.
+    /// For a simulation, no state that starts at zero may be a divisor.
     fn starts(&self, declarations: &[Declaration]) -> Result<(), TextError> {
         let Some(division) = start_division(&self.spec) else {
             return Ok(());

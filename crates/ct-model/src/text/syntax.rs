@@ -7,7 +7,7 @@ use crate::expression::{Comparison, Operator};
 pub(crate) struct Node {
     pub(crate) kind: Kind,
     pub(crate) from: usize,
-    /// Nodes above each other, this one included.
+    /// Depth of the tree including this node.
     pub(crate) depth: usize,
 }
 
@@ -76,7 +76,7 @@ pub(crate) struct Declaration {
     pub(crate) description: String,
 }
 
-/// Two sides that are equal.
+/// An equation with its two sides.
 #[derive(Debug, Clone)]
 pub(crate) struct Equation {
     pub(crate) left: Node,

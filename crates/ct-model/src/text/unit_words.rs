@@ -1,4 +1,4 @@
-//! Units of a text that are no units.
+//! Check of the units in a text.
 
 use ct_signals::Unit;
 
@@ -16,8 +16,8 @@ const PREFIXES: [&str; 14] = [
     "da", "n", "u", "\u{b5}", "\u{3bc}", "m", "c", "d", "h", "k", "M", "G", "T", "p",
 ];
 
-/// The words in units of a model's text that are no units, with their places: a slip of the pen as a rule. Such a unit fits everything, so
-/// that nothing is checked or converted by it.
+/// The unknown words in units of a model's text, with their places: usually typing errors. Such a unit is compatible with everything, so it
+/// is not checked or converted.
 ///
 /// # Errors
 /// As [`crate::ModelSpec::parse`].
@@ -44,7 +44,7 @@ pub fn unknown_units(text: &str) -> Result<Vec<TextError>, TextError> {
     Ok(unknown.collect())
 }
 
-/// The first word of a unit that is none.
+/// The first unknown word of a unit.
 fn unknown_word(unit: &str) -> Option<&str> {
     if Unit::parse(unit).is_some() || unit.trim().is_empty() {
         return None;

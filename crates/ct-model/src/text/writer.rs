@@ -20,7 +20,7 @@ enum Binding {
     Primary,
 }
 
-/// An expression or a condition within a model.
+/// An expression or a condition with its model, for printing.
 struct Written<'a, T> {
     spec: &'a ModelSpec,
     part: &'a T,
@@ -70,7 +70,7 @@ impl Condition {
     }
 }
 
-/// A number as Modelica reads it: the shortest that is the same.
+/// A number in Modelica notation: the shortest text with the same value.
 fn number(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e15 {
         return format!("{value:.0}");
@@ -251,7 +251,7 @@ impl Display for ModelSpec {
                 Variable::Parameter(i) => self.parameters[i].value,
                 _ => f64::NAN,
             };
-            // A value that was changed is no longer what the text computes.
+            // A changed value no longer equals the formula in the text.
             let same = |definition: &&Expression| definition.value(0.0, &of) == parameter.value;
             let value = match parameter.definition.as_ref().filter(same) {
                 Some(definition) => self.write(definition),

@@ -1,5 +1,5 @@
-//! Effects at the ports of models: every one at every port is added, gives the outputs of the model without it where it is absent, and has
-//! the derivatives that differences have.
+//! Effects at the ports of models: every effect at every port is added, gives the outputs of the original model at its absent value, and
+//! has derivatives that agree with differences.
 
 mod driven;
 
@@ -69,7 +69,7 @@ fn all_candidates_are_listed_with_their_ports() {
     assert!((40..=200).contains(&tanks.len()), "{}", tanks.len());
     assert!(tanks.iter().any(|c| c.id == "coupling(h1,h2)"));
     assert!(tanks.iter().any(|c| c.id == "input_to(u,h2)"));
-    // A position has no balance, but an end stop.
+    // A position has no balance, but it can have an end stop.
     let spring = Driven::all()[1].candidates();
     let has = |all: &[Candidate], id: &str| all.iter().any(|c| c.id == id);
     assert!(has(&spring, "coulomb(v)") && !has(&spring, "coulomb(s)"));
@@ -91,7 +91,7 @@ fn an_absent_effect_changes_nothing() {
         for candidate in driven.with_shapes() {
             let mended = Model::new(apply(&driven.spec, &[&candidate]).unwrap());
             let with = driven.run(&mended, &mended.parameters());
-            // Steps follow their error, to which new states and branches contribute.
+            // The step size depends on the estimated error, to which new states and branches contribute.
             let exact = [&base, &mended].map(|model| driven.method(model) == Method::Exact);
             let allowed = if exact == [true, true] { 1e-12 } else { 1e-9 };
             let difference = largest_difference(&with, &without) / range(&without);
@@ -228,7 +228,7 @@ fn derivatives_where_the_effect_is_absent_are_those_of_differences() {
     }
 }
 
-/// Some of all pairs: those of the first candidates of every place with all others.
+/// A selection of pairs: the first candidates of every place with all others.
 #[test]
 fn effects_compose_in_any_order() {
     for driven in Driven::all() {

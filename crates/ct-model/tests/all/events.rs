@@ -25,7 +25,7 @@ equation
   der(s) = ({term}) - 0.2*s;
 end Swinging;"#
     );
-    // Held for a second and a bit, so that rows and turning points are at different times.
+    // Held for slightly more than a second, so that rows and turning points are at different times.
     Case::new(&text, 60, 1.13, |k| {
         vec![f64::from(u8::from(k / 9 % 2 == 0))]
     })
@@ -133,7 +133,7 @@ end Late;"#;
     }
 }
 
-/// Time constants of 1 ms and of 1000 s side by side, rows at the pace of each: both have a closed form.
+/// Time constants of 1 ms and of 1000 s together, with rows at both rates: both have an analytic solution.
 #[test]
 fn fast_and_slow_side_by_side() {
     let text = r#"
@@ -214,7 +214,7 @@ fn drive(k: usize) -> f64 {
     0.9 * (0.11 * k as f64).sin() + if k % 40 < 20 { 0.4 } else { 0.0 }
 }
 
-/// The arm from turning point to turning point, between which it oscillations about one side's equilibrium.
+/// The arm between its turning points, where it oscillates about the equilibrium of one side.
 fn arm_reference(inputs: &[f64], step: f64) -> Vec<[f64; 2]> {
     let (f, k, j) = (0.5, 0.8, 0.7);
     let omega = f64::sqrt(k / j);

@@ -1,4 +1,4 @@
-//! Plays, rounding, and states that the first row settles.
+//! Backlash, rounding, and states whose initial value follows from the first row.
 
 use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation};
 

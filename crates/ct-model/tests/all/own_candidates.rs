@@ -226,7 +226,7 @@ fn two_candidates_that_are_the_same_are_refused() {
     assert_eq!(own_candidates(&block(), &all).unwrap().len(), 1);
 }
 
-/// A store whose exchange with the block has no values at which it is absent: its resistance is a divisor.
+/// A store whose exchange with the block has no absent value: its resistance is a divisor.
 fn pair() -> OwnCandidate {
     let mut pair = own(&[("C1", 100.0), ("R1", 2.0)], &[("y", "-v1")]);
     let state = OwnState {
@@ -248,7 +248,7 @@ fn a_candidate_whose_absence_is_a_limit_is_scored_with_a_factor() {
     let factor = &scored.parameters[2];
     assert_eq!((factor.role, factor.absent), (Role::Size, 0.0));
     assert_eq!(factor.bounds, (0.0, f64::INFINITY));
-    // The factor is in the model of the score alone.
+    // The factor is only in the model for the score.
     let text = apply(&block, &[&scored]).unwrap().to_string();
     assert!(
         text.contains("y = y_true + pair_factor*(-pair_v1);"),

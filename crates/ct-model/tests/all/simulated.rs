@@ -96,7 +96,7 @@ equation
   der(v) = -w2*sin(phi) - c*v - 0.02*v*abs(v) + b*u;
 end Pendulum;"#;
 
-/// Linear, and the derivative of one state is another one alone.
+/// A linear model in which the derivative of one state is another state.
 const SPRING: &str = r#"model Spring
   parameter Real g = 0.8;
   parameter Real c = 0.4;
@@ -172,12 +172,12 @@ fn a_root_or_a_power_above_a_limit_that_is_crossed_goes_on() {
                der(x) = u - 0.4*x - a*{term};
              end Hole;"
         );
-        // Over the limit from above and from below, again and again.
+        // The signal crosses the limit from above and from below repeatedly.
         let case = Case::new(&text, 60, 0.7, |k| vec![[0.2, 0.9][k / 6 % 2]]);
         let (rows, _) = case.plain();
         let low = rows.iter().map(|y| y[0]).fold(f64::INFINITY, f64::min);
         assert!(low < 0.8 && low > 0.0, "{term}: {low}");
-        // Steps follow the error of the values; the slope of a root is infinite where it ends.
+        // The step size depends on the error of the values; the slope of a root is infinite at its end.
         case.check_derivatives(if term.contains("1.5") { 1e-6 } else { 1e-3 });
     }
 }

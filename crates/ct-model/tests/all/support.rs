@@ -3,7 +3,7 @@
 use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation};
 use ode_solvers::{DVector, Dopri5, System, dop_shared::OutputType};
 
-/// A model and what drives it: rows of inputs, held or in straight lines.
+/// A model with its inputs: rows, held or linear between them.
 pub struct Case {
     pub model: Model,
     pub time: Vec<f64>,

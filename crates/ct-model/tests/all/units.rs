@@ -69,7 +69,7 @@ fn both_sides_are_named() {
     );
 }
 
-/// The models beside the checkout are read, written, read again, and their units fit.
+/// The models next to the checkout are read, written and read again, and their units are consistent.
 #[test]
 fn models_of_the_domains() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/domains/public");

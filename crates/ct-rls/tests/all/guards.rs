@@ -313,7 +313,7 @@ fn a_relaxation_beyond_the_floating_point_range_is_refused() {
     assert_eq!(rls.relax(&SVector::zeros(), 1.0, 1.0), Some(1.0));
 }
 
-/// Below the rounding of its entries a pivot is no number: positive, and yet nothing that is known of the matrix.
+/// Below the rounding error of its entries, a pivot is positive but has no significant digits.
 #[test]
 fn a_start_that_is_singular_to_rounding_is_refused() {
     let weights = Weights::least_squares(0.0).unwrap();

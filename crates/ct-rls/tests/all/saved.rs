@@ -1,4 +1,4 @@
-//! A saved estimator goes on as if nothing had been, and what is broken is not restored.
+//! A restored estimator continues with identical results, and damaged data are not restored.
 
 use crate::support::{normal, normals, rng, spd};
 use ct_rls::{

@@ -48,7 +48,7 @@ const MISSING: &[&str] = &[
     "pt",
 ];
 
-/// Words that are meant only where another follows.
+/// Words that mark a missing sample only if a certain word follows.
 const BEGINNINGS: &[&str] = &["no", "scan", "i/o", "comm", "under", "over", "calc", "pt"];
 
 /// Whether a cell marks a missing sample.
@@ -60,7 +60,7 @@ pub(crate) fn says_missing(cell: &str) -> bool {
     let end = lower.find([' ', ':', ';', ',', '(']).unwrap_or(lower.len());
     let (first, rest) = lower.split_at(end);
     let alone = rest.is_empty();
-    // A sign in front of a number is no word.
+    // A sign in front of a number does not make a word.
     let number = rest.trim_start().starts_with(|c: char| c.is_ascii_digit());
     let is_sign = !first.contains(|c: char| c.is_alphanumeric());
     MISSING.contains(&first)
@@ -90,7 +90,7 @@ pub(crate) enum CellFault {
     Empty,
     /// A number that is not finite.
     NotFinite,
-    /// A word that contains no information about a missing sample.
+    /// A word that is no mark of a missing sample.
     Word,
     /// Commas that are no decimal mark.
     Thousands,
@@ -212,7 +212,7 @@ impl Numbers {
                 self.check_mark(cell)?;
                 Ok(Cell::Number(value))
             }
-            // A number too large to be one is no word.
+            // A number beyond the floating-point range is no word.
             Ok(_) if self.strict || cell.contains(|c: char| c.is_ascii_digit()) => {
                 Err(CellFault::NotFinite)
             }

@@ -7,7 +7,7 @@ use crate::columns::{Found, Layout, Purpose};
 use crate::record::median_step;
 use crate::{Error, quoted};
 
-/// A record is refused when more than this share of the output sits exactly at its limits ...
+/// A record is rejected if more than this share of the output is exactly at its limits ...
 const SATURATED_SHARE: f64 = 1.0 / 3.0;
 
 /// ... and that is more than this many times what the commonest other value has: a coarsely
@@ -175,7 +175,7 @@ fn check_saturation(file: &str, column: &Found, values: &[f64]) -> Result<(), Er
     let rows = present().count();
     let low = present().fold(f64::INFINITY, f64::min);
     let high = present().fold(f64::NEG_INFINITY, f64::max);
-    // The one lowest or highest sample of any record is no limit.
+    // The single lowest or highest sample of a record is no limit.
     let at = |value: f64| Some(present().filter(|v| *v == value).count()).filter(|n| *n > 1);
     let (at_low, at_high) = (at(low).unwrap_or(0), at(high).unwrap_or(0));
     let count = at_low + at_high;
@@ -210,7 +210,7 @@ fn check_saturation(file: &str, column: &Found, values: &[f64]) -> Result<(), Er
     })
 }
 
-/// A number without the last digits, which are an accident of binary arithmetic.
+/// A number rounded to remove binary rounding errors.
 pub(super) fn rounded(value: f64) -> f64 {
     format!("{value:.9e}").parse().unwrap_or(value)
 }

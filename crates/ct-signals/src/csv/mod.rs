@@ -149,7 +149,7 @@ fn parse(
     table.into_reading(file, text, layout, (options, purpose))
 }
 
-/// The header of a file: what there is to choose from, before anything is read.
+/// The header of a file, with the available columns, before the record is read.
 ///
 /// # Errors
 /// Where the file is not text, is empty, or has no header.

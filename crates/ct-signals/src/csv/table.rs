@@ -186,7 +186,7 @@ impl Table {
             calendar.start = calendar.start.after(first);
             self.time.iter_mut().for_each(|time| *time -= first);
         }
-        // Names and units go into sentences, tables and files; none of them may steer a terminal.
+        // Names and units are used in sentences, tables and files; control characters are removed.
         let printable = |text: &str| escaped(text).into_owned();
         let mut values = self.values.into_iter();
         let mut channels = |columns: &[Found]| -> Vec<Channel> {

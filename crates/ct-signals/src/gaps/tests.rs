@@ -79,7 +79,7 @@ fn a_missing_input_is_held_or_ends_a_part() {
         (106.0, Some(&160.0))
     );
     assert_eq!((parts[1].time[0], parts[1].len()), (180.0, 20));
-    // An input that runs in lines is not known after its last sample.
+    // An input that is linear between samples is not known after its last sample.
     record.inputs[0].hold = Hold::First;
     let (parts, _) = record.without_gaps(4.0);
     assert_eq!(parts[0].time.last(), Some(&158.0));
@@ -136,7 +136,7 @@ fn a_logger_with_several_rates_loses_nothing() {
     let gappy = with_time(time);
     assert_eq!(gappy.before_missing_row(), Some(last));
     assert_eq!(gappy.without_gaps(1.0).0.len(), 2);
-    // Rows are lost one by one: steps of two intervals stand side by side now and then, and most do not.
+    // Rows are lost one by one: only some of the steps of two intervals are adjacent.
     let lost = record((0..1000).filter(|k| (k * k * 31 + k * 17) % 101 > 10));
     assert!(lost.missing_rows() > 110, "{}", lost.missing_rows());
 }

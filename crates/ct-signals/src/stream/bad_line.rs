@@ -33,7 +33,7 @@ pub enum BadLine {
         /// The cell.
         text: String,
     },
-    /// A number too large to be one.
+    /// A number beyond the floating-point range.
     #[error(
         "column \"{column}\": \"{text}\" is not a finite number; check the program that writes the rows"
     )]
@@ -79,7 +79,7 @@ pub enum BadLine {
         /// The cell.
         text: String,
     },
-    /// Bytes that are no text.
+    /// Bytes that are not UTF-8 text.
     #[error(
         "the line is not UTF-8 text; check the speed of the line and the program that writes the rows"
     )]

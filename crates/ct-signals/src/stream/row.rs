@@ -27,7 +27,7 @@ impl Rows {
             }
         } else {
             let fields = || line.split(char::from(self.delimiter));
-            // A row that is not whole has wrong cells too.
+            // An incomplete row may have wrong cells too.
             self.check_count(fields().count())?;
             for (i, cell) in line.split(char::from(self.delimiter)).enumerate() {
                 let Some(role) = self.at.iter().position(|at| *at == i) else {

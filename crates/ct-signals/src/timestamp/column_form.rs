@@ -6,7 +6,7 @@ use super::form::{DateForm, Fields, Form};
 use super::{DAY, TimestampError, Written, calendar};
 use crate::quoted;
 
-/// The form of the first cell and whether it has a date, with the order of day and month from the others where it is not plain.
+/// The form of the first cell and whether it has a date; the order of day and month comes from the other cells if it is ambiguous.
 pub(super) fn find_form<'a>(
     first: &'a str,
     others: impl Iterator<Item = &'a str>,

@@ -32,9 +32,9 @@ pub enum TimestampError {
     DayOrMonth {
         /// The cell.
         text: String,
-        /// The format in which the day is first.
+        /// The format with the day first.
         day_first: String,
-        /// The format in which the month is first.
+        /// The format with the month first.
         month_first: String,
     },
     /// Some dates have the day first, others the month.
@@ -47,7 +47,7 @@ pub enum TimestampError {
         /// `day` or `month`.
         first_here: &'static str,
     },
-    /// A cell is written otherwise than the first one.
+    /// A cell has another form than the first one.
     #[error(
         "\"{text}\" is not written as \"{first}\" further up; write all times alike, or split the file there"
     )]
@@ -85,7 +85,7 @@ pub enum TimestampError {
         /// The zone.
         zone: String,
     },
-    /// A bound that a person gave is not understood.
+    /// A bound given by the user is not understood.
     #[error("\"{text}\" is no date that has one meaning; write 2026-01-31 or \"2026-01-31 14:25\"")]
     UnknownBound {
         /// What was given.

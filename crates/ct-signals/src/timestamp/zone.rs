@@ -112,7 +112,7 @@ impl Zone {
             });
         }
         let found = TimeZoneDatabase::bundled().get(name).ok();
-        // Jiff's own name for a zone that is not known is no zone.
+        // Jiff's name for an unknown zone is rejected.
         let zone = found
             .filter(|zone| !zone.is_unknown())
             .ok_or_else(|| TimestampError::UnknownZone { zone: quoted(name) })?;
@@ -235,7 +235,7 @@ impl Zone {
         }
     }
 
-    /// Seconds since the epoch of a civil time. `known` holds the times for which the offset is known from the call before.
+    /// Seconds since the epoch of a civil time. `known` contains the times with known offset from the preceding call.
     #[inline]
     fn seconds(
         &self,
@@ -267,13 +267,13 @@ fn changing(
             *known = known_around(zone, at(offset), offset);
             Ok(at(offset))
         }
-        // Twice: the earlier, unless the time would not go forward.
+        // Of two possible instants the earlier, unless the time would not increase.
         AmbiguousOffset::Fold { before, after } => {
             let earlier = Timestamp::new(at(before), civil.nanoseconds);
             let forward = previous.is_none_or(|previous| previous < earlier);
             Ok(if forward { at(before) } else { at(after) })
         }
-        // Never. A day whose first hour is left out begins when the clocks have gone forward.
+        // Cannot occur. A day whose first hour is skipped begins when the clocks have gone forward.
         AmbiguousOffset::Gap { before, .. } if !civil.timed => Ok(at(before)),
         AmbiguousOffset::Gap { .. } => Err(NoInstant::Skipped),
     }

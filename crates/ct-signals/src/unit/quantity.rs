@@ -3,10 +3,9 @@
 use super::dimension::Dimension;
 use super::table::{self, Base};
 
-// No existing crate is used: crates that read units at run time follow UCUM or GNU units, where C is the coulomb and degC, rpm, pct or lmin
-// are unknown.
+// Not a crate: crates that read units at run time follow UCUM or GNU units, where C is the coulomb and degC, rpm, pct or lmin are unknown.
 
-/// A unit of measurement that is understood.
+/// A known unit of measurement.
 ///
 /// ```
 /// use ct_signals::Unit;
@@ -25,7 +24,7 @@ pub struct Unit {
     dimension: Dimension,
     /// Power of the angle.
     angle: i8,
-    /// Whether the angle counts turns, as rpm and Hz do; 1/min and 1/s are then the same.
+    /// Whether the angle is measured in turns, as for rpm and Hz; 1/min and 1/s are then equal.
     turns: bool,
     /// The size in SI units and turns, as a fraction.
     size: (f64, f64),

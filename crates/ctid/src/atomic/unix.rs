@@ -34,7 +34,7 @@ fn copy_extended(old: &File, new: &File) -> io::Result<()> {
 
     let mut names = vec![0; LARGEST];
     let length = match flistxattr(old, names.as_mut_slice()) {
-        // The file system has none.
+        // The file system has no extended attributes.
         Err(Errno::NOTSUP) => return Ok(()),
         length => length?,
     };

@@ -30,14 +30,14 @@ pub(super) struct Compare {
     /// Held-out record: only scored, not used for fits or selection; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
-    /// In a loop whose [controller] is known: simulate it from its reference, as is done for a plant, or run on the measured command, as is
-    /// done for a user's own model
+    /// In a loop with a known [controller]: simulate the loop from its reference (default for a plant), or run the model on the measured
+    /// command (default for your own model)
     #[arg(long = "loop", value_enum, value_name = "WAY")]
     way: Option<LoopWay>,
     /// Limit on the time of the search; Ctrl-C ends it earlier with the best result so far
     #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
     effort: EffortLevel,
-    /// Seed of the random starts of a user's own model: another one must not give another result
+    /// Seed of the random starts for your own model: the result should not depend on it
     #[arg(long, default_value_t = FitOptions::default().seed, value_name = "N", hide = true)]
     seed: u64,
     #[command(flatten)]
@@ -59,7 +59,7 @@ pub(super) struct Diagnose {
     /// Write the shape of the unexplained error as CSV, for `ctid add NAME --from F`
     #[arg(long, value_name = "F.csv")]
     unknown: Option<PathBuf>,
-    /// Add at most so many effects
+    /// Largest number of effects to add
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..), allow_negative_numbers = true)]
     max_effects: Option<u8>,
 }
@@ -168,7 +168,7 @@ fn unused(tables: &[String], look: Look) -> String {
 }
 
 impl Compare {
-    /// A loop that was asked to be simulated, where that cannot be done.
+    /// A requested simulation of the loop that is not possible.
     fn check_loop(&self, model: &OwnModelFile) -> Result<(), Error> {
         match self.way {
             Some(LoopWay::Simulated) => model.require_no_loop(),

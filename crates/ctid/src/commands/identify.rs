@@ -41,7 +41,7 @@ pub(super) struct Identify {
         allow_hyphen_values = true
     )]
     order: Orders,
-    /// Records that are not fitted, on which the models are tried
+    /// Records that are not fitted, for a test of the models
     #[arg(long, value_name = "TEST.csv", num_args = 1..)]
     test: Vec<PathBuf>,
     /// Model file: source of the columns, the hold of the input and, for methods for a loop, the controller; for a linear model of your
@@ -75,7 +75,7 @@ pub(super) struct Identify {
     /// S
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     delay: Option<DelayChoice>,
-    /// The plant integrates, A(0) = 0; for srivc and rivc
+    /// The plant has an integrator, A(0) = 0; for srivc and rivc
     #[arg(long)]
     integrator: bool,
     /// Bandwidth of a filter on the reading in front of the controller [1/s]; y is the filtered reading
@@ -87,7 +87,7 @@ pub(super) struct Identify {
     results: Results,
 }
 
-/// Three or four names, in the order of the help.
+/// Three or four names, in the order of the help text.
 fn columns(text: &str) -> Result<Columns, String> {
     let names: Vec<&str> = text.split(',').map(str::trim).collect();
     let (time, input, output, reference) = match names[..] {
@@ -202,7 +202,7 @@ impl Identify {
         methods
     }
 
-    /// Refuses an option that concerns none of the methods.
+    /// Rejects an option that none of the methods uses.
     fn check_options(&self, methods: &[Method]) -> Result<(), Error> {
         let names: Vec<&str> = methods.iter().map(|method| method.id()).collect();
         let names = names.join(",");
@@ -392,7 +392,7 @@ impl Identify {
     }
 }
 
-/// Whether a method has no memory that could fade.
+/// Whether a method has a memory that does not fade.
 fn weighs_all_alike(method: Method) -> bool {
     method.is_refined() || method.is_of_loop() && method != Method::RecursiveFcloe
 }

@@ -1,4 +1,4 @@
-//! The command line: what may be typed, and what is then called.
+//! The command line: its options and the functions that it calls.
 
 mod compare;
 mod export;
@@ -54,13 +54,14 @@ enum Command {
     Export(Export),
     /// Propose the next experiment, which distinguishes two effects
     Design(design::Arguments),
-    /// Watch a running plant: rows on standard input; alarms out when the model stops fitting, with the effect it looks like
+    /// Monitor a running plant: rows on standard input; alarms on standard output when the model stops fitting, with the effect that is
+    /// consistent with the change
     Monitor(monitor::Arguments),
     /// Identify a linear model in continuous time from a record
     Identify(Box<Identify>),
-    /// Serve the page: the same with the mouse, on this machine alone
+    /// Serve the page: the same functions in a browser, on this computer only
     Serve(serve::Arguments),
-    /// Compute the tables of a paper again, with many noises, and say which printed figures agree
+    /// Compute the tables of a paper again, with many noises, and report which printed figures agree
     Tables(Tables),
 }
 
@@ -77,7 +78,7 @@ struct Results {
 
 #[derive(Debug, Args)]
 struct Add {
-    /// The effect, as `ctid effects` lists it, of a plant with --from a name of your own
+    /// The effect, as listed by `ctid effects`; for a plant with --from, a name of your choice
     effect: String,
     /// Model file
     #[arg(long, value_name = "M.toml")]
@@ -107,7 +108,7 @@ struct Effects {
     /// List only what may be added to the model of this file
     #[arg(long, value_name = "M.toml", conflicts_with = "effect")]
     model: Option<PathBuf>,
-    /// List those that go with a symptom or a word of the process, best first: clog, drift, leak, stick, late, noisy
+    /// List the effects for a symptom or a word of the process, best first: clog, drift, leak, stick, late, noisy
     #[arg(long, value_name = "WORDS", conflicts_with = "effect")]
     like: Option<String>,
 }
@@ -203,7 +204,8 @@ pub(crate) fn finish(
     out: &mut dyn Write,
     look: Look,
 ) -> Result<(), Error> {
-    // The files first: whoever pipes the text into `head` still gets them. Where one cannot be written the text is not lost.
+    // The files are written first: they are complete even if the reader of the text closes the pipe. If a file cannot be written, the text
+    // is printed nevertheless.
     let written: Vec<_> = outputs.iter().map(|output| output.write(found)).collect();
     let mut text = text.to_string();
     if !outputs.is_empty() {

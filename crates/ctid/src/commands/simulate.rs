@@ -24,7 +24,7 @@ pub(super) struct Simulate {
     /// Model file
     #[arg(value_name = "M.toml")]
     model: PathBuf,
-    /// Inputs (CSV): the columns of the inputs, and where there are first readings of the outputs, those
+    /// Inputs (CSV): the columns of the inputs and, if available, first readings of the outputs
     #[arg(value_name = "INPUTS.csv")]
     inputs: PathBuf,
     /// Write time, outputs and the limits of their 95 % bands
@@ -52,10 +52,10 @@ pub(super) struct Simulate {
         requires = "fit"
     )]
     fit_to: Option<String>,
-    /// Write the limits of a reading too: the band of the output and the noise
+    /// Write the limits of a reading too: the band of the output plus the noise
     #[arg(long, requires = "fit")]
     readings: bool,
-    /// Fit initial states to so many first readings of each output, where INPUTS.csv has them
+    /// Fit initial states to this number of first readings of each output, if INPUTS.csv has them
     #[arg(long, value_name = "N", default_value_t = FIRST_READINGS, value_parser = first, allow_negative_numbers = true)]
     initial: usize,
     /// Limit on the time of the fit of a plant

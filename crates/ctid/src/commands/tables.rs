@@ -21,7 +21,7 @@ pub(super) struct Tables {
     /// The paper
     #[arg(value_enum, default_value_t = Paper::Udink)]
     paper: Paper,
-    /// Noises: each table is run once with each; without it as many as a paper's bands are for, 200 or 100
+    /// Number of noises: each table is run once with each; by default the number for which a paper's bands are valid, 200 or 100
     #[arg(long, value_name = "N", value_parser = runs, allow_negative_numbers = true)]
     runs: Option<usize>,
     /// Seed of the noise
@@ -52,7 +52,7 @@ enum Paper {
     All,
 }
 
-/// The runs that the bands of each paper are for.
+/// Number of runs for which the bands of each paper are valid.
 const RUNS_UDINK: usize = 200;
 const RUNS_BAYSSE: usize = 100;
 

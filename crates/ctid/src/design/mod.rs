@@ -26,7 +26,7 @@ use crate::{Error, names};
 /// Command line options.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Records (CSV) that leave it undecided; several are fitted together
+    /// Records (CSV) that do not decide between the two; several are fitted together
     #[arg(required = true, value_name = "DATA.csv")]
     data: Vec<PathBuf>,
     /// Model file; neither of the two effects is in it
@@ -39,13 +39,13 @@ pub struct Arguments {
     /// any: all that moved in the records
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
     input: Vec<AppliedRange>,
-    /// Smallest and largest command, or reference in a loop; without it what the records visited
+    /// Smallest and largest command, or reference in a loop; by default the range of the records
     #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true)]
     range: Option<Vec<f64>>,
-    /// Largest change of the command, or reference, in a second
+    /// Largest change of the command, or reference, per second
     #[arg(long, value_name = "MAX", allow_negative_numbers = true)]
     slew: Option<f64>,
-    /// Length [s]; without it that of the longest record
+    /// Length [s]; by default that of the longest record
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// Seed of the random sequences
@@ -99,7 +99,7 @@ impl std::str::FromStr for AppliedRange {
     }
 }
 
-/// A design, and in what unit of time its CSV is written.
+/// A design, and the unit of time of its CSV file.
 #[derive(Debug, Serialize)]
 pub struct Proposal {
     /// The design.
@@ -114,7 +114,7 @@ pub struct Proposal {
 }
 
 impl Proposal {
-    /// A design, its time written as these columns have it.
+    /// A design whose time is written in the format of these columns.
     #[must_use]
     pub fn new(design: Design, columns: &Columns) -> Self {
         let (time, seconds) = columns.time_header();
@@ -153,7 +153,7 @@ impl Found for Proposal {
     }
 }
 
-/// The effect of one of the two names, and the tank that it is to act in.
+/// The effect with one of the two names, and the tank in which it acts.
 pub(crate) fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Candidacy, Error> {
     let (id, place) = match name.split_once(':') {
         Some((id, place)) => (id, Some(place)),
@@ -296,7 +296,7 @@ impl Arguments {
         finish(&proposal, &text, &outputs, out, look)
     }
 
-    /// Designs, and writes what was asked for.
+    /// Designs an experiment, and writes the requested files.
     pub(crate) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = Files {
             data: self.data.clone(),

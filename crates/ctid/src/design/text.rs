@@ -55,7 +55,7 @@ fn alternatives(design: &Design, look: Look) -> String {
     lines(&look.heading(&title), &sides, &rows)
 }
 
-/// The experiments, the best first, and the same once more.
+/// The experiments, the best first, and the repetition of the previous one.
 fn experiments(design: &Design, look: Look) -> String {
     let (unit, limits) = (&design.experiment.unit, &design.limits);
     let what = if design.in_loop {

@@ -1,4 +1,4 @@
-//! The text of a model file, changed in its own layout: its list of effects and where an effect acts.
+//! Changes of a model file's text that keep its layout: its list of effects, and the place of an effect.
 
 use toml_edit::{Array, DocumentMut, Item, Table, Value, value};
 
@@ -13,7 +13,7 @@ pub(crate) fn document(file: &str, text: &str) -> Result<DocumentMut, Error> {
         })
 }
 
-/// Appends to the list, in the list's own layout; makes the list where there is none.
+/// Appends to the list in the list's layout; creates the list if there is none.
 pub(super) fn push(document: &mut DocumentMut, id: &str) {
     let Some(effects) = document.get_mut("effects").and_then(Item::as_array_mut) else {
         document.insert("effects", value(Array::from_iter([id])));

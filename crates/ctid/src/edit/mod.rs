@@ -19,8 +19,7 @@ use crate::model_file::{self, ModelFile};
 use crate::term_file;
 use crate::{Error, atomic, names};
 
-/// Adds an effect to a model file; `place` is a vessel or a pump, where there is a choice. Returns
-/// what was done, in one line.
+/// Adds an effect to a model file; `place` is a vessel or a pump, if there is a choice. Returns a description of the change, in one line.
 ///
 /// # Errors
 /// Where the effect is unknown, on already, or does not act on this plant or there; the file is
@@ -39,8 +38,8 @@ pub fn add(path: &Path, effect: &str, place: Option<&str>) -> Result<String, Err
     })
 }
 
-/// Adds to a plant a term of the user's own, its shape read from a CSV file; to a user's own model an effect, with what a result in JSON
-/// found of it. Returns what was done, in one line.
+/// Adds a user's own term to a plant, with its shape read from a CSV file; to a user's own model an effect, with its values from a result
+/// in JSON. Returns a description of the change, in one line.
 ///
 /// # Errors
 /// Where the name is taken or the shape cannot act on this plant, or the result is not one of this model and effect; the file is then as it
@@ -58,7 +57,7 @@ pub fn add_from(path: &Path, name: &str, from: &Path) -> Result<String, Error> {
     change(path, |text| with_term(&file, text, name, &from, &read))
 }
 
-/// Removes an effect or a term from a model file. Returns what was done, in one line.
+/// Removes an effect or a term from a model file. Returns a description of the change, in one line.
 ///
 /// # Errors
 /// Where the effect is unknown or not on; the file is then as it was.
@@ -73,7 +72,7 @@ pub fn remove(path: &Path, effect: &str) -> Result<String, Error> {
     })
 }
 
-/// A changed text and what was done, in one line.
+/// A changed text and a description of the change, in one line.
 pub struct Edited {
     /// The model file's new text.
     pub text: String,
@@ -207,7 +206,7 @@ pub fn with_effect(
     Ok(Edited { text, done })
 }
 
-/// The text with a column for a signal under `[columns]`; an empty name takes it away.
+/// The text with a column for a signal under `[columns]`; an empty name removes the column.
 ///
 /// # Errors
 /// Where the text is no TOML, or `columns` is no table.

@@ -74,8 +74,8 @@ impl Findings {
         self.record_numbers.contains_key(id)
     }
 
-    /// The value of a parameter in the last model that has it, of the shape of the error that no candidate explains, or, of an effect that
-    /// is in no model, as it was fitted alone.
+    /// The value of a parameter in the last model with this parameter, of the unexplained function, or, for an effect that is in no model,
+    /// from its single fit.
     fn value(&self, name: &str) -> Option<f64> {
         let steps = self.steps.iter().rev().chain(&self.unknown);
         let steps = steps.flat_map(|step| &step.parameters);
@@ -199,7 +199,7 @@ pub(crate) fn with_effect(
     Ok(Edited { text, done })
 }
 
-/// Writes what a result found of an effect into its table. Returns what, in words.
+/// Writes a result's values of an effect into its table. Returns a description of them.
 fn keep(
     document: &mut DocumentMut,
     candidate: &Candidate,

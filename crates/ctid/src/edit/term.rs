@@ -1,4 +1,4 @@
-//! Terms of an own model, written into its file.
+//! Terms of the user's own, written into the model file.
 
 use plants::{Fitted, Term};
 use toml_edit::{Array, Item, Table, value};

@@ -141,7 +141,7 @@ fn in_a_file(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
 
 const BARE: &str = "plant = \"single-tank\"\neffects = []\n";
 
-/// An editor that writes between reading and writing loses nothing, and neither does who adds the effect.
+/// An editor that writes between reading and writing loses nothing, and neither does the user who adds the effect.
 #[test]
 fn what_is_written_meanwhile_is_kept() {
     let (_folder, path) = in_a_file(BARE);

@@ -5,7 +5,7 @@ use linear_identification::side_by_side::{Outcome, Row, SideBySide};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 
-/// The whole of it.
+/// The complete text.
 #[must_use]
 pub fn text(found: &SideBySide, look: Look) -> String {
     let mut text = format!(

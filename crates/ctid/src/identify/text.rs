@@ -153,7 +153,7 @@ fn parameters(found: &Identification, look: Look) -> String {
     text
 }
 
-/// The second half: the start is not the record's.
+/// The second half, where the start has no influence.
 fn settled(values: &[f64]) -> &[f64] {
     values.get(values.len() / 2..).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! Whether records fit each other, the model's units and sizes, and its parameters.
+//! Checks that records are consistent with each other, with the model's units and sizes, and with its parameters.
 
 use ct_signals::Record;
 use plants::controller::Controller;
@@ -7,19 +7,19 @@ use plants::{Outlet, Place, Plant, Scales};
 use crate::model_file::{ControllerLaw, ControllerSettings, ModelFile};
 use crate::{Error, numbers};
 
-/// Readings above the tank's height by this part, and commands above their range, are noise.
+/// Readings above the tank's height, and commands above their range, by up to this share are noise.
 const BEYOND_THE_RANGE: f64 = 1.01;
 
 /// With an effect of the sensor in the model, a full tank may read up to this many times its height; a larger reading has another unit.
 const BEYOND_THE_TANK: f64 = 1.5;
 
-/// Readings this far below zero, as a part of what the record spans, are no noise about an empty tank.
+/// Readings below zero by more than this share of the record's range are not noise about an empty tank.
 const BELOW_THE_OUTLET: f64 = 0.1;
 
-/// Sampling intervals that differ by less than this part are one: times are read from text.
+/// Sampling intervals that differ by less than this share are equal: times are read from text.
 const SAME_INTERVAL: f64 = 0.01;
 
-/// The controller as it ran in the records.
+/// The controller at the interval of the records.
 pub(super) fn controller(
     model_name: &str,
     settings: &ControllerSettings,
@@ -67,7 +67,7 @@ pub(super) fn controller(
     Ok(controller.at_output(outputs.saturating_sub(1)))
 }
 
-/// Records that are fitted by one model are in one unit, and so are the commands of two pumps and the levels of several tanks.
+/// All records of a fit have the same units, and so have the commands of two pumps and the levels of several tanks.
 pub(super) fn check_units(pumps: usize, records: &[Record], test: &[Record]) -> Result<(), Error> {
     let Some((first, others)) = records.split_first() else {
         return Err(Error::Usage(
@@ -262,7 +262,7 @@ pub(super) fn check_levels<'a>(
     })
 }
 
-/// A term is written in the units of the record that it was found on.
+/// A term has the units of the record in which it was found.
 pub(super) fn check_terms(
     model_name: &str,
     model: &ModelFile,

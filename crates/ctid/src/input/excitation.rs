@@ -1,4 +1,4 @@
-//! Whether the records can tell anything of the process, seen without a fit.
+//! Checks of the information in the records, without a fit.
 //!
 //! Three findings, each made so that a record that a fit can use raises none of them:
 //!
@@ -17,13 +17,13 @@ use crate::numbers;
 /// A command has changed if its distance from the previous constant value is this share of its whole range.
 const MOVE: f64 = 0.1;
 
-/// The range of white noise of up to 100 000 samples is below this many medians of its first differences.
+/// White noise of up to 100 000 samples has a range below this multiple of the median of its first differences.
 const NOISE_RANGE: f64 = 10.0;
 
-/// An output answers where chance alone gives such a correlation with the command less often than this.
+/// An output responds to the command if the p-value of their correlation is below this.
 const CHANCE: f64 = 0.01;
 
-/// Standard errors of a correlation beyond which it is none of chance.
+/// A correlation beyond this number of standard errors is significant.
 const STANDARD_ERRORS: f64 = 4.0;
 
 /// Properties that a record cannot show.
@@ -211,7 +211,7 @@ fn uncorrelated(input: &[f64], output: &[f64]) -> bool {
     prewhitened_input_test(input, output, lags).is_ok_and(|(_, p)| p > CHANCE)
 }
 
-/// The input, as it is and after first-order lags of one sample to a third of the record, is not correlated with the output.
+/// The input, and the input after first-order lags of one sample to a third of the record, are not correlated with the output.
 fn uncorrelated_behind_lags(input: &[f64], output: &[f64]) -> bool {
     let samples = output.iter().filter(|y| !y.is_nan()).count();
     let bound = STANDARD_ERRORS / (samples as f64).sqrt();
@@ -257,7 +257,7 @@ mod tests {
 
     use super::*;
 
-    /// A lag of `gain` and `tau` samples, in white noise of one, with this command.
+    /// Response of a lag with `gain` and `tau` samples to this command, plus white noise of standard deviation one.
     fn record(name: &str, gain: f64, tau: f64, seed: u64, command: &[f64]) -> Record {
         let n = command.len();
         let white = noise::white(n, 1.0, &mut ChaCha8Rng::seed_from_u64(seed));
@@ -282,7 +282,7 @@ mod tests {
         }
     }
 
-    /// Steps between random levels, each held for so long.
+    /// Steps between random levels, each held for this time.
     fn steps(n: usize, held: usize, seed: u64) -> Vec<f64> {
         let levels = noise::white(n.div_ceil(held), 1.0, &mut ChaCha8Rng::seed_from_u64(seed));
         (0..n).map(|k| levels[k / held]).collect()
@@ -371,7 +371,7 @@ mod tests {
             warnings(&[noisy]).as_slice(),
             [ExcitationWarning::SingleStep { .. }]
         ));
-        // A second record with a step, a step back, and a ramp are more.
+        // A second record with a step, a step back, and a ramp has more changes.
         let again = record("b.csv", 30.0, 20.0, 2, &single);
         assert_eq!(warnings(&[once, again]), []);
         let back: Vec<f64> = (0..400)

@@ -94,7 +94,7 @@ impl ReadArguments {
     }
 }
 
-/// A problem, and how its records were read.
+/// A problem, and the summaries of its records.
 #[derive(Debug, Clone)]
 pub struct Input {
     /// Model and records.
@@ -119,7 +119,7 @@ impl Files {
         self.read_with(self.read_model()?)
     }
 
-    /// The model file, where no record is given twice.
+    /// Reads the model file, and checks that no record is given twice.
     ///
     /// # Errors
     /// As [`Files::read`].
@@ -128,7 +128,7 @@ impl Files {
         model_file::read(&self.model)
     }
 
-    /// The rest, where the model file was read: a pipe can be read only once.
+    /// Reads the rest after the model file: a pipe can be read only once.
     ///
     /// # Errors
     /// As [`Files::read`].
@@ -159,7 +159,7 @@ impl Files {
         })
     }
 
-    /// An error of the computation, with the file that is to blame where that is known.
+    /// An error of the computation, with the file in question if known.
     pub(crate) fn blame(&self, error: missing_effect::Error) -> Error {
         use missing_effect::Error::{ControlledOutput, Design, Structure, UnstableLoop};
         if matches!(
@@ -239,8 +239,8 @@ pub fn on_one_clock(records: &mut [Record]) {
     }
 }
 
-/// Fitted records with dates are given in the order of their dates, and do not overlap: a clock that runs backwards between files tells
-/// nothing of drifts. `summaries`: how the records were read, where this is known.
+/// Fitted records with dates are given in the order of their dates, and do not overlap: with a clock that runs backwards between files,
+/// drifts cannot be found. `summaries`: summaries of the records, if known.
 pub(crate) fn check_clocks(records: &[Record], summaries: &[ReadSummary]) -> Result<(), Error> {
     for (k, pair) in records.windows(2).enumerate() {
         let [before, after] = pair else { continue };
@@ -270,7 +270,7 @@ pub(crate) fn check_clocks(records: &[Record], summaries: &[ReadSummary]) -> Res
     Ok(())
 }
 
-/// A problem from what has been read; `model_name` names the model file in messages.
+/// A problem from records and a model that were read; `model_name` is the name of the model file in messages.
 ///
 /// # Errors
 /// Where the records do not fit each other or the model.

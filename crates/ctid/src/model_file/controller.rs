@@ -36,7 +36,7 @@ pub enum ControllerLaw {
     },
 }
 
-/// The settings of a controller; those of a PI have been accepted by [`Controller::pi`].
+/// The settings of a controller; those of a PI were accepted by [`Controller::pi`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControllerSettings {
     /// The control law.
@@ -195,7 +195,7 @@ impl Source<'_> {
             u_min: limit("u_min", &raw.u_min, f64::NEG_INFINITY)?,
             u_max: limit("u_max", &raw.u_max, f64::INFINITY)?,
         };
-        // The interval is the records'; what cannot work does not hang on it.
+        // The interval is that of the records; errors do not depend on it.
         settings
             .controller(1.0)
             .map_err(|error| self.at(at, error.to_string()))?;

@@ -105,7 +105,7 @@ impl Source<'_> {
         Ok(terms)
     }
 
-    /// The table's names are parameters of the effect at its place, and what is fixed has a value.
+    /// The table's names are parameters of the effect at its place, and fixed parameters have a value.
     pub(super) fn check_parameters(
         &self,
         (plant, known): (Plant, &Known),
@@ -222,7 +222,7 @@ pub(crate) fn vessel(
         })
 }
 
-/// Names and places do not depend on the data: any ranges will do to ask for them.
+/// Names and places do not depend on the data: any ranges can be used for a query.
 pub(super) fn any_scales(second_pump: bool) -> Scales {
     let mut scales = Scales::from_ranges((0.0, 1.0), (0.0, 1.0), 1.0, 100.0);
     scales.input_2 = second_pump.then_some((0.0, 1.0));

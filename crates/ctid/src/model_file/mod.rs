@@ -1,4 +1,4 @@
-//! The model file: which plant, which effects, which columns, what is known.
+//! The model file: plant, effects, columns, known constants.
 //!
 //! ```
 //! let model = ctid::model_file::parse("tank.toml", r#"
@@ -67,11 +67,11 @@ pub struct ModelFile {
     pub fixed: Vec<String>,
     /// Prior knowledge of parameters, by the same names.
     pub priors: BTreeMap<String, PriorValue>,
-    /// The controller of the loop, where it is known.
+    /// The controller of the loop, if known.
     pub controller: Option<ControllerSettings>,
     /// Hold of the input between samples.
     pub hold: Hold,
-    /// Tables of effects and terms that are not on, and so have no effect: `effect.overflow`.
+    /// Tables of effects and terms that are not in the model: `effect.overflow`.
     pub waiting: Vec<String>,
 }
 
@@ -93,7 +93,7 @@ impl ModelFile {
         Domain::of(self.plant, self.columns.output_unit())
     }
 
-    /// The plant with its effects, over the ranges that the data visit.
+    /// The plant with its effects, for the ranges of the data.
     ///
     /// # Errors
     /// None for a model that [`parse`] has returned.

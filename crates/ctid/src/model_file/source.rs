@@ -83,7 +83,7 @@ impl Source<'_> {
         self.at(span.start, what)
     }
 
-    /// The line that the parser refuses.
+    /// The line of a parser error.
     fn line(&self, error: &toml::de::Error) -> &str {
         let start = error.span().map_or(0, |span| span.start);
         let (before, behind) = self.text.split_at_checked(start).unwrap_or_default();
@@ -178,7 +178,7 @@ impl Source<'_> {
     }
 }
 
-/// A line as it was meant, where its value begins as a number and has a unit after it or a decimal comma.
+/// The probably intended line, if its value begins as a number and has a unit or a decimal comma.
 fn number_with_more(line: &str) -> Option<String> {
     let (key, value) = line.split_once('=')?;
     let word = value.split_whitespace().next()?;
@@ -189,7 +189,7 @@ fn number_with_more(line: &str) -> Option<String> {
         return None;
     }
     let key = quoted(key.trim());
-    // 1,000.0 may be a thousand, or a slip.
+    // 1,000.0 may be a thousand, or a typing error.
     if word.matches([',', '.']).count() > 1 {
         return Some(format!("{key} = 154.0, say"));
     }

@@ -1,4 +1,4 @@
-//! Lines of the input: the header, rows, and what is wrong with them.
+//! Lines of the input: the header, rows, and their errors.
 
 mod first_row;
 
@@ -15,7 +15,7 @@ const LOST: [&str; 2] = [
     "the reading is lost, the command of the row is used",
     "the reading is lost, the inputs of the row are used",
 ];
-/// The mend where names are missing: `tail -f` alone begins in the middle of the file.
+/// Correction for missing names: `tail -f` alone begins in the middle of the file.
 const HEADER_FIRST: &str = "begin with the header: tail -n +1 -f FILE";
 
 impl<'a> Session<'a> {
@@ -41,7 +41,7 @@ impl<'a> Session<'a> {
             && matches!(&read, Err(bad) if may_follow_a_part(bad))
             && self.rows.as_ref().is_some_and(|rows| !rows.has_header())
         {
-            // Who listens to a running line hears the end of a row first.
+            // A reader that connects to a running stream receives the end of a row first.
             self.bad(|| "the row before was not whole".to_string());
             self.rows = None;
             self.timed = false;
@@ -107,7 +107,7 @@ impl<'a> Session<'a> {
         (row, bad)
     }
 
-    /// A line in the order of the first one.
+    /// A line with the column order of the first one.
     fn read(&mut self, line: &[u8]) -> Result<Line, BadLine> {
         match &mut self.rows {
             Some(rows) => rows.read(line),
@@ -115,7 +115,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Whether a line that is no row is a header of another form: what follows is read in its order.
+    /// Whether a line that is no row is a header of another form: later rows are read in its order.
     fn header_again(&mut self, line: &[u8]) -> Result<bool, Error> {
         let (Some(known), Ok(text)) = (&self.rows, std::str::from_utf8(line)) else {
             return Ok(false);
@@ -244,7 +244,7 @@ impl<'a> Session<'a> {
     }
 
     fn refused(&mut self, refused: &Refused) {
-        // Time and inputs alone refuse a row.
+        // Only errors of time and inputs reject a row.
         let text = self.named(refused, refused.at());
         self.bad(|| text);
     }
@@ -284,7 +284,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Whether a row may be refused because the one before, by which the stream was understood, was only the end of one.
+/// Whether a row may be rejected because the preceding row, which determined the format, was only the end of a row.
 fn may_follow_a_part(bad: &BadLine) -> bool {
     matches!(
         bad,

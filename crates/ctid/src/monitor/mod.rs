@@ -1,4 +1,4 @@
-//! `ctid monitor`: rows on standard input as they come; alarms on standard output, all else on standard error.
+//! `ctid monitor`: rows on standard input as they arrive; alarms on standard output, other messages on standard error.
 
 mod input;
 mod lines;
@@ -38,10 +38,10 @@ pub struct Arguments {
     /// Keep the state in this file: it is read at the start if it exists, and saved every minute and at the end
     #[arg(long, value_name = "FILE")]
     state: Option<PathBuf>,
-    /// Write the estimates with their band as JSON lines too, between the alarms
+    /// Also write the estimates with their bands as JSON lines between the alarms
     #[arg(long)]
     estimates: bool,
-    /// Time between estimates [s]; without it ten times the slowest time constant
+    /// Time between estimates [s]; by default ten times the slowest time constant
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     interval: Option<f64>,
     /// Mean number of rows of the input between false alarms, of all kinds together
@@ -53,7 +53,7 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// Watches until the rows end, or the program is asked to stop.
+    /// Monitors until the rows end, or until the program is stopped.
     ///
     /// # Errors
     /// Where the model, the state or the first line cannot be used, nothing comes, or something cannot be written.
@@ -158,7 +158,7 @@ struct Session<'a> {
     /// Whether the monitor continues from a saved state.
     restored: bool,
     rows: Option<Rows>,
-    /// Lines before the first row that were none.
+    /// Number of lines before the first row.
     parts: usize,
     line: u64,
     trouble: Trouble,
@@ -254,7 +254,7 @@ impl<'a> Session<'a> {
     fn pause(&mut self) {
         self.screen.draw(&self.monitor);
         if self.saver.is_due() {
-            // A disk that is full for a while is no reason to stop watching.
+            // A disk that is temporarily full does not stop the monitor.
             if let Some(text) = self.saver.save(&self.monitor) {
                 self.screen.say(&text);
             }
@@ -307,7 +307,7 @@ fn believed(file: &ModelFile) -> Model {
     }
 }
 
-/// An error of the monitor, with the file that is to blame.
+/// An error of the monitor, with the file in question.
 fn blame(error: ::monitor::Error, arguments: &Arguments) -> Error {
     use ::monitor::Error::{ByClock, Damaged, NoParameters, OtherModel, Structure, Time, Version};
     match (&error, &arguments.state) {

@@ -9,7 +9,7 @@ use super::{Halt, INPUT, Session};
 use crate::numbers::significant;
 use crate::{Error, one_line};
 
-/// A threshold above this is not that of the false alarms alone: 8.6 where they come every 1e15 rows.
+/// A threshold above this is larger than false alarms require: 8.6 corresponds to one in 1e15 rows.
 const DEAF: f64 = 10.0;
 
 impl Session<'_> {
@@ -170,7 +170,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// A JSON line; where the rows have dates, with those of its `time` and of its `since`.
+    /// A JSON line; if the rows have dates, with the dates of its `time` and `since`.
     pub(super) fn print(
         &mut self,
         value: &impl serde::Serialize,

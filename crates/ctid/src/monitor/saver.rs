@@ -1,4 +1,4 @@
-//! Saves the state now and then; what cannot be written is said once, and tried again.
+//! Saves the state at intervals; a failed save is reported once and repeated.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -15,7 +15,7 @@ pub(super) struct Saver {
     /// None if no state is saved.
     path: Option<PathBuf>,
     tried: Instant,
-    /// Rows of the state that is in the file.
+    /// Number of rows of the saved state.
     rows: u64,
     failed: bool,
 }
@@ -34,7 +34,7 @@ impl Saver {
         self.tried.elapsed() >= SAVED_EVERY
     }
 
-    /// Saves it; in words where that begins to fail, or to succeed again.
+    /// Saves the state; returns a message when saving begins to fail, or succeeds again.
     pub(super) fn save(&mut self, monitor: &Monitor) -> Option<String> {
         let failed = std::mem::replace(&mut self.failed, false);
         match self.finish(monitor) {
@@ -52,7 +52,7 @@ impl Saver {
         }
     }
 
-    /// The last time: a failure is an error.
+    /// The last save: a failure is an error.
     pub(super) fn finish(&mut self, monitor: &Monitor) -> Result<(), Error> {
         self.tried = Instant::now();
         let Some(path) = &self.path else {

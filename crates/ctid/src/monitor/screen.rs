@@ -12,9 +12,9 @@ use crate::look::Look;
 use crate::numbers::{significant, value_and_error};
 use crate::plot::{Curve, RESIDUAL, plot};
 
-/// Innovations that are drawn.
+/// Number of plotted innovations.
 const DRAWN: usize = 400;
-/// The plot is drawn again after so long, where rows have come.
+/// Interval between redraws of the plot, if there are new rows.
 pub(super) const DRAWN_EVERY: Duration = Duration::from_millis(250);
 /// Lines of a plot.
 const ROWS: usize = 6;
@@ -23,9 +23,9 @@ const LEAST: f64 = 4.0;
 
 pub(super) struct Screen {
     look: Look,
-    /// Standard error, where it is a terminal.
+    /// Standard error, if it is a terminal.
     term: Option<Term>,
-    /// Lines of the plot on the terminal now.
+    /// Number of the plot's lines on the terminal.
     drawn: usize,
     /// The signals that are plotted, one for each output.
     signals: Vec<Signal>,
@@ -188,7 +188,7 @@ impl Screen {
     }
 }
 
-/// The line above the plot. A terminal would break a longer line, and a part of it would stay when the plot is removed.
+/// Heading of the plot.
 fn heading(
     of: Option<&str>,
     residual: f64,

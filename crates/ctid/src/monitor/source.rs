@@ -1,4 +1,4 @@
-//! Standard input and the wish to stop, on one channel.
+//! Standard input and stop requests, on one channel.
 
 use std::io::{self, Read};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -8,7 +8,7 @@ use crate::Error;
 
 /// Bytes read at once.
 const CHUNK: usize = 64 * 1024;
-/// Chunks that may wait.
+/// Capacity of the queue of chunks.
 const WAITING: usize = 4;
 
 /// Input event.
@@ -28,7 +28,7 @@ pub(super) fn open() -> Result<Receiver<Event>, Error> {
     let (sender, receiver) = sync_channel(WAITING);
     let stop = sender.clone();
     ctrlc::set_handler(move || {
-        // Who no longer listens has stopped.
+        // The receiver has already stopped.
         let _ = stop.send(Event::Stop);
     })
     .map_err(|error| {

@@ -1,4 +1,4 @@
-//! The saved state: written whole or not at all, and nothing else is overwritten. A checksum of its numbers tells a damaged one.
+//! The saved state: written completely or not at all, and no other file is overwritten. A checksum of its numbers detects damage.
 
 use std::fs;
 use std::io::{self, BufReader};
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, atomic, output};
 
-/// A larger file is none of ours \[bytes\].
+/// A larger file is not a state of this program \[bytes\].
 const LARGEST: u64 = 64 * 1024 * 1024;
 
 #[derive(Serialize)]
@@ -102,7 +102,7 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
     Ok(Some(read.state))
 }
 
-/// CRC-32 of the state as it is written: numbers are read and written again to the last digit.
+/// CRC-32 of the state as written: numbers are read and written again exactly.
 fn checksum(state: &State) -> serde_json::Result<u32> {
     Ok(crc32fast::hash(&serde_json::to_vec(state)?))
 }

@@ -23,7 +23,7 @@ impl Trouble {
         }
     }
 
-    /// A bad row: the message to print, where one is.
+    /// Counts a bad row; returns the message to print, if any.
     pub(super) fn bad(&mut self, message: impl FnOnce() -> String) -> Option<String> {
         self.good = 0;
         self.bad += 1;

@@ -98,7 +98,7 @@ impl RawCandidate {
     }
 }
 
-/// The candidates in plain data, each of which fits the model.
+/// The candidates as plain data; each is valid for the model.
 ///
 /// # Errors
 /// One line that names the file, the line, the place in the expression, what is wrong and the correction.

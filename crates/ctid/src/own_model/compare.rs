@@ -1,4 +1,4 @@
-//! A user's own model fitted to records, and how far it is off.
+//! Fit of a user's own model to records, and its errors.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,12 +14,12 @@ use super::fitted::{FitLimit, FittedModel, blame};
 use super::problem::RecordNumbers;
 use crate::Error;
 
-/// Estimates whose correlation is above this are not known one without the other.
+/// Two estimates with a correlation above this are determined only in combination.
 const TOGETHER: f64 = 0.999;
 /// The initial states of held-out records are fitted within this share of the time, whatever the fit took.
 const OF_HELD_OUT: f64 = 0.25;
 
-/// Measured and model, of one output of one record.
+/// Measured values and model output, for one output of one record.
 #[derive(Debug, Clone)]
 pub struct Curves {
     /// The record's name.
@@ -53,11 +53,11 @@ pub struct Comparison {
     pub noise: Vec<NoiseFloor>,
     /// Fitted entries that these records do not determine, alone or together with another one.
     pub not_determined: Vec<Vec<String>>,
-    /// The limit on the time, and what it cut short.
+    /// The time limit, and the steps that were cut short.
     pub effort: Effort,
     /// Computing time \[s\].
     pub seconds: f64,
-    /// Measured and model, of each output of each record.
+    /// Measured values and model output, for each output of each record.
     #[serde(skip)]
     pub curves: Vec<Curves>,
 }
@@ -150,7 +150,7 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
             coefficients: Vec::new(),
         });
     let noise_floors = noise_floors.collect();
-    // The fit is one by simulation error: its residual has the noise's spectrum.
+    // The fit minimises the simulation error: its residual has the noise's spectrum.
     let errors = setup
         .robust(fit, options.noise_order)
         .map_or_else(|_| fit.std_errors(), |robust| robust.std_errors);

@@ -1,4 +1,4 @@
-//! `[controller.u]`: what moved an input of a user's own model in a loop.
+//! `[controller.u]`: the controller that drove an input of a user's own model in a loop.
 //!
 //! `ctid identify` works with it by the methods that have to do with a loop. Simulations of the model run on the measured inputs: what that
 //! means for a fit is said.
@@ -20,9 +20,9 @@ pub(super) type RawControllers = BTreeMap<Spanned<String>, Spanned<RawController
 /// A controller of the model file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct OwnController {
-    /// The input that it drives, by its position.
+    /// The input that the controller drives, by its position.
     pub input: usize,
-    /// The output that it reads, by its position.
+    /// The output that the controller reads, by its position.
     pub output: usize,
     /// The column of the reference.
     pub reference: Option<String>,

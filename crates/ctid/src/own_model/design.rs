@@ -51,18 +51,18 @@ pub fn design(
     })
 }
 
-/// A design, and how its experiment is written.
+/// A design, and the format of its experiment.
 #[derive(Debug, Serialize)]
 pub(crate) struct OwnProposal {
     #[serde(flatten)]
     pub design: Design,
-    /// The experiment as CSV; none where none is worth making.
+    /// The experiment as CSV; none if no experiment is worthwhile.
     #[serde(skip)]
     record: Option<String>,
 }
 
 impl OwnProposal {
-    /// A design whose experiment is written in columns of the model file's names.
+    /// A design whose experiment has the columns of the model file.
     pub fn new(design: Design, file: &OwnModelFile, time_unit: f64) -> Self {
         let record = (!design.twins()).then(|| csv(&design, file, time_unit));
         Self { design, record }
@@ -149,7 +149,7 @@ fn range(low: f64, high: f64, unit: &str) -> String {
     format!("{low} .. {high} {unit}").trim_end().to_string()
 }
 
-/// Length and inputs with what they may do: `33 min, u 0 .. 36 % (visited)`.
+/// Length and inputs with their permitted changes: `33 min, u 0 .. 36 % (visited)`.
 pub(crate) fn limits(design: &Design) -> String {
     let of = |limits: &InputRange| {
         let from = if limits.visited { " (visited)" } else { "" };
@@ -182,7 +182,7 @@ pub(crate) struct ShownExperiment {
     pub decides: String,
 }
 
-/// The best experiments, and the same once more.
+/// The best experiments, and the repetition of the previous one.
 pub(crate) fn experiments(file: &OwnModelFile, design: &Design) -> Vec<ShownExperiment> {
     let shown = design.experiments.iter().take(SHOWN);
     let all = shown.chain(&design.again);
@@ -213,7 +213,7 @@ fn in_words(file: &OwnModelFile, design: &Design, experiment: &Experiment) -> Sh
     }
 }
 
-/// The experiments, the best first, and the same once more, as a table.
+/// The experiments, the best first, and the repetition of the previous one, as a table.
 fn listed(file: &OwnModelFile, design: &Design, look: Look) -> String {
     let mut title = limits(design);
     title.replace_range(..1, "E");

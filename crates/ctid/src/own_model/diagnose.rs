@@ -250,7 +250,7 @@ fn errors(diagnosis: &Diagnosis, look: Look) -> String {
     text + &state_rows(first)
 }
 
-/// On how many rows the initial states of held-out records were fitted.
+/// Number of rows for the fit of the held-out records' initial states.
 pub(super) fn state_rows(step: &Step) -> String {
     let Some(rows) = &step.state_rows else {
         return String::new();

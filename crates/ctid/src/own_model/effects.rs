@@ -1,4 +1,4 @@
-//! `effects = [...]` of a model file with a user's own model, and what `[effect."lag(u)"]` keeps of an effect.
+//! `effects = [...]` of a model file with a user's own model, and the kept values in `[effect."lag(u)"]`.
 
 use std::collections::BTreeMap;
 
@@ -34,15 +34,15 @@ pub(super) enum Setting {
 /// The effects of a model file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OwnEffects {
-    /// Identifiers of those that are on, in order.
+    /// Identifiers of the effects in the model, in order.
     pub on: Vec<String>,
     /// Values kept from earlier results.
     pub kept: BTreeMap<String, Kept>,
-    /// Parameters of theirs that are not fitted, and their values.
+    /// Fixed parameters of the effects, and their values.
     pub fixed: BTreeMap<String, f64>,
     /// Parameters of all effects by their names in the extended model, with the effect of each.
     pub parameters: BTreeMap<String, String>,
-    /// Tables of effects that are not on.
+    /// Tables of effects that are not in the model.
     pub waiting: Vec<String>,
 }
 

@@ -20,7 +20,7 @@ pub(crate) struct Exported {
     pub schema: u32,
     /// The model's name.
     pub model: String,
-    /// The records that it was fitted to; none where the values are those of its text.
+    /// The records of the fit; empty if the values are those of the text.
     pub fitted_to: Vec<String>,
     /// The text.
     #[serde(skip)]
@@ -40,7 +40,7 @@ impl Found for Exported {
     }
 }
 
-/// The text of a model with the values that it has, and those of `[known]`; `source`: where it is from, for its first line.
+/// The text of a model with its values, and those of `[known]`; `source`: origin, for the first line.
 ///
 /// # Errors
 /// Where the model file lacks a number that its effects need.
@@ -64,8 +64,8 @@ fn with_known(file: &OwnModelFile) -> ModelSpec {
 }
 
 impl FittedModel {
-    /// The model's text with its fitted values, and their standard errors in comments; it begins where the first record does. `source`:
-    /// where the model is from, for the first line.
+    /// The model's text with its fitted values, and their standard errors in comments; the initial states are those of the first record.
+    /// `source`: origin of the model, for the first line.
     ///
     /// # Errors
     /// Where the simulation is not finite at the fit.
@@ -113,7 +113,7 @@ impl FittedModel {
     }
 }
 
-/// The names of records, parts of one file once.
+/// The names of records; parts of one file once.
 fn names_of(records: &[Record]) -> Vec<String> {
     let mut names: Vec<String> = records.iter().map(|record| record.name.clone()).collect();
     names.dedup();
@@ -191,7 +191,7 @@ pub(crate) fn export(
     Ok((exported, records.summaries.clone()))
 }
 
-/// A number as a text has it.
+/// A number in the notation of a text.
 pub(crate) fn number(value: f64) -> Expression {
     let size = Expression::Number(value.abs());
     if value < 0.0 {

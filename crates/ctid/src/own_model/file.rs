@@ -1,4 +1,4 @@
-//! The model file of a user's own model, and the records that go with it.
+//! The model file of a user's own model, and its records.
 
 mod parse;
 
@@ -87,7 +87,7 @@ pub struct Records {
     pub summaries: Vec<ct_signals::ReadSummary>,
 }
 
-/// A model file, of a plant or of its user's own.
+/// A model file of a plant or of a user's own model.
 pub enum AnyModelFile {
     /// The file names one of the plants.
     Plant(Box<ModelFile>),
@@ -217,7 +217,7 @@ impl OwnModelFile {
         crate::input::on_one_clock(&mut all);
         crate::input::check_clocks(&all[..fitted], &summaries)?;
         let test = all.split_off(fitted);
-        // An input that is missing is held for a row; a longer gap parts the record.
+        // A missing input is held for one row; a longer gap splits the record.
         let whole = |records: Vec<Record>| -> Vec<Record> {
             let parts = records
                 .iter()
@@ -258,8 +258,8 @@ impl OwnModelFile {
         }
     }
 
-    /// Puts the channels into the units of the model, where the model file reads them in others, and gives them the names of its signals:
-    /// results name these, whatever the columns are called.
+    /// Converts the channels to the units of the model, if the model file gives other ones, and renames them: results have the names of the
+    /// model's signals.
     ///
     /// # Errors
     /// Where a column is in a unit of another dimension.

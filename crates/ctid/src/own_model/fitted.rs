@@ -1,4 +1,4 @@
-//! A user's own model fitted to records: what comparisons, simulations and exports begin with.
+//! A user's own model fitted to records: the basis of comparisons, simulations and exports.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,7 +14,7 @@ use super::simulate::simulated;
 use crate::Error;
 use crate::simulate::{ReadInputs, Simulated};
 
-/// The effects of the file are added one after the other within this share of the time.
+/// Share of the time for adding the effects of the file one after the other.
 const OF_EFFECTS: f64 = 0.5;
 
 /// A model, the records that it is fitted to, and the fit.
@@ -158,7 +158,7 @@ impl FittedModel {
         &self.options
     }
 
-    /// The limit on the time of the fit, and what it cut short.
+    /// The time limit of the fit, and the steps that were cut short.
     #[must_use]
     pub fn effort(&self) -> &Effort {
         &self.effort
@@ -172,7 +172,7 @@ impl FittedModel {
         setup_of(&self.model, &self.records)
     }
 
-    /// The uncertainty of all that was fitted, under the noise of the residual; `None` where the simulation at the fit is not finite.
+    /// The uncertainty of all fitted parameters, with the noise model of the residual; `None` if the simulation at the fit is not finite.
     ///
     /// # Errors
     /// As [`FittedModel::setup`].
@@ -280,7 +280,7 @@ fn setup_of<'a>(model: &'a OwnModelFile, records: &'a Records) -> Result<ModelSe
     setup.map_err(|error| blame(&records.records, &error))
 }
 
-/// An error of the computation, with the records that it is of.
+/// An error of the computation, with its records.
 pub(super) fn blame(records: &[Record], error: &greybox::Error) -> Error {
     let mut names: Vec<&str> = records.iter().map(|r| r.name.as_str()).collect();
     names.dedup();

@@ -128,7 +128,7 @@ impl<'f> OneByOne<'f> {
         })
     }
 
-    /// The columns of the two, and what the input does between samples.
+    /// The columns of both, and the hold of the input between samples.
     pub fn columns(&self) -> (Columns, Hold) {
         let all = &self.file.columns;
         let columns = Columns {
@@ -144,7 +144,7 @@ impl<'f> OneByOne<'f> {
         (columns, self.file.hold)
     }
 
-    /// The controller that drives this input by this output.
+    /// The controller between this output and this input.
     fn loop_controller(&self) -> Option<&OwnController> {
         let mut controllers = self.file.controllers.iter();
         controllers.find(|own| own.input == self.input && own.output == self.output)
@@ -160,8 +160,8 @@ impl<'f> OneByOne<'f> {
         controller.map(in_seconds).transpose()
     }
 
-    /// Puts a record of the two into the units of the model. A reference that no controller names contains no information about this loop,
-    /// and is left out.
+    /// Converts a record to the units of the model. A reference that no controller names contains no information about this loop, and is
+    /// dropped.
     ///
     /// # Errors
     /// Where a unit is of another dimension.
@@ -183,7 +183,7 @@ impl<'f> OneByOne<'f> {
         Ok(())
     }
 
-    /// The transfer function with the values of the text and of `[known]`; `None` where something is delayed.
+    /// The transfer function with the values of the text and of `[known]`; `None` if the model has a delay.
     ///
     /// `data`: a record, whose header says the unit of the time where the model file does not.
     ///

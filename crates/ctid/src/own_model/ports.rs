@@ -61,7 +61,7 @@ pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
     Ok(text)
 }
 
-/// Candidates, those of one effect that follow each other together, with its physics.
+/// Candidates, with consecutive ones of the same effect together, and the effect's physics.
 fn by_effect(all: &[&Candidate], words: &EffectWords, look: Look) -> String {
     let mut text = String::new();
     let mut rest = all;

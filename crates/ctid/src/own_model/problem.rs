@@ -10,7 +10,7 @@ use super::file::{OwnModelFile, Records};
 use crate::effort::EffortLevel;
 use crate::{Error, interrupt, numbers};
 
-/// The numbers of a record that effects are written in, by the effects' identifiers.
+/// Numbers of a record that the effects contain, by the effects' identifiers.
 pub type RecordNumbers = BTreeMap<String, BTreeMap<String, f64>>;
 
 /// Options of a search that Ctrl-C ends.
@@ -88,7 +88,7 @@ impl OwnModelFile {
         })
     }
 
-    /// The model with its effects as the file has them.
+    /// The model with its effects and their values in the file.
     fn as_it_stands(&self) -> Result<Believed, Error> {
         let refuse = |what: String| Error::File {
             file: self.name.clone(),
@@ -215,7 +215,7 @@ fn own_start(parameter: &ct_model::effects::EffectParameter) -> f64 {
     }
 }
 
-/// The unit of time of so many seconds.
+/// The unit of time with this number of seconds.
 fn unit_of(seconds: f64) -> &'static str {
     [(0.001, "ms"), (60.0, "min"), (3600.0, "h"), (86_400.0, "d")]
         .into_iter()

@@ -155,7 +155,7 @@ pub fn diagnosed(
     }
 }
 
-/// The number of an only output; NaN of several.
+/// The number of a single output; NaN for several.
 fn only(values: &[f64]) -> f64 {
     match values {
         [one] => *one,
@@ -180,7 +180,7 @@ fn parameter(estimate: &Estimate) -> Parameter {
     }
 }
 
-/// A document without a finding; `source`: where the noise is from. Records, steps, where they fail, tests of their residuals.
+/// A document without a finding; `source`: source of the noise. Records, steps, locations of the failures, tests of the residuals.
 fn document(
     file: &OwnModelFile,
     records: &Records,
@@ -359,7 +359,7 @@ fn of_step(
     }
 }
 
-/// Tests of a residual, on the first record: whiteness, and the input that leaves the clearest trace, its chance counted over all inputs.
+/// Tests of a residual, on the first record: whiteness, and the input with the smallest p-value, corrected for the number of inputs.
 fn tests(record: &Record, residual: &[f64]) -> ResidualTests {
     let samples = residual.iter().filter(|e| !e.is_nan()).count();
     let lags = (samples / 10).clamp(2, 60);

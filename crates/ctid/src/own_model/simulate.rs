@@ -13,7 +13,7 @@ use crate::simulate::{
     first_readings, read_inputs,
 };
 
-/// Simulates the model on the inputs of a record, after a fit to others where there are any.
+/// Simulates the model on the inputs of a record, after a fit to other records if there are any.
 ///
 /// # Errors
 /// One line that names the file, the place and the correction.
@@ -188,7 +188,7 @@ pub(super) fn simulated(
     })
 }
 
-/// The initial states: fitted to the first readings, on more of them where these do not tell, or as the text has them.
+/// The initial states: fitted to the first readings, to more of them if these are not sufficient, or from the text.
 fn states(
     setup: &ModelSetup,
     parameters: &[f64],

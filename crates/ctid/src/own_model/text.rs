@@ -7,7 +7,7 @@ use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
 
-/// The whole comparison, the first record drawn.
+/// The complete comparison, with a plot of the first record.
 pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     let [step] = &comparison.steps;
     let name = [std::slice::from_ref(&comparison.model), &comparison.effects].concat();

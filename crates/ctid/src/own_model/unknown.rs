@@ -1,4 +1,4 @@
-//! The shape of the error that no candidate explains, as a person reads it and as a file.
+//! The unexplained function, as text and as a file.
 
 use effect_search::Unknown;
 
@@ -30,7 +30,7 @@ pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
 
 /// Some of its values, as a table.
 pub(super) fn values(unknown: &Unknown, look: Look) -> String {
-    /// Every so many of them.
+    /// Distance between listed values.
     const EVERY: usize = 4;
     let head = |name: &str, unit: &str| match shown_unit(unit) {
         "" => name.to_string(),

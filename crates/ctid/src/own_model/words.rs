@@ -1,4 +1,4 @@
-//! Effects at the ports of a model in words: where each acts, and what it does there.
+//! Descriptions of effects at the ports of a model: place and action.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::effects::every_candidate;
 /// Descriptions of the effects of a model.
 pub(crate) struct EffectWords(BTreeMap<String, Words>);
 
-/// A port that effects sit at, by the name of its variable.
+/// A port with effects, by the name of its variable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Site {
     Input(String),
@@ -44,7 +44,7 @@ struct Words {
 impl EffectWords {
     /// Descriptions of all effects that can act in a model.
     pub fn of(spec: &ModelSpec, own: &BTreeMap<String, OwnCandidate>) -> Self {
-        // A model file has been read with these candidates.
+        // The candidates were checked when the model file was read.
         let all = every_candidate(spec, own).unwrap_or_default();
         let words = |candidate: &Candidate| match own.get(&candidate.id) {
             Some(own) => of_own(spec, own),
@@ -67,7 +67,7 @@ impl EffectWords {
         }
     }
 
-    /// The ports that it sits at.
+    /// The ports of the effect.
     pub fn sites(&self, id: &str) -> &[Site] {
         self.0.get(id).map_or(&[], |words| &words.sites)
     }
@@ -95,12 +95,12 @@ fn sites(spec: &ModelSpec, port: Port) -> Vec<Site> {
     }
 }
 
-/// A unit as it is shown: nothing after a number without dimension.
+/// A unit for display: empty for a dimensionless number.
 pub(crate) fn shown_unit(unit: &str) -> &str {
     if unit == "1" { "" } else { unit }
 }
 
-/// A candidate of the model file, by what its terms are added to.
+/// A candidate of the model file, by the targets of its terms.
 fn of_own(spec: &ModelSpec, own: &OwnCandidate) -> Words {
     let ports = own.terms.keys().filter_map(|key| port_of_term(spec, key));
     let ports: Vec<Port> = ports.collect();
@@ -143,7 +143,7 @@ fn named(about: &About) -> String {
 fn place(spec: &ModelSpec, port: Port) -> String {
     let of = |variable: Variable| named(spec.about(variable));
     let state = |i: usize| of(Variable::State(i));
-    // The text says more of what is measured than of the reading that is equal to it.
+    // The measured variable is better described in the text than an equal reading.
     let output = |i: usize| {
         let about = spec.about(spec.outputs[i].variable);
         let measured = match spec.outputs[i].variable {

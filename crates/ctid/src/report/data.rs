@@ -9,7 +9,7 @@ use super::missing_term::MissingTerm;
 use super::text;
 use crate::findings;
 
-/// Points of one curve that are drawn at most.
+/// Largest number of points of a curve.
 const POINTS: usize = 5_000;
 
 #[derive(Serialize)]
@@ -69,7 +69,7 @@ impl From<&Clock> for Axis {
 struct Record<'a> {
     name: &'a str,
     held_out: bool,
-    /// In the order of the outputs.
+    /// Curves in the order of the outputs.
     outputs: Vec<Curve>,
     inputs: Vec<Input<'a>>,
 }
@@ -100,7 +100,7 @@ struct ModelOutput<'a> {
     input_test: String,
     tests: &'a ResidualTests,
     failures: &'a Failures,
-    /// Over each record that was simulated.
+    /// Simulation of each record.
     runs: Vec<Run>,
     cloud: Option<Cloud>,
 }
@@ -201,7 +201,7 @@ fn scores(diagnosis: &Diagnosis, are: fn(&Diagnosis, &Score) -> bool) -> Vec<boo
 
 /// JSON without what could close a `<script>` element.
 pub(super) fn script_safe(data: &impl Serialize) -> String {
-    // Writing plain structs to memory cannot fail; an empty object would draw an empty report.
+    // Writing plain structs to memory cannot fail; an empty object would give an empty report.
     serde_json::to_string(data)
         .unwrap_or_else(|_| "{}".to_owned())
         .replace('<', "\\u003c")
@@ -303,7 +303,7 @@ fn cloud(series: &[Series]) -> Option<Cloud> {
     if residual.is_empty() {
         return None;
     }
-    // Sample for sample with the residual.
+    // Has the same samples as the residual.
     let level: Vec<f64> = fitted()
         .flat_map(|series| series.simulated.iter().take(series.measured.len()))
         .copied()

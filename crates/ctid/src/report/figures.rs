@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::data::rounded;
 use super::decimate::min_max;
 
-/// Draws them.
+/// Script that draws the figures.
 pub(super) const SCRIPT: &str = include_str!("figures.js");
 
 /// Points of one curve that are drawn at most.
@@ -21,9 +21,9 @@ pub(super) struct Figure {
     pub x_title: &'static str,
     pub x_unit: String,
     pub x_range: Option<[f64; 2]>,
-    /// A stretch of the abscissa that is shaded.
+    /// A shaded interval of the abscissa.
     pub x_band: Option<[f64; 2]>,
-    /// The ordinate is of names instead of numbers.
+    /// The ordinate has names instead of numbers.
     pub categories: bool,
     pub panels: Vec<Panel>,
     pub curves: Vec<Curve>,
@@ -35,7 +35,7 @@ pub(super) struct Panel {
     pub title: String,
     pub unit: String,
     pub log: bool,
-    /// In powers of ten where it is logarithmic.
+    /// Powers of ten for a logarithmic axis.
     pub range: Option<[f64; 2]>,
     /// Part of the height.
     pub share: f64,
@@ -76,13 +76,13 @@ pub(super) struct Curve {
     pub legend: bool,
     pub x: Vec<f64>,
     pub y: Values,
-    /// A band about the curve, or nothing.
+    /// A band around the curve, or nothing.
     pub lower: Vec<f64>,
     pub upper: Vec<f64>,
 }
 
 impl Figure {
-    /// Over time.
+    /// A figure over time.
     pub(super) fn over_time(id: &str, height: u32, panels: Vec<Panel>, curves: Vec<Curve>) -> Self {
         Self {
             id: id.to_owned(),

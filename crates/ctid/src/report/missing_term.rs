@@ -38,7 +38,7 @@ pub(crate) struct ComparedPort {
     pub placed: String,
     /// Fall of the criterion.
     pub bic_gain: String,
-    /// Fall of the squared error on parts that were left out of the fit; nothing where that was not computed.
+    /// Fall of the squared error on parts that were left out of the fit; empty if not computed.
     pub left_out: String,
 }
 

@@ -38,15 +38,14 @@ use self::text::{escape, significant};
 pub use self::udink::html as udink;
 use crate::findings::{self, Reader};
 
-/// Draws a diagnosis, here and on the page that is served.
+/// Script that draws a diagnosis, in the report and on the served page.
 pub(crate) const DIAGNOSIS_FIGURES: &str = include_str!("diagnosis_figures.js");
 const SCRIPT: &str = concat!(
     include_str!("diagnosis_figures.js"),
     include_str!("report.js")
 );
 
-/// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and
-/// no scores; what is empty is left out.
+/// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and no scores; empty parts are omitted.
 pub fn html(diagnosis: &Diagnosis) -> String {
     html_with(diagnosis, None)
 }
@@ -78,7 +77,7 @@ pub(crate) fn html_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> St
     })
 }
 
-/// The verdict, the fall of the error in large numbers, and what was looked at.
+/// The verdict, the fall of the error in large numbers, and the analysed data.
 fn headline(diagnosis: &Diagnosis) -> String {
     let effort = findings::effort(&diagnosis.effort, Reader::Commands);
     let sentences: String = diagnosis
@@ -109,7 +108,7 @@ fn verdict(diagnosis: &Diagnosis) -> String {
                 _ => "The missing effects are found",
             };
             let rest = if diagnosis.residual_unexplained {
-                "; something remains"
+                "; the residual is not noise"
             } else {
                 ""
             };

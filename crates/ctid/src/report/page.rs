@@ -15,7 +15,7 @@ pub(super) const NOTICES: &str = "<noscript><p class=\"notice\">The plots need a
      the findings and the tables do not.</p></noscript>\n\
      <p class=\"notice\" id=\"no-plots\" hidden></p>\n";
 
-/// A page to be.
+/// Parts of a page.
 pub(super) struct Page<'a> {
     /// HTML.
     pub title: &'a str,

@@ -1,5 +1,5 @@
-//! A diagnosis to try the report on: two tanks whose upper one overflows and whose pump has a dead
-//! zone, with the base model, the overflow, and both. The simulations are real, the scores made up.
+//! A diagnosis for tests of the report: two tanks with an overflow of the upper one and a dead zone of the pump, with the base model, the
+//! overflow, and both. The simulations are real, the scores are invented.
 
 mod signals;
 mod variants;

@@ -23,7 +23,7 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
         } else {
             "Fitted to"
         };
-        // The readings of all outputs are counted.
+        // Number of readings of all outputs.
         let count = if several { "readings" } else { "samples" };
         let mut text = format!("{}: {} {count}", escape(&record.name), record.samples());
         if let (Some(first), Some(last)) = (record.time.first(), record.time.last()) {
@@ -53,7 +53,7 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
     format!("<dl class=\"facts\">\n{items}</dl>\n")
 }
 
-/// The effects that were added, each with all that cannot be distinguished from it.
+/// The added effects, each with the effects that cannot be distinguished from it.
 pub(super) fn groups(diagnosis: &Diagnosis) -> String {
     let items: String = diagnosis
         .groups
@@ -201,7 +201,7 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
     } else {
         unit(&diagnosis.output_unit)
     };
-    // A user's own model is scored without a signature of each effect.
+    // A user's own model has scores without signatures of the effects.
     let visible = diagnosis.scores.iter().any(|s| s.visibility.is_finite());
     let of_signature = |cell: String| if visible { cell } else { String::new() };
     let rows: String = diagnosis
@@ -281,7 +281,7 @@ fn percent(part: f64) -> String {
     }
 }
 
-/// A table that scrolls inside its own box, also by the keyboard.
+/// A table that scrolls inside its box, also by the keyboard.
 pub(super) fn table(name: &str, head: &str, rows: &str, caption: &str) -> String {
     format!(
         "<h3>{name}</h3>\n<div class=\"scroll\" role=\"region\" aria-label=\"{name}\" tabindex=\"0\">\n\

@@ -133,7 +133,7 @@ fn p_value(p: f64) -> String {
     }
 }
 
-/// Fixed decimals with the sign of print.
+/// Fixed decimals with a typographic minus sign.
 fn decimals(value: f64, places: i32) -> String {
     numbers::decimals(value, places).replace('-', "−")
 }

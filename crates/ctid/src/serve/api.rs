@@ -27,9 +27,9 @@ use super::{App, downloads, own, state};
 use crate::edit;
 use crate::term_file::TermFile;
 
-/// Requests in JSON are no larger \[bytes\].
+/// Largest request in JSON \[bytes\].
 pub(super) const LARGEST_REQUEST: usize = 1 << 20;
-/// Characters of a record's name at most.
+/// Largest number of characters of a record's name.
 const LONGEST_NAME: usize = 100;
 
 type Answer = Result<Json<Value>, Refusal>;
@@ -53,7 +53,7 @@ pub(super) fn routes(app: &Arc<App>) -> Router<Arc<App>> {
         .route("/api/record", post(record))
 }
 
-/// Reads the request before anything is done with it.
+/// Reads the request before it is processed.
 async fn read_first(
     State(app): State<Arc<App>>,
     request: Request,
@@ -164,7 +164,7 @@ struct NewRecord {
     held_out: bool,
 }
 
-/// A name for messages and tables; it names no file of this machine.
+/// A name for messages and tables; it is not used as a file name.
 pub(super) fn plain_name(name: &str) -> String {
     let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
     let printable = last.chars().filter(|c| !c.is_control());
@@ -230,7 +230,7 @@ async fn settings(
 #[derive(Debug, Deserialize)]
 struct Text {
     text: String,
-    /// The one that was shown.
+    /// The displayed text.
     #[serde(default)]
     from: String,
 }
@@ -268,7 +268,7 @@ async fn own(
 enum Way {
     Add,
     Remove,
-    /// Adds what the diagnosis left unexplained, as a term of this name.
+    /// Adds the unexplained error of the diagnosis, as a term of this name.
     Keep,
 }
 

@@ -11,7 +11,7 @@ use tokio::time::timeout;
 
 use super::guard::Refusal;
 
-/// The next part of a body is here within this time after the one before it.
+/// Time limit between two parts of a body.
 const LONGEST_SILENCE: Duration = Duration::from_secs(10);
 /// Time limit for receiving a whole body.
 const LONGEST: Duration = Duration::from_secs(60);

@@ -30,17 +30,17 @@ use super::session::lock;
 
 /// Pause after a failed accept, for example with too many open files.
 const PAUSE: Duration = Duration::from_millis(100);
-/// Bytes of a request that are held before they are looked at; the head is smaller.
+/// Bytes of a request that are buffered before they are parsed; the head is smaller.
 const BUFFER: usize = 64 << 10;
 
 /// Limits of a client.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {
-    /// Connections at once on which the secret was known. A browser opens six.
+    /// Limit of simultaneous connections with the access key. A browser opens six.
     pub known: usize,
-    /// Connections at once on which it was not known yet.
+    /// Limit of simultaneous connections without the access key.
     pub unknown: usize,
-    /// The head of a request is here within this time after the connection or the request before it; else the connection ends.
+    /// Time limit for the head of a request after the connection or the preceding request; else the connection ends.
     pub head: Duration,
     /// Time limit for the transfer of a part of an answer; else the connection ends.
     pub silence: Duration,
@@ -110,7 +110,7 @@ struct Door {
     bounds: Bounds,
 }
 
-/// Serves for ever.
+/// Runs the server without end.
 pub(super) async fn serve(listener: TcpListener, guard: Guard, router: Router, bounds: Bounds) {
     let door = Arc::new(Door {
         guard,
@@ -143,7 +143,7 @@ pub(super) async fn serve(listener: TcpListener, guard: Guard, router: Router, b
         let service = service_fn(move |request| answer(at.clone(), of.clone(), request));
         let connection = http.serve_connection(TokioIo::new(watched), service);
         let (at, of) = (door.clone(), client.clone());
-        // The lock is held until it is among them: it may be over at once.
+        // The lock is held until the connection is in the list, because it may end at once.
         let mut all = lock(&door.clients.0);
         let task = tokio::spawn(async move {
             // A client that disconnects is no error.

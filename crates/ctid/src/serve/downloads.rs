@@ -30,7 +30,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/api/file", get(file))
 }
 
-/// The records as they are, before anything is fitted.
+/// The records before any fit.
 async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Response, Refusal> {
     let session = find(&app, &tab.session)?;
     let text = aside(move || {

@@ -15,7 +15,7 @@ use axum::http::{HeaderMap, HeaderValue, Request, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
-/// The largest body that is taken \[bytes\].
+/// The largest accepted body \[bytes\].
 pub(super) const LARGEST_BODY: usize = 64 << 20;
 
 /// Content security policy of the page: everything comes from this server. Plotly writes styles into its elements, and draws saved pictures
@@ -102,7 +102,7 @@ impl Guard {
         &self.secret
     }
 
-    /// Whether the request may be answered; its address is then the one after the secret.
+    /// Whether the request may be answered; its address is then the part after the access key.
     ///
     /// # Errors
     /// Why it is refused.

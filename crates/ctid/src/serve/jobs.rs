@@ -209,7 +209,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
     let run = move || {
         let show = |now: Progress| {
             let mut shown = lock(&progress);
-            // The threads report in any order: it never runs back within a phase.
+            // The threads report in any order: the progress never goes back within a phase.
             let back =
                 shown.is_some_and(|old: Progress| old.phase == now.phase && old.done > now.done);
             if !back {
@@ -311,7 +311,7 @@ fn compute(
     outcome.map_err(|error| work.files.blame(error))
 }
 
-/// Puts what came out where the page finds it.
+/// Stores the result for the page.
 fn settle(session: &mut Session, work: Input, outcome: Outcome) {
     let work = match (work, &outcome) {
         (Input::Own(work), Outcome::Own(found)) => return work.settle(session, found),

@@ -117,7 +117,7 @@ pub struct Arguments {
     /// Held-out record; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
-    /// Port on 127.0.0.1; the next that is free where it is taken, 0 for any
+    /// Port on 127.0.0.1; if it is in use, the next free one; 0 for any
     #[arg(long, value_name = "PORT", default_value_t = PORT)]
     port: u16,
 }
@@ -128,7 +128,7 @@ struct App {
     sessions: Sessions,
     /// Number of bytes of files that may be transferred at once.
     uploading: Semaphore,
-    /// Bytes of other requests that may be.
+    /// Number of bytes of other requests.
     asking: Semaphore,
 }
 
@@ -203,7 +203,7 @@ fn read(path: &Path, name: &str, held_out: bool) -> Result<Upload, Error> {
     Upload::new(name, held_out, content.into()).map_err(|refusal| Error::Usage(refusal.to_string()))
 }
 
-/// The port, or the next that is free.
+/// The port, or the next free one.
 async fn listen(port: u16) -> Result<TcpListener, Error> {
     let mut tried = port;
     loop {
@@ -234,7 +234,7 @@ async fn serve(listener: TcpListener, guard: Guard, sessions: Sessions) -> Resul
         loop {
             clock.tick().await;
             let watched = watched.clone();
-            // A tab that is busy is waited for.
+            // Waits for a busy tab.
             let _ = tokio::task::spawn_blocking(move || {
                 watched.sessions.stop_abandoned();
                 watched.sessions.make_room();

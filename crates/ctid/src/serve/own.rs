@@ -63,7 +63,7 @@ const EXAMPLES: [Example; 8] = examples!(
 pub(super) struct Own {
     /// The text of the model.
     pub text: String,
-    /// The model file: columns, what is known, side measurements.
+    /// The model file: columns, known parameters, side measurements.
     pub file: String,
     /// Latest fit.
     pub fit: Option<Fit>,
@@ -73,7 +73,7 @@ pub(super) struct Own {
     pub design: Option<Designed>,
     /// Content of the report: the latest of both.
     pub shown: Option<Arc<report::Document>>,
-    /// Columns and what is held, as they were read last: a text that is being typed is no model for a while.
+    /// Columns and hold from the last valid model: a text that is being typed is invalid for a while.
     read: (Columns, ReadOptions),
 }
 
@@ -93,7 +93,7 @@ pub(super) struct Fit {
 #[derive(Debug, serde::Deserialize)]
 #[serde(tag = "do", rename_all = "lowercase")]
 pub(super) enum Change {
-    /// A user's own model in place of a plant.
+    /// A user's own model instead of a plant.
     Begin,
     /// Return to the built-in plants.
     End,
@@ -106,14 +106,14 @@ pub(super) enum Change {
     },
     /// Sets the column of a signal or of the time.
     Column { signal: String, column: String },
-    /// An effect into the model file, with what the diagnosis found of it.
+    /// Adds an effect to the model file, with its values from the diagnosis.
     Add { effect: String },
-    /// An effect out of it.
+    /// Removes an effect from the model file.
     Remove { effect: String },
 }
 
 impl Own {
-    /// The model file that the command line names, and the text that it names.
+    /// The model file from the command line, and its text.
     pub(super) fn read(path: &Path) -> Result<Self, Error> {
         let file = read_text(path)?;
         let table: toml::Table = file.parse().unwrap_or_default();
@@ -140,7 +140,7 @@ impl Own {
         OwnModelFile::parse_with(Path::new(FILE), &self.file, self.named_text())
     }
 
-    /// Columns and what is held.
+    /// Columns and hold.
     pub(super) fn layout(&self) -> (Columns, ReadOptions) {
         self.read.clone()
     }

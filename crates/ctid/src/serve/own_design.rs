@@ -10,7 +10,7 @@ use crate::output::Found as _;
 use crate::own_model::{OwnModelFile, OwnProposal, design_limits, design_sentences, experiments};
 use crate::report::rounded;
 
-/// The seed of `ctid design` where none is given.
+/// The default seed of `ctid design`.
 const SEED: u64 = 1;
 
 /// Settings of an input in the page's form.
@@ -23,7 +23,7 @@ pub(super) struct AppliedInput {
     slew: Option<f64>,
 }
 
-/// The limits of an experiment. An input whose range or slew is given may be moved.
+/// The limits of an experiment. An input with a range or a slew may change.
 pub(super) fn limits(inputs: &[AppliedInput], duration: Option<f64>) -> Limits {
     let applied = inputs.iter();
     let applied = applied.filter(|i| i.apply || i.range.is_some() || i.slew.is_some());
@@ -63,7 +63,7 @@ impl Designed {
 
     pub(super) fn held(&self) -> usize {
         let record = self.record.as_ref().map_or(0, String::len);
-        // The body has the same numbers once more.
+        // The JSON for the page contains the same numbers.
         2 * record
     }
 }

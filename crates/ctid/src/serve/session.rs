@@ -78,7 +78,7 @@ pub(super) struct Session {
     /// Path of the model file, if there is one; else the text exists in memory only.
     pub file: Option<PathBuf>,
     pub text: String,
-    /// A user's own model, where one is looked at in place of a plant.
+    /// A user's own model, if it replaces a plant.
     pub own: Option<Own>,
     /// Serialises the fits of a user's own model, including stopped ones.
     pub own_fits: Arc<Mutex<()>>,
@@ -95,9 +95,9 @@ pub(super) struct Session {
     pub job: Option<Job>,
     /// Reason why the last computation or change failed.
     pub failure: Option<String>,
-    /// The models run on the measured command, also where the loop could be simulated.
+    /// The models run on the measured command although the loop could be simulated.
     pub measured: bool,
-    /// The model file could not be read when it was looked at last.
+    /// The model file could not be read at the last attempt.
     lost: bool,
     numbers: u64,
 }
@@ -223,7 +223,7 @@ impl Session {
         model_file::parse(&self.model_name(), &self.text)
     }
 
-    /// The unit of a model's output: that of the first record that can be read, else that of the model's columns.
+    /// The unit of a model's output: that of the first readable record, else that of the model's columns.
     pub(super) fn output_unit<'a>(&'a self, model: &'a ModelFile) -> &'a str {
         let mut read = self.records.iter().filter_map(Upload::as_read);
         let output = read.next().and_then(|record| record.outputs.first());
@@ -351,7 +351,7 @@ impl Session {
         self.failure = None;
     }
 
-    /// Stops what nobody has asked after for so long, in words where the page would not begin it again by itself.
+    /// Stops a computation whose page has sent no request for this time; returns a message if the page would not restart it.
     pub(super) fn stop_abandoned(&mut self) {
         let Some(job) = &self.job else { return };
         let what = match job.kind {
@@ -367,7 +367,7 @@ impl Session {
         }
     }
 
-    /// Ends the search that runs with the best that it has found.
+    /// Ends the running search with its best result so far.
     pub(super) fn finish(&mut self) {
         if let Some(job) = &self.job {
             job.interrupt.store(true, Ordering::Relaxed);

@@ -36,7 +36,7 @@ pub(super) fn job(session: &Session) -> Value {
     })
 }
 
-/// Everything but curves.
+/// The complete state except curves.
 pub(super) fn state(session: &mut Session) -> Value {
     let (columns, options) = session.layout();
     let records: Vec<Value> = session
@@ -65,7 +65,7 @@ pub(super) fn state(session: &mut Session) -> Value {
     let warnings: Vec<String> = remarks
         .chain(warnings.iter().map(ToString::to_string))
         .collect();
-    // The form offers the columns of the first file; all have to have the same.
+    // The form offers the columns of the first file; all files need the same columns.
     let headings = session
         .records
         .first()
@@ -149,7 +149,7 @@ fn about(record: &Record) -> Value {
     })
 }
 
-/// Effects and where each acts, where there is a choice; terms of the user's own by their name.
+/// Effects with their places, if there is a choice; terms of the user's own by their name.
 type Chain = Vec<(String, Option<String>)>;
 
 fn effects_of(model: &ModelFile) -> Chain {
@@ -194,7 +194,7 @@ fn choices(session: &Session, model: &ModelFile, kin: &[&Arc<Fitted>]) -> Vec<Ch
 
 fn point(fitted: &Fitted) -> Value {
     let effects = effects_of(&fitted.model);
-    // Models that were fitted one by one have no noise in common by which errors of several outputs become one number.
+    // Separately fitted models have no common noise, so the errors of several outputs are not combined.
     let several = fitted.errors.0.len() > 1;
     let errors = fitted.errors.0.iter().enumerate();
     let errors = errors.map(|(k, (name, rmse))| {
@@ -254,7 +254,7 @@ fn vessel_names(plant: Plant) -> Vec<&'static str> {
     names
 }
 
-/// Every effect that the domain offers, at every place where it can act on a plant.
+/// Every effect of the domain, at every place where it can act on a plant.
 fn sites(model: &ModelFile, domain: Domain) -> Vec<Value> {
     let (plant, known) = (model.plant, &model.known);
     let offered = CATALOGUE.iter().filter(|effect| domain.offers(effect));

@@ -1,4 +1,4 @@
-//! A record as the page has sent it, and as it was read last.
+//! A record as sent by the page, and as last read.
 
 use std::sync::Arc;
 
@@ -10,9 +10,9 @@ use ct_signals::{
 use super::guard::Refusal;
 use super::held::of_record;
 
-/// Columns of a file at most: what the page can offer for a choice.
+/// Largest number of columns of a file: the page offers them for choice.
 const MOST_COLUMNS: usize = 500;
-/// Bytes in which the header has to be found.
+/// The header has to end within this number of bytes.
 const LARGEST_HEAD: usize = 1 << 20;
 
 /// A record that could be read, and what was missing in it.
@@ -30,7 +30,7 @@ pub(super) struct Upload {
 }
 
 impl Upload {
-    /// Takes a file; the header alone is looked at.
+    /// Accepts a file; only the header is checked.
     ///
     /// # Errors
     /// Where it is no CSV, or has too many columns.
@@ -62,7 +62,7 @@ impl Upload {
         self.content.len() + read.map_or(0, |(record, _)| of_record(record))
     }
 
-    /// The record as it was read last.
+    /// The record as last read.
     pub(super) fn as_read(&self) -> Option<&Record> {
         let (_, _, read) = self.read.as_ref()?;
         read.as_ref().ok().map(|(record, _)| record.as_ref())
@@ -75,7 +75,7 @@ impl Upload {
         (!summary.is_plain()).then(|| summary.to_string())
     }
 
-    /// The record with what was missing in it, read again only where the columns have changed.
+    /// The record with a note on missing samples, read again only after a change of the columns.
     pub(super) fn reading(
         &mut self,
         columns: &Columns,
@@ -90,7 +90,7 @@ impl Upload {
         })
     }
 
-    /// The record, read again only where the columns have changed.
+    /// The record, read again only after a change of the columns.
     pub(super) fn record(
         &mut self,
         columns: &Columns,
@@ -112,7 +112,7 @@ impl Upload {
     }
 }
 
-/// The first lines of a file. One long line may hold as many columns as bytes, each of them far larger in memory.
+/// The first lines of a file. A long line may have as many columns as bytes, each far larger in memory.
 fn head<'a>(name: &str, content: &'a [u8]) -> Result<&'a [u8], Refusal> {
     let Some(first) = content.get(..LARGEST_HEAD) else {
         return Ok(content);

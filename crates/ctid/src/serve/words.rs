@@ -120,7 +120,7 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
         "headline": headline,
         "tone": tone,
         "groups": groups.collect::<Vec<_>>(),
-        // The first sentences are those of the groups.
+        // The first sentences belong to the groups.
         "sentences": diagnosis.sentences.get(diagnosis.groups.len()..).unwrap_or_default(),
         "before": diagnosis.steps.first().map_or("-".to_owned(), |step| errors(diagnosis, step)),
         "noise": noise(diagnosis),
@@ -135,7 +135,7 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
     })
 }
 
-/// Ranked effects that are worth a fit of their own.
+/// Number of ranked effects that are offered for a separate fit.
 const RANKED: usize = 8;
 
 /// The effects that were found and the best of the ranking, each with its place.

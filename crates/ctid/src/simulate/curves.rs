@@ -24,7 +24,7 @@ pub(crate) struct Curves {
 }
 
 impl Curves {
-    /// A row for each instant: record, time, inputs, and of each output what was measured, the model and the residual.
+    /// A row for each instant: record, time, inputs, and for each output the measured value, the model and the residual.
     pub fn csv(&self) -> String {
         let time = self.records.first().map(|r| r.time.header.clone());
         let mut head = vec!["record".to_string(), time.unwrap_or_default()];

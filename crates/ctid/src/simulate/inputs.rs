@@ -1,4 +1,4 @@
-//! The record on whose inputs a model is simulated: read, and whole.
+//! The input record of a simulation: read and checked for completeness.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ pub(crate) struct Inputs {
     pub path: PathBuf,
     /// Options for reading, except the hold.
     pub options: ReadOptions,
-    /// First readings of each output to which initial states are fitted.
+    /// Number of first readings of each output for the fit of initial states.
     pub first: usize,
 }
 
@@ -43,7 +43,7 @@ pub(crate) fn read_inputs(
 }
 
 impl ReadInputs {
-    /// Inputs that were read, which have to be whole; `path` names them in messages.
+    /// Inputs that were read, which have to be complete; `path` is their name in messages.
     ///
     /// # Errors
     /// Where a sample of an input is missing, or rows are, with the place and the correction.
@@ -95,13 +95,13 @@ fn check_whole(path: &Path, record: &Record) -> Result<(), Error> {
     Ok(())
 }
 
-/// Whether some output was measured.
+/// Whether some output has readings.
 pub(crate) fn begins_with_readings(record: &Record) -> bool {
     let has = |output: &Channel| output.missing() < output.values.len();
     record.outputs.iter().any(has)
 }
 
-/// A record up to where the last of its outputs has so many readings, without what the others have beyond theirs.
+/// A record up to the row where each of its outputs has this number of readings, without further readings.
 pub(crate) fn first_readings(record: &Record, count: usize) -> Record {
     let end = |output: &Channel| {
         let present = output.values.iter().enumerate();

@@ -32,7 +32,7 @@ use crate::output::Found;
 
 /// Coverage of the band.
 pub(crate) const LEVEL: f64 = 0.95;
-/// Initial states are fitted to so many first readings of each output, as those of a held-out record are.
+/// Number of first readings of each output for the fit of initial states, as for a held-out record.
 pub(crate) const FIRST_READINGS: usize = 5;
 
 /// Half the widths of the bands of an output \[its unit\].
@@ -68,7 +68,7 @@ pub enum StateSource {
     Readings,
     /// The model's text.
     Text,
-    /// The plant rests under the first inputs.
+    /// Steady state of the plant under the first inputs.
     Rest,
 }
 
@@ -100,7 +100,7 @@ pub struct Simulated {
     pub length: f64,
     /// Time of each row.
     pub time: TimeColumn,
-    /// The bands of readings are written too.
+    /// Whether the bands of readings are written too.
     #[serde(skip)]
     pub readings: bool,
 }
@@ -132,7 +132,7 @@ pub(crate) fn header(name: &str, unit: &str) -> String {
 pub(crate) fn csv_text(rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
-        // Into memory nothing fails.
+        // Writing to memory does not fail.
         let _ = writer.write_record(&row);
     }
     let bytes = writer.into_inner().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The time of rows as a file writes it that reads back as the same.
+//! Times of rows in the format of a file, which reads back identically.
 
 use std::path::Path;
 
@@ -17,8 +17,7 @@ pub struct TimeColumn {
 }
 
 impl TimeColumn {
-    /// The times of a record that was read from a file with such columns: dates with their offset from UTC, or numbers in the unit of the
-    /// column.
+    /// The times of a record that was read with these columns: dates with their offset from UTC, or numbers in the unit of the column.
     ///
     /// # Errors
     /// Where the file cannot be read any more.

@@ -64,7 +64,7 @@ pub(crate) fn other_settings(changed: &[Changed]) -> String {
     )
 }
 
-/// The 5 to 95 % range, both ends with the decimals that its width deserves: of 20 to 200 last digits.
+/// The 5 to 95 % range, both ends with decimals according to its width: 20 to 200 units of the last digit.
 pub(crate) fn range(cell: &Cell, between: &str) -> String {
     let width = cell.q95 - cell.q05;
     if !width.is_finite() {
@@ -75,7 +75,7 @@ pub(crate) fn range(cell: &Cell, between: &str) -> String {
     format!("{low}{between}{high}")
 }
 
-/// The factor of `P(0)` as a person writes it.
+/// The factor of `P(0)` for display.
 pub(crate) fn factor(row: &LargerP) -> String {
     if row.factor < 1e6 {
         format!("{}", row.factor)

@@ -64,7 +64,7 @@ fn of_output(diagnosis: &Diagnosis, output: usize) -> String {
     name.map_or(String::new(), |name| format!(", {name}"))
 }
 
-/// The residual of each of these steps over time in the first record, those of an output on one scale.
+/// The residual of each of these steps over time in the first record, those of an output with a common scale.
 pub(crate) fn residuals(diagnosis: &Diagnosis, steps: &[&Step], look: Look) -> String {
     let outputs = 0..diagnosis.outputs.len();
     outputs
@@ -114,7 +114,7 @@ fn residuals_of(diagnosis: &Diagnosis, steps: &[&Step], output: usize, look: Loo
     text
 }
 
-/// The first record, with what was measured and simulated of this output.
+/// The first record, with the measured and simulated values of this output.
 fn first_record<'a>(
     diagnosis: &'a Diagnosis,
     step: &'a Step,

@@ -6,7 +6,7 @@ use super::{BAR, compared, model_name, step_name, with_unit};
 use crate::look::{Look, Side, table};
 use crate::{findings, numbers};
 
-/// The error from step to step: of each output, and where there are several of all together.
+/// The error from step to step: for each output and, if there are several, for all together.
 pub(crate) fn trail(diagnosis: &Diagnosis, look: Look) -> String {
     // The residual of a single model does not separate its noise from its model error.
     let floor_known = !compared(diagnosis);
@@ -63,7 +63,7 @@ struct Errors<'a> {
     title: &'a str,
     of_steps: Vec<(f64, Option<f64>)>,
     floor: f64,
-    /// The floor is shown.
+    /// Whether the floor is shown.
     floor_known: bool,
     unit: &'a str,
 }

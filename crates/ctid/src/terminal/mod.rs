@@ -138,7 +138,7 @@ fn step_name(diagnosis: &Diagnosis, step: &Step) -> String {
     }
 }
 
-/// The whole model of a step, in few words.
+/// The complete model of a step, in few words.
 fn model_name(diagnosis: &Diagnosis, step: &Step) -> String {
     let added = diagnosis
         .steps

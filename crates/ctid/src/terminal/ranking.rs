@@ -1,4 +1,4 @@
-//! The catalogue, one effect at a time, as wide as the terminal allows.
+//! The catalogue, one effect at a time, for the width of the terminal.
 
 use missing_effect::{Diagnosis, Parameter, Score, Verdict};
 
@@ -131,7 +131,7 @@ fn size(parameter: &Parameter, with_error: bool) -> String {
     format!("{name} {}", with_unit(&value, &parameter.unit))
 }
 
-/// The smallest size that the data would have shown.
+/// The minimum detectable size.
 fn visible_from(score: &Score) -> String {
     match (score.smallest_visible, &score.size) {
         (Some(smallest), Some(size)) => with_unit(&numbers::significant(smallest, 2), &size.unit),

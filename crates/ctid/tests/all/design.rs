@@ -1,10 +1,10 @@
-//! `ctid design` from the program's outside: what it proposes, what it writes, and what it refuses.
+//! `ctid design` through the program: its proposals, files and errors.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use crate::common::{Place, Tanks};
 
-/// A tank whose reading lags: or its pump.
+/// A tank with a lag of the reading, or of the pump.
 fn lagging() -> Place {
     let tanks = Tanks {
         hidden: vec![("sensor_lag", 0, vec![8.0])],

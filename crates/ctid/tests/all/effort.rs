@@ -50,7 +50,7 @@ fn what_is_known_of_the_records_beforehand_is_said() {
     assert!(said("step.csv").starts_with(warning));
 }
 
-/// The first interrupt asks for the best so far, the second ends the program at once.
+/// The first interrupt gives the best result so far, the second one ends the program at once.
 #[test]
 #[cfg(unix)]
 fn a_second_interrupt_ends_it_at_once() {

@@ -1,4 +1,4 @@
-//! Identification in a loop: what is found, and what is refused.
+//! Identification in a loop: results and errors.
 
 #![allow(clippy::unwrap_used)]
 
@@ -85,7 +85,7 @@ fn without_noise_the_plant_is_found_in_the_loop_and_without() {
             let record = record(&plant, &controller, None, 0);
             for method in METHODS {
                 let found = found(&record, method, order, LevelChoice::Auto);
-                // A regression on u that is no line between samples is a little off.
+                // A regression on an input that is not linear between samples has a small error.
                 let close = match method {
                     Method::Fcloe => 1e-6,
                     _ => 0.02,
@@ -194,7 +194,7 @@ fn a_slow_transient_is_no_rest() {
                     found.warnings.iter().any(said),
                     in_loop.levels_from == LevelChoice::Mean
                 );
-                // Means still bias the regressions; levels that were taken for rest gave 74 s.
+                // Means still bias the regressions; levels that were mistaken for rest gave 74 s.
                 let near = match method {
                     Method::RecursiveFcloe => 0.02,
                     _ => 0.1,
@@ -213,7 +213,7 @@ fn a_slow_transient_is_no_rest() {
     }
 }
 
-/// Means of the record are those of all of it, also for a recursion that is started from its beginning.
+/// Means are those of the whole record, also for a recursion that starts at its beginning.
 #[test]
 fn the_levels_are_the_same_for_both() {
     let order = Order { n: 1, m: 0 };
@@ -263,7 +263,7 @@ fn drifting(from: f64, to: f64, rows: usize) -> Record {
     }
 }
 
-/// A drift is followed with a delay of a memory, without asking for it; what is asked for is used.
+/// By default a drift is followed with a delay of one memory; a requested memory is used.
 #[test]
 fn a_recursion_follows_a_drift() {
     let (rows, from, to) = (12_000, 110.0, 143.0);

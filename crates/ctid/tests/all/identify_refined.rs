@@ -1,4 +1,4 @@
-//! SRIVC and RIVC on files: delays, integrators, two inputs, several records, loops, and what is refused.
+//! SRIVC and RIVC on files: delays, integrators, two inputs, several records, loops, and errors.
 
 use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
 use ct_signals::{excitation, noise};
@@ -42,7 +42,7 @@ fn add(parts: &[&[f64]]) -> Vec<f64> {
         .collect()
 }
 
-/// A parameter of the result is within so many standard errors, and known to a tenth.
+/// A parameter of the result is within this number of standard errors of the truth, and its standard error is below a tenth.
 fn holds(found: &Value, name: &str, truth: f64) {
     let parameters = found["parameters"].as_array().unwrap();
     let parameter = parameters.iter().find(|p| p["name"] == name).unwrap();

@@ -1,4 +1,4 @@
-//! `ctid monitor` from outside: rows go in through a pipe.
+//! `ctid monitor` as a process: rows go in through a pipe.
 
 mod bad_rows;
 mod dates;
@@ -164,7 +164,7 @@ fn the_ways_to_write_rows_are_those_of_the_csv_reader() {
     assert_eq!(events(&lone.out).len(), events(&plain.out).len());
 }
 
-/// A logger that starts again with its columns in another order swaps nothing.
+/// A logger that restarts with another order of its columns does not exchange signals.
 #[test]
 fn a_header_that_comes_again_in_another_order_is_followed() {
     let rows = rows(1400, 1100);

@@ -1,4 +1,4 @@
-//! Candidates of the user's own from the command line: named with their place, in the monitor's isolation as well.
+//! Candidates of the user's own on the command line: named with their place, also in the monitor's isolation.
 
 use std::fmt::Write;
 use std::io::Write as _;
@@ -22,7 +22,7 @@ end Block;
 
 const CANDIDATE: &str = "[candidates.vent]\nparameters = { q = { unit = \"W/K\", min = 0.0, start = 0.1 } }\nterms = { T = \"-q*max(T - 60, 0)\" }\n";
 
-/// k = 0.4 W/K, g = 0.6 W/%, every 5 s; from row `vent` on more is lost above 60 degC.
+/// k = 0.4 W/K, g = 0.6 W/%, every 5 s; from row `vent` on there is an additional loss above 60 degC.
 fn rows(count: usize, vent: usize) -> String {
     let mut text = String::from("t [s],u [%],y [degC]\n");
     let mut draw = Random(11);
@@ -83,7 +83,7 @@ fn a_candidate_is_found_with_its_place_added_and_removed() {
     assert!(said.contains("effects = []"), "{said}");
 }
 
-/// Another member of a group is added with the size that it had alone.
+/// Another member of a group is added with the size of its single fit.
 #[test]
 fn what_stands_in_for_an_effect_is_added_with_its_size_too() {
     let other = "[candidates.draught]\nparameters = { w = { unit = \"W/K\", min = 0.0, start = 0.1 } }\nterms = { T = \"-w*max(T - 60.3, 0)\" }\n";

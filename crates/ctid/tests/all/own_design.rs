@@ -31,7 +31,7 @@ fn heated() -> String {
         let read = |level: f64, draw: &mut Random| 20.0 + level + 0.2 * draw.normal();
         let (y1, y2) = (read(first, &mut draw), read(second, &mut draw));
         writeln!(text, "{:.6},{u},{w},{y1:.4},{y2:.4}", row as f64 / 6.0).unwrap();
-        // Half of the interval still has the command before.
+        // In half of the interval the previous command is still active.
         for command in [before, u] {
             let decay = (-5.0 * 0.8 / 50.0_f64).exp();
             first = decay * first + (1.0 - decay) * command / 0.8;

@@ -93,7 +93,7 @@ fn what_a_diagnosis_finds_is_added_and_the_error_falls() {
     assert_eq!(kept["record"]["duration"].as_float(), Some(1995.0));
     assert_eq!(kept["record"]["interval"].as_float(), Some(5.0));
 
-    // The error falls to the noise, and what is fitted is what was hidden.
+    // The error falls to the noise, and the fitted values are the hidden ones.
     let mended = place.result("compare a.csv --model m.toml");
     assert_eq!(mended["effects"][0], "lag(y)");
     let (before, after) = (&bare["steps"][0], &mended["steps"][0]);
@@ -115,7 +115,7 @@ fn what_a_diagnosis_finds_is_added_and_the_error_falls() {
     let rmse = again["steps"][0]["rmse"].as_f64().unwrap();
     assert!((rmse / after - 1.0).abs() < 0.01, "{rmse} {after}");
 
-    // Taken out, the table waits, and the model is what it was.
+    // After removal the table is kept, and the model is as before.
     let said = place.succeeds("remove lag(y) --model m.toml");
     assert!(
         said.contains("effects = []") && said.contains("stays for the day"),
@@ -154,7 +154,7 @@ fn without_a_result_the_effect_is_fitted_from_its_own_starts() {
     let tau = table["effect"]["lag(y)"]["tau"].as_float().unwrap();
     let (fitted, _) = parameter(&mended["steps"][0], "lag_y_tau");
     assert!((tau / fitted - 1.0).abs() < 1e-4, "{tau} {fitted}");
-    // Fixed, it is not fitted.
+    // A fixed parameter is not fitted.
     let fixed = place
         .read("m.toml")
         .replace("tau = ", "fixed = [\"tau\"]\ntau = ");
@@ -182,7 +182,7 @@ fn the_mended_model_is_written_and_read_and_runs() {
     let alone = place.result("compare a.csv --model mended.toml");
     let rmse = |result: &Value| result["steps"][0]["rmse"].as_f64().unwrap();
     assert!((rmse(&alone) / rmse(&mended) - 1.0).abs() < 1e-3);
-    // Unfitted, it gives the curves of the fit.
+    // Without a fit it gives the curves of the fit.
     place.succeeds("simulate mended.toml a.csv --out y.csv");
     let column = |name: &str, at: usize| -> Vec<f64> {
         let text = place.read(name);

@@ -1,4 +1,5 @@
-//! Candidates of a model file whose absence is a limit: RC pairs of a cell. And texts that cannot be simulated or have units that are none.
+//! Candidates of a model file that are absent only in a limit: RC pairs of a cell. And texts that cannot be simulated or have unknown
+//! units.
 
 use std::fmt::Write;
 

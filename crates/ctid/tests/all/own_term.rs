@@ -5,7 +5,7 @@
 use crate::common::{Place, Tanks, lasting};
 use plants::{Fitted, Term, Variable};
 
-/// A tank with a wave in the level that no effect describes.
+/// A tank with an oscillation as a function of the level that no effect describes.
 fn wave(seed: u64) -> Tanks {
     let knots: Vec<f64> = (0..160).map(|i| 0.25 * f64::from(i)).collect();
     Tanks {
@@ -202,7 +202,7 @@ fn a_shape_that_cannot_be_is_refused() {
         "compare a.csv --model tank.toml",
         &["[term.mine] has at in m, but with a.csv it would be in cm"],
     );
-    // A table that a person has spoilt.
+    // A damaged table.
     let good = place.read("tank.toml");
     place.write(
         "tank.toml",

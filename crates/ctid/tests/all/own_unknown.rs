@@ -1,4 +1,4 @@
-//! The shape of the error that no candidate explains: where it acts, what it depends on, as a file, and kept in the model.
+//! The unexplained function: its place, its variable, its file, and its use in the model.
 
 use std::fmt::Write;
 

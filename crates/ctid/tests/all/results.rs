@@ -37,7 +37,7 @@ fn parameters(step: &Value) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// The keys, types and rules that `docs/results.md` promises of the JSON of `diagnose`.
+/// The keys, types and rules that `docs/results.md` specifies for the JSON of `diagnose`.
 fn fulfils_the_contract(json: &Value, held_out: bool) {
     assert_eq!(json["schema"], 2);
     let verdict = json["verdict"].as_str().unwrap();
@@ -228,8 +228,7 @@ fn the_ranking_keeps_the_error_at_eighty_columns() {
 
 #[test]
 fn something_that_nothing_explains_is_a_result() {
-    // A sensor that is off by a wave of its reading: no effect of the catalogue. Chance decides
-    // whether one of them imitates it on a record.
+    // A sensor error that oscillates with its reading: no effect of the catalogue. By chance one of them may resemble it on a record.
     let unexplained = (1..8).any(|seed| {
         let tanks = Tanks {
             seed,

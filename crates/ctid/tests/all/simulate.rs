@@ -47,7 +47,7 @@ fn record(rows: usize, seed: u64, noise: f64, begin: f64) -> Vec<[f64; 5]> {
             u = 100.0 * draw();
         }
         let room = 20.0 + 2.0 * (row as f64 / 30.0).sin();
-        // Six uniform numbers are nearly normal.
+        // The sum of six uniform numbers is nearly normal.
         let mut v = || noise * ((0..6).map(|_| draw()).sum::<f64>() - 3.0) * 2.0_f64.sqrt();
         let loss = k * (t - room);
         all.push([10.0 * row as f64, u, room, t + v(), loss + 0.1 * v()]);
@@ -132,7 +132,7 @@ fn new_inputs_are_simulated_with_a_band() {
         );
         assert!(high[k] - low[k] < 0.06, "row {k}");
     }
-    // A reading scatters by its noise.
+    // A reading varies with its noise.
     let wide = column(&text, "block reading upper [degC]")[70] - mean[70];
     assert!((0.08..0.13).contains(&wide), "{wide}");
     // If the first state is known exactly, its band has zero width.
@@ -167,7 +167,7 @@ fn initial_states_follow_the_first_readings() {
         mean[0]
     );
     assert!((mean[149] - clean[149][3]).abs() < 0.05);
-    // The initial state is forgotten, and its error with it.
+    // The initial state is forgotten, and so is its error.
     assert!(high[149] - low[149] < 0.5 * (high[0] - low[0]));
     // More readings, a narrower band.
     place.write("begun.csv", csv(&record(150, 3, 0.05, 31.0), 40));

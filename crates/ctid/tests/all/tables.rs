@@ -68,7 +68,7 @@ fn the_result_holds_every_cell_for_both_rules() {
     }
     assert!(!page.contains("http://") && !page.contains("https://"));
 
-    // The seed decides, not the threads; and its own files may be written again.
+    // The result depends on the seed and not on the threads; and files of the program may be overwritten.
     let mut threads = place.command("tables --runs 25 --seed 3 --json b.json --report a.html");
     threads.env("RAYON_NUM_THREADS", "3");
     assert_eq!(common::outcome(threads).code, Some(0));
@@ -183,7 +183,7 @@ fn the_second_paper_is_reproduced_cell_by_cell() {
     }
     assert!(!page.contains("http://") && !page.contains("https://"));
 
-    // The seed decides, not the threads.
+    // The result depends on the seed and not on the threads.
     let mut threads = place.command("tables baysse --runs 20 --seed 5 --json b.json");
     threads.env("RAYON_NUM_THREADS", "3");
     assert_eq!(common::outcome(threads).code, Some(0));
@@ -233,7 +233,7 @@ fn the_emulated_rig_misses_its_dead_zone() {
     assert!(before > 0.5 && after < 0.1, "{before} {after}");
     // The best single effect would be a backlash, which resembles the dead zone and the sensor's filter together.
     let (effects, before, after) = missing("tank.toml", "");
-    // A constant leak is the same as long as the command stays above the dead zone.
+    // A constant leak is equivalent while the command is above the dead zone.
     assert_eq!(
         effects,
         serde_json::json!([["pump_deadzone", "const_leak"], ["pump_lag", "sensor_lag"]])

@@ -21,7 +21,7 @@ pub(super) struct Comparison<'s, 'a> {
     scales: Vec<f64>,
     /// R factor of the parameters of each model.
     known: [Triangle; 2],
-    /// The existing records as each has them, free of noise.
+    /// Simulations of the existing records by each model, without noise.
     simulated: [Vec<Record>; 2],
     /// `before[i]`: misfit of the other model to the response of model `i`.
     before: [f64; 2],
@@ -109,7 +109,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
         [ahead, -ahead]
     }
 
-    /// A model against other records, outputs by their noise, and what is known of its parameters beside the records as a truth has it.
+    /// A model with other records, outputs weighted by their noise, and priors of its parameters with the values of the true model.
     fn setup<'b>(
         &'b self,
         i: usize,
@@ -129,7 +129,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
         Some(setup.with_scales(self.scales.clone()))
     }
 
-    /// A model's vector in an experiment: it begins where the first record did.
+    /// A model's vector in an experiment: the initial states are those of the first record.
     fn vector(&self, i: usize) -> Vec<f64> {
         let spec = self.nodes[i].spec();
         let length = spec.parameters.len() + spec.states.len();
@@ -220,7 +220,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
         })
     }
 
-    /// Misfit of the other model to what one of them gives of the existing records, and of an experiment, refitted.
+    /// Misfit of the other model to one model's simulation of the existing records and of an experiment, after a refit.
     fn misfit(&self, truth: usize, experiment: Option<Record>) -> Option<f64> {
         let stand_in = 1 - truth;
         let mut records = self.simulated[truth].clone();

@@ -8,7 +8,7 @@ use super::InputRange;
 use super::sequences::Room;
 use crate::Problem;
 
-/// Samples for every fitted number at least, ...
+/// Least number of samples per fitted parameter, ...
 const SAMPLES_PER_PARAMETER: usize = 3;
 /// ... and largest total number of samples.
 const MOST_SAMPLES: usize = 20_000;
@@ -18,11 +18,11 @@ const MOST_SAMPLES: usize = 20_000;
 pub struct Limits {
     /// Inputs that are applied; if none is named, all inputs that change in the records. The others are held at their median.
     pub inputs: Vec<String>,
-    /// Smallest and largest value of an input \[its unit\]. Without it what the records visited.
+    /// Smallest and largest value of an input \[its unit\]. By default the range of the records.
     pub ranges: BTreeMap<String, (f64, f64)>,
-    /// Largest change of an input in a second.
+    /// Largest change of an input per second.
     pub slews: BTreeMap<String, f64>,
-    /// Length \[s\]. Without it that of the longest record.
+    /// Length \[s\]. By default that of the longest record.
     pub duration: Option<f64>,
     /// Seed of the sequences that are drawn.
     pub seed: u64,
@@ -65,7 +65,7 @@ pub enum Refused {
         /// Names of the inputs.
         known: String,
     },
-    /// The range's ends are exchanged, equal or no numbers.
+    /// The range's ends are in the wrong order, equal or not finite.
     #[error("--input {input}={}..{}: the smaller value comes first, and they have to differ", shown(*low), shown(*high))]
     Range {
         /// The input.
@@ -95,7 +95,7 @@ pub enum Refused {
         /// The sampling interval \[s\].
         interval: f64,
     },
-    /// Too slow to get anywhere.
+    /// A slew limit that is too small.
     #[error("--slew {} a second moves {input} by less than its range within {} s", shown(*slew), shown(*duration))]
     Slew {
         /// The input.

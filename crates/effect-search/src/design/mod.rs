@@ -34,7 +34,7 @@ use crate::node::{Context, FINE, Node};
 use crate::problem::{Limit, Options, Phase, Problem};
 use limits::Bounds;
 
-/// The slowest time constant that sequences are made for, over the length of an experiment: what such a process is like is not known ahead.
+/// The slowest time constant for the sequences, as a share of an experiment's length: the process is not known before.
 const SLOWEST: f64 = 0.1;
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 4;

@@ -23,7 +23,7 @@ pub struct Power {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Prospect {
-    /// The best experiment will very probably decide.
+    /// The experiment will very probably decide.
     Decides,
     /// The experiment may decide.
     May,
@@ -33,13 +33,13 @@ pub enum Prospect {
     Twins,
 }
 
-/// More power than this is of no use: it decides even where the effect is half as large as the records make it.
+/// A higher power has no further use: the decision is certain even if the effect is half as large as estimated.
 pub const PLENTY: f64 = 200.0;
-/// The criterion decides where it differs by more than this.
+/// The criterion decides if the difference exceeds this.
 const BIC_MARGIN: f64 = Thresholds::DEFAULT.bic_margin;
-/// Excursions that differ by less than this are one.
+/// Excursions with a smaller difference are equal.
 const SAME_EXCURSION: f64 = 0.1;
-/// A decision as good as certain, as likely, and what the criterion does not notice.
+/// Nearly certain decision, likely decision, and difference below the resolution of the criterion.
 const SURE: f64 = 0.9;
 const LIKELY: f64 = 0.5;
 const NOTHING: f64 = 1.0;

@@ -30,7 +30,7 @@ pub struct InputRange {
     pub low: f64,
     /// Largest value.
     pub high: f64,
-    /// The range is what the records visited, as none was given.
+    /// The range is that of the records, because none was given.
     pub visited: bool,
     /// Largest change per second, if there is a limit.
     pub slew: Option<f64>,

@@ -150,7 +150,7 @@ fn falls<const P: usize>(
     for _ in 0..5 {
         let phi: SVector<f64, P> = normals(&mut rng);
         let blurred = |rls: &ContinuousRls<P>| {
-            // theta is known to some units in the last place, and so far V is blurred
+            // theta is accurate to some units in the last place, which limits the accuracy of V
             let axis = |i: usize| SVector::from_fn(|j, _| f64::from(u8::from(i == j)));
             let information: f64 = (0..P)
                 .map(|i| rls.factor().information_norm(&axis(i)))

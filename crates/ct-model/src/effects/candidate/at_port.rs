@@ -131,7 +131,7 @@ pub(super) fn candidate(
             .map_or((Role::Size, Starts::Values(&[])), |(_, role, starts)| {
                 (*role, *starts)
             });
-        // A reading of a row is later by a row with the slightest delay of what it shows at once.
+        // Even the smallest delay of a direct feedthrough shifts the reading by one row.
         let jumps = effect.id == "delay" && spec.is_read_directly(signal);
         let role = if jumps { Role::Threshold } else { role };
         EffectParameter {

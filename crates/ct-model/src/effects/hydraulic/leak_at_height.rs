@@ -1,5 +1,5 @@
-//! `leak_at_height(h)`: a hole in the wall, above the outlet. Torricelli's root, but for heads of a hundredth of the visited range, where
-//! the flow is laminar: an infinite slope would make the derivative by the height depend on the steps.
+//! `leak_at_height(h)`: a hole in the wall, above the outlet. Torricelli's law, with laminar flow for heads below a hundredth of the
+//! visited range: an infinite slope would make the derivative with respect to the height depend on the steps.
 
 use crate::effects::{Effect, Place, Role, Starts};
 

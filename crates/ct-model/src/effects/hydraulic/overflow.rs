@@ -1,4 +1,4 @@
-//! `overflow(h1,h2)`: what spills over a rim falls into the tank below.
+//! `overflow(h1,h2)`: water over the rim flows into the tank below.
 
 use crate::effects::{Effect, Place, Role, Starts};
 

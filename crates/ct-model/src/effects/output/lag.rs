@@ -1,4 +1,4 @@
-//! `lag(y)`: the reading follows with a time constant. As a lag of an input is.
+//! `lag(y)`: the reading follows with a time constant, like a lag of an input.
 
 use crate::effects::{Effect, Place, input::lag};
 

@@ -1,4 +1,4 @@
-//! `evaporation(T,Ta)`: heat lost with what evaporates.
+//! `evaporation(T,Ta)`: heat loss by evaporation.
 
 use crate::effects::{Effect, Place, Role, Starts};
 

@@ -1,4 +1,4 @@
-//! Models of several domains that are driven by a record, on which the effects are tried.
+//! Models of several domains with inputs from a record, for tests of the effects.
 
 use ct_model::effects::{Candidate, EffectParameter, Role, Visited, candidates, shapes_keeping};
 use ct_model::{Method, Model, ModelSpec, Scalar, Simulation};
@@ -69,7 +69,7 @@ equation
 end Battery;
 "#;
 
-/// A model and what drives it, held from row to row.
+/// A model with its inputs, held from row to row.
 pub(super) struct Driven {
     pub(super) spec: ModelSpec,
     time: Vec<f64>,

@@ -73,7 +73,7 @@ pub struct Run {
     /// Largest diagonal entry of P, and smallest pivot.
     pub largest: f64,
     pub smallest_pivot: f64,
-    /// Steps in which a guard forgot less.
+    /// Number of steps in which a guard reduced forgetting.
     pub capped: u64,
 }
 

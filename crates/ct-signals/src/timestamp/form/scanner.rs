@@ -45,7 +45,7 @@ impl Scanner<'_> {
         Ok(value)
     }
 
-    /// The digits after a decimal mark, as nanoseconds; what is finer is cut off.
+    /// The digits after a decimal mark, as nanoseconds; further digits are dropped.
     #[inline]
     pub(super) fn fraction(&mut self) -> Result<u32, Fault> {
         let begin = self.at;

@@ -102,7 +102,7 @@ fn missing_samples_are_left_out_as_by_dense_algebra() {
     }
 }
 
-/// A gap is as many lost rows, however it is passed.
+/// A gap equals the same number of lost rows, for each way of skipping.
 #[test]
 fn long_gaps_are_as_many_lost_rows() {
     let slow = [1.989, -0.989_01];
@@ -183,7 +183,7 @@ fn moments(x: &[f64]) -> (f64, f64) {
 fn fit_recovers_what_missing_samples_leave() {
     let runs: u64 = std::env::var("RECORDS").map_or(60, |runs| runs.parse().unwrap());
     let n = 2000;
-    // The most that the spread grows: of samples lost at random the pairs are fewer, of blocks only the samples.
+    // Largest increase of the spread: samples lost at random reduce the number of pairs, blocks only that of samples.
     for (coefficients, at_random, third) in [(&[0.8][..], 1.45, 1.7), (&[1.5, -0.7], 1.45, 2.2)] {
         let p = coefficients.len();
         let mut whole = Vec::new();

@@ -112,8 +112,8 @@ impl Source<'_> {
         Ok(areas)
     }
 
-    /// The vessels whose levels are the outputs, in their order. Without a word it is the last one; of tanks that are joined, and of
-    /// several outputs, it has to be said.
+    /// The vessels whose levels are the outputs, in their order. The default is the last one; for joined tanks, and for several outputs,
+    /// the file has to name them.
     fn measured(
         &self,
         plant: Plant,

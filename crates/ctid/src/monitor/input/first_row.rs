@@ -1,4 +1,4 @@
-//! The first line and the first row: columns, units, times, and where a saved state goes on.
+//! The first line and the first row: columns, units, times, and continuation of a saved state.
 
 use ::monitor::{Monitor, TimeAxis, Units};
 use ct_signals::{BadLine, RowTimes, Rows, quoted};
@@ -85,7 +85,7 @@ impl<'a> Session<'a> {
         Ok(is_row)
     }
 
-    /// The units of the rows: as many readings as the model has outputs, in one unit.
+    /// The units of the rows: the number of readings equals the number of the model's outputs, with a single unit.
     fn units(&self, rows: &Rows) -> Result<Units, Error> {
         let mut units = rows.units();
         let input = units.next().unwrap_or("").to_string();

@@ -1,4 +1,4 @@
-//! A model file of the user's own as it is written: keys, columns, and what of them cannot be.
+//! Parser of the model file of a user's own model: keys, columns, and their errors.
 
 use ct_model::{Model, ModelSpec, Variable};
 use ct_signals::{Columns, Hold, Zone, quoted};
@@ -198,7 +198,7 @@ fn unnamed_controller(text: &str) -> Option<usize> {
     at.filter(|_| controller.values().any(is_setting))
 }
 
-/// Whether a model, or an effect in it, has a parameter of this name; in words where not.
+/// Checks that a model, or an effect in it, has a parameter of this name.
 fn is_parameter(spec: &ModelSpec, effects: &OwnEffects, name: &str) -> Result<(), String> {
     let parameters = spec.parameters.iter().map(|p| p.about.name.as_str());
     let parameters: Vec<&str> = parameters
@@ -216,7 +216,7 @@ fn is_parameter(spec: &ModelSpec, effects: &OwnEffects, name: &str) -> Result<()
     ))
 }
 
-/// The columns of the model's signals: those that `[columns]` names, else the ones of their own names.
+/// The columns of the model's signals: those named by `[columns]`, else columns with the signals' names.
 pub(super) fn columns(spec: &ModelSpec, raw: &Raw, source: &Source) -> Result<Columns, Error> {
     let inputs = (0..spec.inputs.len()).map(Variable::Input);
     let inputs: Vec<&str> = inputs.map(|v| spec.about(v).name.as_str()).collect();

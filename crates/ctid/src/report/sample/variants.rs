@@ -100,7 +100,7 @@ pub(crate) fn partial_of(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis
 }
 
-/// Long records, a name that is markup, gaps, infinite edges and numbers that are not finite.
+/// Long records, a name with markup, gaps, infinite edges and numbers that are not finite.
 pub(crate) fn awkward() -> Diagnosis {
     let mut diagnosis = two_tanks();
     let repeats = 100;

@@ -126,7 +126,7 @@ fn errors(diagnosis: &Diagnosis, index: usize, name: &str) -> String {
     rows
 }
 
-/// Every parameter once, with its unit, in the order of the last step, which has the most.
+/// Every parameter once, with its unit, in the order of the last step, which has the most parameters.
 fn names(steps: &[Step]) -> Vec<(&str, &str)> {
     let mut names: Vec<(&str, &str)> = Vec::new();
     for parameter in steps.iter().rev().flat_map(|step| &step.parameters) {

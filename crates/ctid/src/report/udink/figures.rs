@@ -127,7 +127,7 @@ fn counterexample_figure(gains: &Gains) -> Figure {
     Figure::over_time("counterexample", 660, panels, curves)
 }
 
-/// Errors over time, a panel for each of the bounds; lines of Euler's rule are thin.
+/// Errors over time, a panel for each set of bounds; lines of Euler's rule are thin.
 fn gains_figure(gains: &Gains) -> Figure {
     let titles = [
         "error, no bounds",

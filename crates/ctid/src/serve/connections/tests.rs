@@ -165,7 +165,7 @@ fn an_answer_that_is_never_taken_ends_its_connection() {
     let silence = Duration::from_millis(200);
     let served = served(Bounds { silence, ..PATIENT });
     let mut stream = greedy(&served);
-    // Written to until the other end is gone.
+    // Written to until the other end is closed.
     let head = format!("{}\r\n", served.own("/large"));
     while stream.write_all(head.as_bytes()).is_ok() {
         std::thread::sleep(Duration::from_millis(20));

@@ -102,7 +102,7 @@ impl Work {
         compare(&self.model, &self.records, &options)
     }
 
-    /// Searches what is missing, until the flag is set.
+    /// Searches for missing effects, until the flag is set.
     pub(crate) fn search(
         &self,
         max_effects: Option<NonZeroU8>,
@@ -153,7 +153,7 @@ impl Work {
         )
     }
 
-    /// Puts a design where the page finds it.
+    /// Stores a design for the page.
     pub(crate) fn settle_design(self, session: &mut Session, design: &Design) {
         let id = session.number();
         let designed = Designed::new(id, &self.model, design, self.records.time_unit);
@@ -162,7 +162,7 @@ impl Work {
         }
     }
 
-    /// Puts a diagnosis where the page finds it.
+    /// Stores a diagnosis for the page.
     pub(crate) fn settle_diagnosis(self, session: &mut Session, found: &Diagnosis) {
         let id = session.number();
         let json = serde_json::to_string(found).unwrap_or_default();

@@ -48,7 +48,7 @@ impl Session {
         fitted.data == self.data && fitted.measured == self.measured
     }
 
-    /// The fits to these records of models that differ from this one in their effects and terms alone.
+    /// The fits to these records of models that differ from this one in their effects and terms only.
     pub(crate) fn kin(&self, model: &ModelFile) -> Vec<&Arc<Fitted>> {
         let bare = without_effects(model);
         let kin = |fitted: &&Arc<Fitted>| {
@@ -57,8 +57,7 @@ impl Session {
         self.models.iter().filter(kin).collect()
     }
 
-    /// The fits of the model with its first effects, none of them and then one more each time, and then with its first terms, as
-    /// far as they are known.
+    /// The fits of the model with its first effects, from none to all, and then with its first terms, as far as they exist.
     pub(crate) fn trail(&self, model: &ModelFile) -> Vec<&Arc<Fitted>> {
         let kin = self.kin(model);
         let (effects, terms) = (model.effects.as_slice(), model.terms.as_slice());

@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 
 use crate::common::{Place, bundled};
 
-/// Results that ctid wrote earlier: a run that fails may not touch them.
+/// Results that ctid wrote earlier: a failed run must not change them.
 fn earlier_results() -> &'static [(&'static str, Vec<u8>); 2] {
     static RESULTS: OnceLock<[(&str, Vec<u8>); 2]> = OnceLock::new();
     RESULTS.get_or_init(|| {

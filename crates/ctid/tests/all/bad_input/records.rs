@@ -1,4 +1,4 @@
-//! Records whose cells or numbers cannot be.
+//! Records with invalid cells or numbers.
 
 mod several;
 

@@ -1,4 +1,4 @@
-//! Units that contradict, and columns of no clear role.
+//! Contradictory units, and columns without a clear role.
 
 use super::{Rows, both_refuse, model_with, place, record_refused};
 

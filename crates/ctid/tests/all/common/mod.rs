@@ -83,9 +83,9 @@ impl Place {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
-            // Two cores shared by many runs: one thread each, unless a test is about threads.
+            // Two cores are shared by many runs: one thread each, unless a test is about threads.
             .env("RAYON_NUM_THREADS", "1");
-        // Nor may a result hang on how busy the machine is.
+        // Nor may a result depend on the load of the computer.
         let searches = ["compare ", "diagnose ", "design "]
             .iter()
             .any(|command| words.starts_with(command));
@@ -100,7 +100,7 @@ impl Place {
         outcome(self.command(words))
     }
 
-    /// Runs the program, which has to end well; what it printed.
+    /// Runs the program, which has to end successfully; returns its output.
     pub fn succeeds(&self, words: &str) -> String {
         let outcome = self.ctid(words);
         assert_eq!(outcome.code, Some(0), "ctid {words}: {}", outcome.err);
@@ -108,7 +108,7 @@ impl Place {
         outcome.out
     }
 
-    /// Runs `diagnose` or `compare`; what it wrote as JSON.
+    /// Runs `diagnose` or `compare`; returns the JSON.
     pub fn result(&self, words: &str) -> Value {
         self.succeeds(&format!("{words} --json result.json"));
         let json = self.json("result.json");
@@ -197,7 +197,7 @@ fn drain(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<Vec<u8>> {
     })
 }
 
-/// The exit code; a program that does not end is a failure, not a test that never ends.
+/// The exit code; a program that does not end is a failure after a time limit.
 fn wait(child: &mut Child) -> Option<i32> {
     let began = Instant::now();
     loop {
@@ -212,7 +212,7 @@ fn wait(child: &mut Child) -> Option<i32> {
     }
 }
 
-/// A result without what differs from run to run.
+/// A result without the entries that differ from run to run.
 pub fn lasting(mut result: Value) -> Value {
     let seconds = result.as_object_mut().unwrap().remove("seconds");
     assert!(seconds.is_some_and(|seconds| seconds.is_number()));
@@ -341,7 +341,7 @@ impl Tanks {
         csv(&inputs, &outputs)
     }
 
-    /// The model file of the plant as it is without what is hidden.
+    /// The model file of the plant without the hidden effects.
     pub fn model(&self) -> String {
         let known = match self.plant.vessels() {
             1 => "area = 154.0\n",

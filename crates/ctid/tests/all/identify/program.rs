@@ -1,4 +1,4 @@
-//! The program: what it writes and refuses.
+//! The program: its files and errors.
 
 use ct_signals::{ReadOptions, Reading, read_csv};
 use linear_identification::{Method, Order, Request, identify};
@@ -157,7 +157,7 @@ fn a_record_too_short_to_tell_is_called_so() {
     }
 }
 
-/// Records that no file brought along are looked at too.
+/// Records without a file are checked too.
 #[test]
 fn a_record_that_stands_still_is_refused() {
     let mut record = FIRST.record(200, 1);

@@ -1,4 +1,4 @@
-//! The program in a loop: what it writes and refuses.
+//! The program in a loop: its files and errors.
 
 use ct_signals::{Channel, Record, excitation};
 use fcloe::{Noise, PlantModel, sampled_loop};

@@ -48,8 +48,8 @@ fn bad_rows_are_said_skipped_and_not_flooded_with() {
     assert_says(&outcome, "103 of them with something wrong");
 }
 
-/// Who listens to a running line hears the end of a row first.
-/// Empty, no number, not finite, or a word: the rows' commands count, and the tank is followed.
+/// A reader that connects to a running line receives the end of a row first. Empty, no number, not finite, or a word: the rows' commands
+/// are used, and the simulation continues.
 #[test]
 fn a_row_without_a_reading_is_said_and_its_command_used() {
     let rows = rows(2000, 9999);

@@ -108,7 +108,7 @@ fn a_tour_writes_its_report_and_a_second_one_destroys_nothing() {
     let page = place.read("report.html");
     assert!(page.starts_with(&ctid::report::head()) && page.contains("tour.csv"));
 
-    // Again: its own page, once more.
+    // Again: the page of ctid is overwritten.
     assert_eq!(place.succeeds(""), first);
     assert_eq!(place.snapshot().len(), 1);
     assert!(place.read("report.html") == page);
@@ -127,7 +127,7 @@ fn a_tour_writes_its_report_and_a_second_one_destroys_nothing() {
     assert!(place.snapshot() == before);
 }
 
-/// A shell's `--model <(...)` is a pipe, which gives its content once.
+/// A shell's `--model <(...)` is a pipe, which can be read once.
 #[cfg(unix)]
 #[test]
 fn a_model_file_may_be_a_pipe() {

@@ -21,7 +21,7 @@ fn what_is_exported_reads_back() {
         "{text}"
     );
     place.succeeds("check fitted.mo");
-    // Simulated as it was written it gives the curves of the fit.
+    // A simulation of the exported file gives the curves of the fit.
     place.write("again.toml", FILE.replace("block.mo", "fitted.mo"));
     let inputs = place.read("a.csv");
     let inputs = inputs.lines().map(|line| {

@@ -125,7 +125,7 @@ fn a_clock_that_runs_backwards_between_files() {
     );
 }
 
-/// Whether the record has dates or not: the model file is wrong.
+/// The model file is wrong, for records with and without dates.
 #[test]
 fn a_time_zone_that_does_not_exist() {
     let place = place();

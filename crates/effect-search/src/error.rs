@@ -16,7 +16,7 @@ pub enum Error {
     /// A candidate of the user's own.
     #[error("candidates.{0}")]
     Own(#[from] ct_model::effects::OwnError),
-    /// Effects that do not go together.
+    /// Effects that exclude each other.
     #[error(transparent)]
     Apply(#[from] ct_model::effects::ApplyError),
     /// The simulation of the fitted model.
@@ -25,13 +25,13 @@ pub enum Error {
     /// An experiment that cannot be proposed.
     #[error(transparent)]
     Design(#[from] crate::design::Refused),
-    /// The unit of the model's time is none.
+    /// The unit of the model's time is not positive.
     #[error("a unit of the model's time of {seconds} s: it has to be above zero and finite")]
     TimeUnit {
         /// The given number of seconds.
         seconds: f64,
     },
-    /// An effect of the model file that the model cannot have.
+    /// An effect of the model file that cannot act in the model.
     #[error("effect {id} cannot act in this model: `ctid effects --model` lists what can")]
     UnknownEffect {
         /// Identifier of the effect.

@@ -1,4 +1,4 @@
-//! The score of a candidate whose absence is a limit: an RC pair is not there at no value of its resistance and capacity.
+//! The score of a candidate that is absent only in a limit: no values of resistance and capacity remove an RC pair.
 //!
 //! A factor before its terms ([`Candidate::with_factor`]) takes it out of the model. The score is the step of Gauss-Newton by this factor
 //! and all other parameters, from zero, over the starts of the candidate's own parameters. The fit has no factor: it begins where these
@@ -26,7 +26,7 @@ struct Place {
 }
 
 impl Context<'_> {
-    /// A candidate with a factor, at its best start; `None` where no start gives a simulation.
+    /// A candidate with a factor, at its best start; `None` if no start gives a simulation.
     pub fn trial_by_factor(
         &self,
         node: &Node,
@@ -78,7 +78,7 @@ impl Context<'_> {
             for (d, &at) in step.iter().zip(setup.free()) {
                 stepped[at] = within(stepped[at] + d, setup.bounds()[at]);
             }
-            // An effect of the other sign explains nothing.
+            // An effect of the opposite sign explains nothing.
             let predicted = if stepped[factor] == 0.0 {
                 triangle.cost()
             } else {
@@ -144,7 +144,7 @@ impl Context<'_> {
     }
 }
 
-/// Every combination of scales of so many parameters: one, the factor, and its inverse; one alone for more than `most` parameters.
+/// Every combination of scales of the parameters: one, the factor, and its inverse; only one for more than `most` parameters.
 fn scalings(parameters: usize, factor: f64, most: usize) -> impl Iterator<Item = Vec<f64>> {
     let usable = factor.is_finite() && factor != 0.0 && parameters <= most;
     let each = [1.0, factor, factor.recip()];

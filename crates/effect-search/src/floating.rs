@@ -34,7 +34,7 @@ impl Context<'_> {
         fitted
     }
 
-    /// The set with the least criterion when each model has the noise model of its own residual, where that is less than a fit's.
+    /// The set with the least criterion when each model has the noise model of its own residual, if this is less than that of a fit.
     pub fn better_in_own_noise(&self, sets: Vec<Node>, than: &Fit) -> Option<Node> {
         let best = best_first(sets)
             .into_iter()
@@ -85,7 +85,7 @@ impl Context<'_> {
             .into_par_iter()
             .filter_map(|seed| self.refitted(&seed, white, ROUGH).ok());
         let seeds = best_first(fits.collect());
-        // The best set of few effects, and the best of all: what grew beside effects that follow time may lead astray.
+        // The best small set, and the best of all: sets that were grown together with functions of time may be wrong.
         let few = |seed: &&Node| {
             seed.added.len() <= base.added.len() + self.thresholds.floating_small_set
         };
@@ -95,7 +95,7 @@ impl Context<'_> {
         begin
     }
 
-    /// The set with the one effect more that lowers the criterion most.
+    /// The set with the one additional effect that lowers the criterion most.
     fn one_more(
         &self,
         set: &Node,
@@ -112,7 +112,7 @@ impl Context<'_> {
         (best.gain_over(set) > self.thresholds.growth_margin).then_some(best)
     }
 
-    /// The set with effects exchanged for others, or left out, one by one, while that lowers the criterion.
+    /// The set improved by swaps or removals of effects, one by one, while the criterion falls.
     fn exchanged(
         &self,
         mut set: Node,

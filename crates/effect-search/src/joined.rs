@@ -1,4 +1,4 @@
-//! A candidate beside a set whose rows are known.
+//! A candidate added to a set with known Jacobian.
 //!
 //! Where a candidate is absent the outputs and their derivatives by all that the set has are those of the set: only the derivatives by the
 //! candidate's own entries have to be simulated, which is a small part of all. Elsewhere this is an approximation, with the right residual.

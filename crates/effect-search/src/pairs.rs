@@ -10,14 +10,14 @@ use rayon::prelude::*;
 use crate::node::{Context, Node};
 use crate::score::Trial;
 
-/// Values in all columns together above which rows are thinned out.
+/// Number of values in all columns above which rows are thinned out.
 const MOST_VALUES: usize = 20_000_000;
 /// A column whose projection residual is below this share counts as linearly dependent.
 const NOTHING: f64 = 1e-6;
 /// Ridge of the small systems, as a share of the squared length.
 const RIDGE: f64 = 1e-9;
 
-/// Pairs of positions in `trials`, the best first, that predict more than their members.
+/// Pairs of positions in `trials`, the best first, with a larger prediction than their members.
 pub(crate) fn joint_scores(
     context: &Context,
     base: &Node,

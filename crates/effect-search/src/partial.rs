@@ -127,8 +127,8 @@ impl Context<'_> {
         )?)
     }
 
-    /// Samples over independent samples of a noise whose memory is limited: by how much slow parameters, and differences of the deviance
-    /// with white noise, are less certain than under white noise of the same size.
+    /// Samples per independent sample of a noise with limited memory: factor by which slow parameters, and differences of the deviance with
+    /// white noise, are less certain than under white noise of the same variance.
     pub fn slowness(&self, noise: &Noise) -> f64 {
         let limited = noise.with_memory_at_most(self.longest_memory());
         let outputs = limited.iter().zip(&self.problem.records[0].outputs);
@@ -165,7 +165,7 @@ impl Context<'_> {
         })
     }
 
-    /// The squared error of each output on parts of the records that take no part in the fit; `None` where a simulation is not finite.
+    /// The squared error of each output on parts of the records that are not used for the fit; `None` if a simulation is not finite.
     pub fn left_out_squares(&self, node: &Node) -> Result<Option<Vec<f64>>, Error> {
         let mut squares = vec![0.0; self.problem.records[0].outputs.len()];
         for fold in 0..self.thresholds.folds {
@@ -179,7 +179,7 @@ impl Context<'_> {
         Ok(Some(squares))
     }
 
-    /// The squared error of each output on a part of all records, when the readings of this part take no part in the fit; `None` where the
+    /// The squared error of each output on a part of all records, if the readings of this part are not used for the fit; `None` if the
     /// simulation is not finite.
     fn left_out(&self, node: &Node, fold: usize) -> Result<Option<Vec<f64>>, Error> {
         let part = |record: &Record| {

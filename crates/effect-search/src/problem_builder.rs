@@ -9,7 +9,7 @@ use greybox::{ModelSetup, PriorValue};
 
 use crate::{Error, Kept, Problem};
 
-/// Makes a [`Problem`]: what it needs was given to [`Problem::builder`], the rest has a method each.
+/// Builds a [`Problem`]: required parts were given to [`Problem::builder`], the other parts have one method each.
 #[derive(Debug, Clone)]
 #[must_use]
 pub struct ProblemBuilder {
@@ -67,7 +67,7 @@ impl Problem {
 }
 
 impl ProblemBuilder {
-    /// Effects that the model has already, by their identifiers ([`Problem::effects`]).
+    /// Effects in the model, by their identifiers ([`Problem::effects`]).
     pub fn effects<S: Into<String>>(mut self, effects: impl IntoIterator<Item = S>) -> Self {
         self.problem.effects = effects.into_iter().map(Into::into).collect();
         self
@@ -103,7 +103,7 @@ impl ProblemBuilder {
         self
     }
 
-    /// The unit of the model's time: how many seconds it has, above 0, and how it is written. Without this it is the second.
+    /// The unit of the model's time: its length in seconds, above 0, and its symbol. The default is the second.
     pub fn time_unit(mut self, seconds: f64, name: impl Into<String>) -> Self {
         (self.problem.time_unit, self.problem.time_unit_name) = (seconds, name.into());
         self

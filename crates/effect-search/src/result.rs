@@ -23,7 +23,7 @@ pub enum Verdict {
     Adequate,
 }
 
-/// A parameter or an initial state as it was fitted.
+/// A fitted parameter or initial state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Its name.
@@ -46,7 +46,7 @@ pub struct Estimate {
 pub struct Step {
     /// The added effect; `None` for the believed model.
     pub added: Option<String>,
-    /// Simulation error of an only output on the fitted records \[its unit\].
+    /// Simulation error of a single output on the fitted records \[its unit\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rmse: Option<f64>,
     /// Simulation error by output, on the fitted records \[unit of the output\].
@@ -59,7 +59,7 @@ pub struct Step {
     pub state_rows: Option<Vec<usize>>,
     /// Simulation error, each output divided by its noise: 1 is the noise.
     pub weighted_rmse: f64,
-    /// Bayesian information criterion, in the metric in which the effects were confirmed.
+    /// Bayesian information criterion, with the weighting of the confirmation.
     pub bic: f64,
     /// All parameters, followed by the initial states.
     pub parameters: Vec<Estimate>,
@@ -92,7 +92,7 @@ pub struct NoiseFloor {
     pub output: String,
     /// Standard deviation \[unit of the output\].
     pub level: f64,
-    /// Standard deviation of what its past does not predict.
+    /// Standard deviation of the innovations.
     pub innovation: f64,
     /// Autoregressive coefficients; empty for white noise.
     pub coefficients: Vec<f64>,

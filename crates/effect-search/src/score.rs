@@ -19,7 +19,7 @@ use crate::joined::Joined;
 use crate::node::{Context, Node};
 use crate::spectral_line::strongest_line;
 
-/// Damping of the predicted step, against what the data do not determine.
+/// Damping of the predicted step, for directions that the data do not determine.
 pub(crate) const DAMPING: f64 = 1e-9;
 /// Parts of the predicted step from which a fit may begin, as shares of it.
 const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
@@ -36,7 +36,7 @@ pub(crate) struct Trial {
     pub fall: f64,
 }
 
-/// The starts, or so many of them.
+/// The starts, or the given number of them.
 pub(crate) fn thinned(starts: Vec<Vec<f64>>, most: usize) -> Vec<Vec<f64>> {
     if starts.len() <= most {
         return starts;
@@ -56,9 +56,9 @@ struct Place {
     stepped: Vec<f64>,
 }
 
-/// The effect whose starts follow from the spectrum of the residual.
+/// The effect whose starts come from the spectrum of the residual.
 const PERIODIC: &str = "periodic";
-/// The effect whose time is looked for between its starts.
+/// The effect whose instant is refined between its starts.
 const STEP: &str = "step";
 /// Distances from the best instants at which further starts are scored, round by round, as shares of the longest record.
 const BETWEEN: [f64; 2] = [0.05, 0.025];
@@ -130,7 +130,7 @@ impl Context<'_> {
         }
     }
 
-    /// Derivatives and residuals of a set where its fit ended.
+    /// Derivatives and residuals of a set at the end of its fit.
     fn rows_of(&self, node: &Node) -> Option<Rows> {
         estimation::rows(&self.setup(&node.model).ok()?, &node.fit.x)
     }
@@ -218,7 +218,7 @@ impl Context<'_> {
             for (d, &at) in step.iter().zip(setup.free()) {
                 stepped[at] = within(stepped[at] + d, setup.bounds()[at]);
             }
-            // A size that its bound forbids explains nothing.
+            // A size outside its bound explains nothing.
             let forbidden = smooth
                 && candidate
                     .parameters
@@ -264,7 +264,7 @@ impl Context<'_> {
                 scored.extend(others.into_iter().filter_map(scored_at));
                 scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
             }
-            // A fit from a neighbour of the best time ends where that from the best one does.
+            // A fit from a neighbour of the best instant ends in the same minimum.
             let best = scored.first().map_or(0.0, |place| place.x[at]);
             let near = 2.0 * BETWEEN[0] * duration;
             let mut first = true;

@@ -18,7 +18,7 @@ const LARGER: &str = "larger sets of effects";
 
 /// Result of a search with one noise model.
 pub(crate) struct Grown {
-    /// The model that the search began with.
+    /// The first model of the search.
     pub base: Node,
     /// Single effects, best first.
     pub singles: Vec<Node>,
@@ -26,11 +26,11 @@ pub(crate) struct Grown {
     pub best: Node,
     /// Candidates that are scored for sets of several effects: candidates with almost no influence on the believed model are left out.
     among: Vec<usize>,
-    /// Sets that may grow, best first.
+    /// Sets that may be extended, best first.
     beam: Vec<Node>,
     /// All fitted sets.
     pub fitted: Vec<Node>,
-    /// The time ended the search.
+    /// Whether the time limit ended the search.
     pub cut_short: bool,
 }
 
@@ -62,8 +62,8 @@ impl Context<'_> {
         free.is_ok_and(|free| free.iter().any(|&i| errors[i].is_none()))
     }
 
-    /// The best single effects fitted again from starts of their own: where the believed model has no minimum within its bounds, an effect
-    /// beside it begins there, and that may be a place that it has no part in. `known`: fits of single effects in another metric.
+    /// The best single effects fitted again from their own starts. If the believed model has no minimum within its bounds, the fits of
+    /// single effects start at its end point, which may be unfavourable. `known`: fits of single effects with another weighting.
     fn refit_from_own_starts(&self, nodes: &mut [Node], known: &[Node], noise: &Noise) {
         nodes
             .par_iter_mut()
@@ -98,7 +98,8 @@ impl Context<'_> {
         Ok(self.setup(&node.model)?.fit(&options)?.x)
     }
 
-    /// The search of sets of up to so many effects. `of`: positions of the candidates; `known`: fits of single effects in another metric.
+    /// The search of sets up to a given number of effects. `of`: positions of the candidates; `known`: fits of single effects with another
+    /// weighting.
     pub fn grow(
         &self,
         base: Node,

@@ -13,7 +13,8 @@ use realfft::RealFftPlanner;
 
 use ct_signals::Error;
 
-/// Neighbours of a line, from where its taper ends to where a smooth spectrum may have changed, and the fewest that do.
+/// Neighbours of a line: the first one outside its taper, the last one for which a smooth spectrum is nearly constant, and the least number
+/// of them.
 const NEAREST: usize = 3;
 const FARTHEST: usize = 12;
 const FEWEST: f64 = 4.0;
@@ -33,7 +34,7 @@ pub struct Line {
 /// The strongest line of a series; `None` if it is too short, or constant.
 pub fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
     let n = series.len();
-    // Flat enough for neighbours to be compared, by a filter that has no room for a line.
+    // Made nearly flat for a comparison of neighbours, by a filter whose order is too low to model a line.
     let mut flat = ArModel::fit(&[series], 1)?.whiten(series);
     for (k, value) in flat.iter_mut().enumerate() {
         // A missing sample contributes nothing.

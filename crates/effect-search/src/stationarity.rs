@@ -23,7 +23,7 @@ pub fn stationary_p(noise: &ArModel, residual: &[f64], thresholds: &Thresholds) 
     let white: Vec<f64> = noise
         .whiten(residual)
         .into_iter()
-        // A missing sample has no power.
+        // A missing sample contributes no power.
         .map(|w| if w.is_nan() { 0.0 } else { w })
         .collect();
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(size);

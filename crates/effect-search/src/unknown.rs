@@ -1,4 +1,4 @@
-//! The shape of the error that no candidate explains: where a missing term acts, what it depends on, and how.
+//! The unexplained error as a function: place, variable and shape.
 //!
 //! At every port a smooth function ([`ct_model::effects::shapes_keeping`]) of every state and input is added to the model and fitted with
 //! all other parameters. A function bends to whatever there is, so ports and variables are compared by the error that each leaves on

@@ -1,4 +1,4 @@
-//! Fits from many starts in the metric of a noise, the noise's spectrum, and the uncertainty of what was fitted.
+//! Fits from many starts with a noise model as weighting, estimation of the noise model, and the uncertainty of the parameters.
 
 mod prewhitened;
 
@@ -12,7 +12,7 @@ use crate::{
     linearise_below, prior::begin_near_priors, prior::free_priors, squares,
 };
 
-/// Two ends are one minimum where twice the logarithm of their likelihood ratio is below this.
+/// Two results are the same minimum if twice the logarithm of their likelihood ratio is below this.
 const SAME_MINIMUM: f64 = 0.1;
 
 /// A fit.
@@ -20,7 +20,7 @@ const SAME_MINIMUM: f64 = 0.1;
 pub struct Fit {
     /// The fitted vector.
     pub x: Vec<f64>,
-    /// Cost of the whitened residual: its sum of squares or, of several outputs, [`crate::Squares::cost`] \[output unit squared\].
+    /// Cost of the whitened residual: its sum of squares or, for several outputs, [`crate::Squares::cost`] \[output unit squared\].
     pub cost: f64,
     /// Root mean square of the residual at each output, not whitened \[output unit\].
     pub rmse: Vec<f64>,
@@ -29,10 +29,10 @@ pub struct Fit {
     pub noise: Noise,
     /// Weights of the rows of each output, in addition to whitening ([`crate::Squares::weights`]).
     pub weights: Vec<f64>,
-    /// Minus twice the logarithm of the Gaussian likelihood, the innovations' variance of each output at its best; priors are part of it,
-    /// but for what does not change.
+    /// Minus twice the logarithm of the Gaussian likelihood, maximised over the innovations' variance of each output; priors are included
+    /// up to a constant.
     pub deviance: f64,
-    /// Fitted numbers, those of the noise included.
+    /// Number of fitted parameters, including those of the noise.
     pub parameters: usize,
     /// BIC penalty of the parameters, in [`Fit::bic`].
     pub price: f64,
@@ -48,7 +48,7 @@ pub struct Fit {
     pub agree: usize,
     /// Reason why the best fit stopped.
     pub stop: Stop,
-    /// The folded rows at the minimum.
+    /// The R factor at the minimum.
     pub triangle: Triangle,
     /// Positions (among the fitted entries) of the parameters that are not held at a bound.
     interior: Vec<usize>,
@@ -61,7 +61,7 @@ pub struct Fit {
     of_samples: f64,
 }
 impl Fit {
-    /// Whether two fits of one model in one metric ended in the same minimum.
+    /// Whether two fits of one model with the same weighting ended in the same minimum.
     #[must_use]
     pub fn same_minimum(&self, other: &Self) -> bool {
         self.samples as f64 * (self.cost / other.cost).ln().abs() <= SAME_MINIMUM
@@ -90,7 +90,7 @@ impl Fit {
         self
     }
 
-    /// [`Fit::rmse`] of an only output; of several their geometric mean, by samples, on which no choice of units has an influence.
+    /// [`Fit::rmse`] of a single output; for several their geometric mean, weighted by samples, which does not depend on units.
     #[must_use]
     pub fn mean_rmse(&self) -> f64 {
         if let [only] = self.rmse[..] {
@@ -109,7 +109,7 @@ impl Fit {
         self.deviance + self.price
     }
 
-    /// Variance of the innovations, with the degrees of freedom that are left.
+    /// Variance of the innovations, with the degrees of freedom of the residual.
     #[must_use]
     pub fn variance(&self) -> f64 {
         self.of_samples / self.degrees_left()
@@ -154,14 +154,13 @@ impl Fit {
         all
     }
 
-    /// Columns of the triangle whose entries are not at a bound.
+    /// Columns of the R factor whose parameters are not at a bound.
     #[must_use]
     pub fn interior(&self) -> &[usize] {
         &self.interior
     }
 
-    /// Degrees of freedom of every standard error: the quantile of Student's distribution with as many makes an
-    /// interval of it. A noise model that was estimated with the fit leaves fewer than the samples do.
+    /// Degrees of freedom of every standard error, for the quantile of Student's distribution. An estimated noise model reduces them.
     #[must_use]
     pub fn freedom(&self) -> Vec<Option<f64>> {
         self.spread(self.freedom.iter().copied())
@@ -250,8 +249,8 @@ fn begun(model: &impl Residuals, given: &[f64], noise: &Noise) -> Vec<f64> {
     }
 }
 
-/// Fits from the given starts, in parallel, in the metric of a given noise, of which the colour counts alone. The best one is given, and
-/// how many agree with it.
+/// Fits from the given starts, in parallel, with the AR coefficients of a given noise model as weighting. Returns the best fit, and the
+/// number of starts that agree with it.
 ///
 /// # Errors
 /// Where the model is not finite at any start.
@@ -268,7 +267,7 @@ pub fn fit_from(
         .into_par_iter()
         .enumerate()
         .filter_map(|(k, Start { x: given, triangle })| {
-            // Out of time a fit still needs one start.
+            // After the time limit a fit still uses one start.
             if k > 0 && model.out_of_time() {
                 return None;
             }
@@ -357,7 +356,7 @@ struct End {
     weights: Vec<f64>,
     prior_weight: f64,
     of_samples: f64,
-    /// Logarithm of the determinant of the noise's covariance, of unit innovations.
+    /// Logarithm of the determinant of the noise's covariance, for innovations of variance 1.
     log_det: f64,
 }
 

@@ -12,10 +12,10 @@ use crate::Triangle;
 /// Stopping criteria.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stopping {
-    /// Most evaluations.
+    /// Largest number of evaluations.
     pub evaluations: usize,
-    /// Relative fall of the cost that is not worth a step: a fit ends where an undamped step promises no more, or two in a row
-    /// brought no more.
+    /// Least relative fall of the cost: a fit ends if an undamped step has a smaller predicted reduction, or if two successive steps
+    /// reached a smaller reduction.
     pub cost: f64,
 }
 
@@ -23,11 +23,11 @@ pub struct Stopping {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Stop {
-    /// The cost falls no more, and a step of Gauss and Newton promises nothing.
+    /// The cost does not fall any more, and the predicted reduction of a Gauss-Newton step is negligible.
     Converged,
-    /// The cost falls no more although its slope is not zero: the simulation is not smooth here.
+    /// The cost does not fall any more although its slope is not zero: the simulation is not smooth here.
     Stuck,
-    /// The evaluations were used up, or the time.
+    /// The largest number of evaluations, or the time limit, was reached.
     Evaluations,
     /// The simulation is not finite at the start.
     NotFinite,
@@ -120,7 +120,7 @@ pub(crate) fn minimise(
             .zip(&step)
             .zip(bounds)
             .map(|((x, d), &(lower, upper))| {
-                // A parameter that must be positive does not lose more than four fifths at once.
+                // A positive parameter is reduced by at most four fifths in one step.
                 let lower = if lower > 0.0 {
                     lower.max(0.2 * x)
                 } else {
@@ -139,7 +139,7 @@ pub(crate) fn minimise(
             };
         }
         evaluations += 1;
-        // A trial that follows one that failed fails as often as not; any other one hardly ever does.
+        // A trial after a failed one fails in half of the cases; other trials rarely fail.
         let doubtful = growth > 2.0;
         let next = (!(doubtful && worse(&trial, cost)))
             .then(|| evaluate(&trial, cost))

@@ -1,4 +1,4 @@
-//! The noise's spectrum from a fit's residual, by marginal (restricted) likelihood.
+//! The noise model from a fit's residual, by marginal (restricted) likelihood, REML.
 //!
 //! **Why**: a fit with `p` free entries takes from its residual the part that its sensitivities span. Slow noise and
 //! slow sensitivities look alike, so an autoregressive model of the residual is too fast and too small, and the standard errors that follow
@@ -27,7 +27,7 @@ use rayon::prelude::*;
 
 use crate::{Error, Noise, Rows};
 
-/// The noise of a residual that was fitted, the model of each output of order zero to `most`.
+/// The noise model of a fit's residual, for each output of order zero to `most`.
 ///
 /// `columns` are the columns of `rows` that were free to follow the noise: those of entries at a bound are not.
 ///
@@ -109,7 +109,7 @@ pub(crate) fn freedom(
         .collect::<Option<Vec<_>>>()?
         .into_iter()
         .unzip();
-    // The lower triangle is all that the factorisation reads.
+    // The factorisation reads only the lower triangle.
     let hessian = DMatrix::from_fn(q, q, |i, j| hessian[i.max(j)][i.min(j)]);
     let factor = hessian.cholesky()?;
     let count = variances(&model(&z, &orders).ok()?, centre.variance)?.len();
@@ -216,7 +216,7 @@ fn bfgs(mut x: Vec<f64>, f: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut value = f(&x);
     let mut slope = gradient(&x);
-    // The curvature of -2 log l in z is about 2 N (1 - k^2): a first step of 1/|slope| at most does no harm.
+    // The curvature of -2 log l in z is about 2 N (1 - k^2): a first step of at most 1/|slope| is safe.
     let first = 0.1 / dot(&slope, &slope).sqrt().max(1.0);
     let mut inverse = vec![vec![0.0; n]; n];
     for (i, row) in inverse.iter_mut().enumerate() {
@@ -256,7 +256,7 @@ fn bfgs(mut x: Vec<f64>, f: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
         }
         let fall = value - to_value;
         (x, value, slope) = (to, to_value, to_slope);
-        // A thousandth of a unit of -2 log l is far below what a record can tell.
+        // A thousandth of a unit of -2 log l is far below the significance level of a record.
         if fall < 1e-4 {
             break;
         }
@@ -361,7 +361,7 @@ pub(crate) mod tests {
             let white = Criterion::of(&rows, &[0, 1], &Noise::white(outputs));
             assert!(most.order() > 0 && at.value < white.value);
             assert_relative_eq!(variance, at.variance, max_relative = 1e-9);
-            // The scale of the second output is at its best.
+            // The scale of the second output maximises the likelihood.
             for factor in [0.97, 1.03] {
                 let moved = |(o, model): (usize, &ArModel)| {
                     model.with_sigma(model.sigma() * if o > 0 { factor } else { 1.0 })

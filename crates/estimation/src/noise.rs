@@ -16,7 +16,7 @@ pub struct Noise {
     outputs: Vec<ArModel>,
 }
 
-/// The partial correlations of a process and the standard deviation of its innovations: what it is made of again, to the last digit.
+/// Saved form of a process: its partial correlations and the standard deviation of its innovations, from which it is restored exactly.
 type Reflections = (Vec<f64>, f64);
 
 impl From<Noise> for Vec<Reflections> {
@@ -38,7 +38,7 @@ impl TryFrom<Vec<Reflections>> for Noise {
 }
 
 impl Noise {
-    /// White noise of unit variance at so many outputs.
+    /// White noise of unit variance at this number of outputs.
     #[must_use]
     pub fn white(outputs: usize) -> Self {
         Self {

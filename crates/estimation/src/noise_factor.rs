@@ -139,7 +139,7 @@ impl Factor {
             let out = &mut rows[k * lanes..][..lanes];
             let predictor = &self.predictors[q.min(k)];
             input.copy_from_slice(own);
-            // `own`: to the prediction of this row, on which the state before acts.
+            // `own`: sensitivity to the prediction of this row, which the preceding state affects.
             match row {
                 Row::Missing => out.fill(0.0),
                 Row::There { scale, gains } => {
@@ -232,7 +232,7 @@ mod tests {
             ] {
                 let observed: Vec<bool> = (0..n).map(|k| !missing.contains(&k)).collect();
                 let there: Vec<usize> = (0..n).filter(|&k| observed[k]).collect();
-                // The covariance without the rows and columns of what is missing.
+                // The covariance without the rows and columns of missing samples.
                 let covariance = (&full * full.transpose())
                     .select_rows(&there)
                     .select_columns(&there);

@@ -5,7 +5,7 @@
 
 use crate::Residuals;
 
-/// A reading of an entry of the vector that does not come from the records.
+/// A measured value of a parameter that does not come from the records.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Position of the entry in the vector.

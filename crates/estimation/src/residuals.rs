@@ -4,7 +4,7 @@ use ct_signals::Whitener;
 
 use crate::{Noise, Prior, Rows, Squares, Triangle, prior::prior_rows};
 
-/// More than sums of squares over a record differ by where they are taken in another order.
+/// Larger than the differences of sums of squares over a record in another order of summation.
 const ROUNDING: f64 = 1e-9;
 /// With several outputs, the cost is checked after this number of samples.
 const LOOK: usize = 64;
@@ -83,7 +83,7 @@ impl Filter {
         Self {
             whiteners: noise.whiteners(columns),
             squares: Squares::of(model, x),
-            // The triangle's cost is a sum in another order.
+            // The cost of the R factor is a sum in another order.
             limit: limit * (1.0 + ROUNDING),
             seen: 0,
         }
@@ -114,8 +114,8 @@ impl Filter {
     }
 }
 
-/// The folded rows, whitened by the noise model and weighted by outputs as the residuals there have it ([`Squares::weights`]), so that
-/// the triangle's cost is [`Squares::cost`]; `None` where the model is not finite.
+/// The R factor of the rows, whitened by the noise model and weighted by outputs according to their residuals ([`Squares::weights`]), so
+/// that its cost is [`Squares::cost`]; `None` if the model is not finite.
 #[must_use]
 pub fn linearise(model: &impl Residuals, x: &[f64], noise: &Noise) -> Option<Triangle> {
     linearise_below(model, x, noise, f64::INFINITY)
@@ -155,7 +155,7 @@ pub fn costs_more(model: &impl Residuals, x: &[f64], noise: &Noise, limit: f64) 
     let within = model.each_residual(x, |sample, row| {
         !filter.push(sample, row) || filter.within()
     });
-    // A cost that is no number is above every limit.
+    // A NaN cost is above every limit.
     let cost = filter.squares.cost();
     within.is_none() || cost.is_nan() || cost > filter.limit
 }
@@ -171,7 +171,7 @@ pub fn squares(model: &impl Residuals, x: &[f64], noise: &Noise) -> Option<Squar
     Some(filter.squares)
 }
 
-/// The rows of all samples as they are, one output's samples of a record after the other; `None` where the model is not finite.
+/// The rows of all samples without weighting, for one output of a record after the other; `None` if the model is not finite.
 #[must_use]
 pub fn rows(model: &impl Residuals, x: &[f64]) -> Option<Rows> {
     let columns = model.free().len() + 1;
@@ -182,7 +182,7 @@ pub fn rows(model: &impl Residuals, x: &[f64]) -> Option<Rows> {
     Some(rows)
 }
 
-/// The residuals, measured minus model, series by series, NaN where the sample is missing; `None` where the model is not finite.
+/// The residuals, measured minus model, series by series, NaN if the sample is missing; `None` if the model is not finite.
 #[must_use]
 pub fn residuals(model: &impl Residuals, x: &[f64]) -> Option<Vec<Vec<f64>>> {
     let mut collected = Collected::new(model, 1);

@@ -1,4 +1,4 @@
-//! Standard errors of a fit whose residual has another spectrum than the metric it was fitted in.
+//! Robust (sandwich) standard errors of a fit whose residual has another spectrum than the noise model in its weighting.
 //!
 //! **Model**: the fit solves `J' M r = 0`, `M = W^-1` the inverse covariance of the noise that it took for granted
 //! (`M = I` for a fit by simulation error); the noise in truth has the covariance `sigma^2 V`. Then
@@ -15,7 +15,7 @@
 
 use crate::{Error, Fit, Noise, Residuals, Rows, Triangle, marginal, noise_factor::Factor, rows};
 
-/// The uncertainty of a fit whose residual has another spectrum than its metric.
+/// Robust uncertainty of a fit whose residual has another spectrum than its weighting.
 #[derive(Debug, Clone)]
 pub struct Robust {
     /// Standard error of every entry of the vector; `None` for one that is fixed, at a bound, or not determined.
@@ -89,7 +89,7 @@ fn diagonal(matrix: &[Vec<f64>]) -> Vec<f64> {
     matrix.iter().enumerate().map(|(i, row)| row[i]).collect()
 }
 
-/// `C` and the rows `M J` of the entries that are not at a bound. Rows whose reading is missing have no part in either.
+/// `C` and the rows `M J` of the parameters that are not at a bound. Rows with a missing reading are not used.
 struct Sandwich {
     bread: Option<Vec<Vec<f64>>>,
     lanes: usize,
@@ -142,7 +142,7 @@ impl Sandwich {
         }
     }
 
-    /// Under noise of scales relative to that of the first output, and the variance of that.
+    /// For noise with scales relative to that of the first output, and the variance of the first one.
     fn covariance(&self, noise: &Noise, variance: f64) -> Option<Vec<Vec<f64>>> {
         let bread = self.bread.as_ref()?;
         if self.lanes == 0 {
@@ -158,7 +158,7 @@ impl Sandwich {
                 filling.push(row);
             }
         }
-        // In units of the variance, as the rest.
+        // In units of the variance, like the other terms.
         let scale = 1.0 / variance.sqrt();
         for row in &self.priors {
             filling.push(&row.iter().map(|value| scale * value).collect::<Vec<f64>>());

@@ -1,4 +1,4 @@
-//! Least squares on the fly: an upper triangle that rows are folded into, in `O(p^2)` memory.
+//! Recursive least squares by QR factorisation: an upper triangle R that is updated with rows, in `O(p^2)` memory.
 
 mod outputs;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use self::outputs::{Outputs, ROUNDS, SAME_WEIGHTS};
 use crate::Squares;
 
-/// Rows are collected in blocks and folded in by Householder reflections.
+/// Rows are collected in blocks and processed by Householder reflections.
 const BLOCK: usize = 128;
 
 /// The triangular factor `R` of all rows pushed so far: `R'R = sum row row'`. Each row is `[j_1 .. j_p, r]`, so the
@@ -20,7 +20,7 @@ pub struct Triangle {
     columns: usize,
     /// Upper triangle, row by row.
     r: Vec<f64>,
-    /// Rows not yet folded in, column by column.
+    /// Rows that are not processed yet, column by column.
     block: Vec<f64>,
     filled: usize,
     /// Work memory: the product of each column of the block with the pivot's column.
@@ -57,7 +57,7 @@ impl Triangle {
         self.rows
     }
 
-    /// Folds one row in; it has [`Triangle::columns`] entries.
+    /// Adds one row; it has [`Triangle::columns`] entries.
     pub fn push(&mut self, row: &[f64]) {
         for (column, value) in self.block.chunks_exact_mut(BLOCK).zip(row) {
             column[self.filled] = *value;
@@ -151,7 +151,7 @@ impl Triangle {
         (0..=j).map(|i| self.at(i, j).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// The cost: the sum of squares of the last column or, of several outputs, [`Squares::cost`].
+    /// The cost: the sum of squares of the last column or, for several outputs, [`Squares::cost`].
     #[must_use]
     pub fn cost(&self) -> f64 {
         if let Some(outputs) = &self.outputs {
@@ -168,7 +168,7 @@ impl Triangle {
             .sum()
     }
 
-    /// The triangle of the same rows with columns chosen and put in this order; the residual may be among them.
+    /// The R factor of the same rows with selected columns in this order; the residual may be among them.
     #[must_use]
     pub fn select(&self, order: &[usize]) -> Self {
         let mut chosen = Self::new(order.len());
@@ -213,7 +213,7 @@ impl Triangle {
         step
     }
 
-    /// `|J x - r|^2`; of several outputs the cost of what is left of each ([`Squares::cost`]).
+    /// `|J x - r|^2`; for several outputs the cost of the residual of each ([`Squares::cost`]).
     #[must_use]
     pub fn predicted(&self, x: &[f64]) -> f64 {
         match &self.outputs {
@@ -264,7 +264,7 @@ impl Triangle {
         own.abs() > 1e-10 * self.column_norm(j) && own.is_finite()
     }
 
-    /// The triangle of the same rows and those of a damping: `J'J + damping diag(scale_j^2)` in place of `J'J`.
+    /// The R factor of the same rows plus damping: `J'J + damping diag(scale_j^2)` instead of `J'J`.
     #[must_use]
     pub fn damped(&self, scale: &[f64], damping: f64) -> Self {
         let mut damped = self.clone();

@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Residuals, prior::free_priors};
 
-/// Sums of squares of each output, and how many samples they are of.
+/// Sums of squares of each output, and the number of their samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Squares {
     /// Sum of squares of each output's whitened residual \[its unit squared\].
@@ -44,7 +44,7 @@ pub struct Squares {
 }
 
 impl Squares {
-    /// None so far, of outputs with so many samples each and these floors.
+    /// Zero sums, for outputs with these numbers of samples and these floors.
     #[must_use]
     pub(crate) fn new(samples: &[usize], floor: impl Fn(usize) -> f64) -> Self {
         Self {
@@ -56,7 +56,7 @@ impl Squares {
         }
     }
 
-    /// None so far, of a model's outputs; its priors at `x`.
+    /// Zero sums for a model's outputs; its priors at `x`.
     pub(crate) fn of(model: &impl Residuals, x: &[f64]) -> Self {
         let prior = free_priors(model).map(|(_, prior)| prior.residual(x).powi(2));
         Self {
@@ -146,7 +146,7 @@ impl Squares {
     }
 }
 
-/// A scale over another, none of them nothing.
+/// Ratio of two scales, both above zero.
 fn relative(first: f64, scale: f64) -> f64 {
     first.max(f64::MIN_POSITIVE) / scale.max(f64::MIN_POSITIVE)
 }
@@ -194,7 +194,7 @@ mod tests {
             assert_relative_eq!(weights[o].powi(2), slope, max_relative = 1e-8);
             weighted += weights[o].powi(2) * sums[o];
         }
-        // The weighted sum of squares is the cost here, and nowhere less.
+        // The weighted sum of squares equals the cost here, and is never smaller.
         assert_relative_eq!(weighted, at(&sums), max_relative = 1e-12);
         for other in [[1.0, 900.0, 0.02], [30.0, 1.0, 5.0], [0.1, 0.1, 0.1]] {
             let sum: f64 = weights.iter().zip(other).map(|(w, c)| w * w * c).sum();

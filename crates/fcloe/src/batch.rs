@@ -189,8 +189,8 @@ impl Problem {
     }
 }
 
-/// Whether the lowest point of the linearised model is nearer than this share of the residual, root mean squares of y^.
-/// The step itself is no measure: damping makes it small far from any minimum too.
+/// Whether the distance to the minimum of the linearised model is below this share of the residual, as root mean squares of y^. The step
+/// itself is no measure, because damping makes it small far from any minimum too.
 fn at_minimum(at: &Triangle, tolerance: f64) -> bool {
     let last = at.columns() - 1;
     // The residual's coordinates along the columns.
@@ -229,7 +229,7 @@ impl Run {
     ) -> Result<Taken, Stop> {
         match method {
             Method::Gradient => {
-                // J' in the coordinates, back in x: scale^2 J'. The lowest point of the linearised model along it.
+                // J' in the coordinates, back in x: scale^2 J'. The minimum of the linearised model along it.
                 let along: Vec<f64> = scale
                     .iter()
                     .enumerate()

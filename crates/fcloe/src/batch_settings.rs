@@ -18,8 +18,8 @@ pub enum Damping {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Along the gradient, the first length tried being the one to the lowest point of the linearised model. Slow in
-    /// a narrow valley: iterate in delta, and allow many iterations.
+    /// Along the gradient; the first trial length leads to the minimum of the linearised model. Slow in a narrow valley: iterate in delta,
+    /// and allow many iterations.
     Gradient,
     /// Step to the minimum of the linearised model, halved until J falls.
     GaussNewton,
@@ -38,7 +38,7 @@ pub enum Method {
 pub enum Coordinates {
     /// The parameters.
     Theta,
-    /// `theta = theta0 (1 + delta)`; estimated levels are scaled by the spread of their signal.
+    /// `theta = theta0 (1 + delta)`; estimated levels are scaled by the standard deviation of their signal.
     Delta,
 }
 
@@ -49,8 +49,8 @@ pub struct Settings {
     pub method: Method,
     /// Coordinates of the iteration.
     pub coordinates: Coordinates,
-    /// The fit ends with a step that changes no parameter by more than this share of itself, or from a point whose
-    /// minimum of the linearised model changes y^ by no more than this share of the residual (root mean square both).
+    /// The fit ends with a step that changes every parameter by at most this share of its value, or at a point where the minimum of the
+    /// linearised model changes y^ by at most this share of the residual (root mean square both).
     pub tolerance: f64,
     /// Most steps that are taken.
     pub max_iterations: usize,

@@ -50,7 +50,7 @@ impl ClosedLoop {
             disturbance: &a * s,
             characteristic,
         };
-        // Refuses what overflowed.
+        // Rejects polynomials that overflowed.
         this.output()?;
         this.input()?;
         this.disturbance()?;

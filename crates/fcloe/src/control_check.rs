@@ -1,4 +1,4 @@
-//! Whether the measured u is what the controller makes of r and y.
+//! Checks whether the measured u is the output of the controller for r and y.
 //!
 //! Method. The controller is run on the recorded r and y, and compared with u; both sides go through `H = (p/(p +
 //! lambda))^q`, q the number of integrators in S and 1/lambda a twentieth of the record, or else noise on y that the controller
@@ -30,17 +30,17 @@ const RIDGE: f64 = 1e-9;
 /// Difference between the controller's output and the measured u, unit of u.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mismatch {
-    /// Root mean square of what the controller does not explain.
+    /// Added to the diagonal, as a share of it, to regularise dependent columns.
     pub rms: f64,
     /// Root mean square of that part of it which follows r.
     pub systematic: f64,
-    /// Root mean square of the difference that noise alone would cause; it is subtracted.
+    /// Root mean square of the part of it that is correlated with r.
     pub by_chance: f64,
     /// Root mean square of u, without its slowest changes if the controller integrates.
     pub size: f64,
 }
 
-/// Compares the controller with a record's u; none in open loop, and where u is not recorded or does not move.
+/// The controller acts on raw signals; a known operating point may contain an offset of the scaling.
 ///
 /// # Errors
 /// [`Error::Lti`] where the controller cannot be simulated at this step; a record that is not valid.
@@ -128,7 +128,7 @@ fn following(free: &[Vec<f64>], ladder: &[Vec<f64>], missed: &[f64]) -> Result<(
     x.truncate(ladder.len());
     let plain = plain.triangle;
     let variance = noise.sigma() * noise.sigma();
-    // The trace of the covariance times J'J = R'R, J the ladder.
+    // The trace of the covariance times J'J = R'R, J the columns of the filtered references.
     let columns = 0..ladder.len();
     let by_row = |k: usize| -> f64 {
         let times = |i: usize| -> f64 {
@@ -191,7 +191,7 @@ fn residual(columns: &[Vec<f64>], signal: &[f64]) -> Vec<f64> {
     Projection::new(columns, signal).left(columns, signal)
 }
 
-/// Least squares of a signal on columns, dependent ones weighed down.
+/// Least squares of a signal on columns, with a ridge for dependent ones.
 struct Projection {
     /// R factor of the columns and the signal.
     triangle: Triangle,

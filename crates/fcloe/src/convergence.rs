@@ -34,7 +34,7 @@ pub struct Condition {
 pub enum Verdict {
     /// `Re (P^/P) > 1/2` at every frequency: the recursion converges with this filter.
     Holds,
-    /// `Re (P^/P)` falls to 1/2 or below, but stays above 0: convergence is not guaranteed, and usual.
+    /// `Re (P^/P)` falls to 1/2 or below, but stays above 0: the recursion usually converges, without guarantee.
     Positive,
     /// `Re (P^/P)` is 0 or negative at some frequency: data at that frequency move the estimates in the wrong direction.
     Negative,
@@ -91,8 +91,8 @@ impl Condition {
     }
 }
 
-/// `P^/P - 1/2` along a logarithmic grid of frequencies, for a picture: `(w, real part, imaginary part)`. The condition
-/// holds where all of the curve is right of 0. The grid covers the roots of both polynomials and two decades beyond.
+/// `P^/P - 1/2` on a logarithmic grid of frequencies, for a plot: `(w, real part, imaginary part)`. The condition is satisfied if the whole
+/// curve is to the right of 0. The grid covers the roots of both polynomials and two decades beyond.
 ///
 /// # Errors
 /// [`Error::Lti`], as [`Condition::new`].

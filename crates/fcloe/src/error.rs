@@ -14,7 +14,7 @@ pub enum Error {
     /// A series or a setting that `ct-signals` refuses.
     #[error(transparent)]
     Signals(#[from] ct_signals::Error),
-    /// A plant that differentiates.
+    /// A plant with more zeros than poles.
     #[error("the plant has B of degree {m} over A of degree {n}; choose m of at most {n}")]
     Improper {
         /// Degree of A.
@@ -22,7 +22,7 @@ pub enum Error {
         /// Degree of B.
         m: usize,
     },
-    /// A plant without dynamics.
+    /// A plant without dynamics (order 0).
     #[error("the plant has order n = 0; a plant needs at least one pole, n >= 1")]
     OrderZero,
     /// A vector that does not fit the orders.
@@ -41,7 +41,7 @@ pub enum Error {
         /// The order asked for.
         n: usize,
     },
-    /// A controller that differentiates.
+    /// A controller with more zeros than poles.
     #[error(
         "the controller has R of degree {r} over S of degree {s}; filter its derivative, so that R's degree is at most {s}"
     )]
@@ -96,7 +96,7 @@ pub enum Error {
         /// The record's name.
         record: String,
     },
-    /// A record without u where signals are regressed on one another.
+    /// A record without u for a regression.
     #[error(
         "{record}: there is no input u, which a regression needs in closed loop too; give it, or start from a plant of your own"
     )]
@@ -175,7 +175,7 @@ pub enum Error {
         /// Rows in the record.
         rows: usize,
     },
-    /// Instruments with a filter that is not the plant's own, and readings that are missing.
+    /// Instruments with a filter that is not the plant's own denominator, and missing readings.
     #[error(
         "readings of y are missing, and the filter of the instruments did not come to rest at A^: their errors are not known then"
     )]
@@ -208,7 +208,7 @@ pub enum Error {
         /// Value in the first record.
         value: f64,
     },
-    /// The measured u is not what the controller makes of r - y.
+    /// The measured u is not the controller's output for r - y.
     #[error(
         "{record}: the measured u is not R/S (r - y): they differ by {mismatch:.3} rms where u moves by {size:.3} rms ({percent:.0} %); \
          check the controller's coefficients, their units of time, the sign, and that u is the command as it was recorded",
@@ -264,7 +264,7 @@ pub enum Error {
         /// Bandwidths that were tried.
         tried: usize,
     },
-    /// The simulation left the range of numbers.
+    /// The simulation overflowed.
     #[error(
         "the loop simulated at the start is not finite; check the units of the signals and the start"
     )]

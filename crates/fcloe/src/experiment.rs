@@ -71,9 +71,8 @@ pub fn continuous_loop(
     Ok(LoopData { y, u })
 }
 
-/// A loop whose controller is sampled: it runs `periods` times in each sampling interval of the record, on the output at
-/// that instant; r and w are held over the interval. From rest. The continuous loop may be stable where this one is not:
-/// then the signals grow.
+/// A loop with a sampled controller: it runs `periods` times in each sampling interval of the record, on the output at that instant; r and
+/// w are held over the interval. From rest. The loop may be unstable although the continuous loop is stable: then the signals grow.
 ///
 /// A direct term of the plant passes on the command of the period before: the controller cannot act on what its own
 /// command does at once.
@@ -195,7 +194,7 @@ fn check_length(w: &[f64], r: &[f64]) -> Result<(), Error> {
     })
 }
 
-/// A converter: `2^bits` levels from `low` to `high`, and nothing beyond.
+/// A converter: `2^bits` levels from `low` to `high`, with saturation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantiser {
     low: f64,

@@ -66,8 +66,8 @@ pub struct NoiseModel {
 }
 
 impl NoiseModel {
-    /// The better of the two paths for the residuals of all records, or `path`. The loop's is out of the question where its
-    /// inverse grows without bound: a plant that is unstable without its controller.
+    /// The better of the two paths for the residuals of all records, or `path`. The loop's path is excluded if its inverse grows without
+    /// bound: for a plant that is unstable without its controller.
     pub(crate) fn of_residuals(
         residuals: &[Residual],
         closed: &ClosedLoop,
@@ -260,7 +260,7 @@ impl NoiseModel {
     }
 }
 
-/// An autoregression after a system that it is held for.
+/// An autoregression followed by a given system.
 pub(crate) fn behind(
     ar: &ArModel,
     system: &StateSpace,

@@ -19,11 +19,11 @@ use ct_lti::Hold;
 use crate::control_check::{Mismatch, controller_mismatch};
 use crate::{Controller, Error, LoopRecord, Offsets, Orders, PlantModel};
 
-/// A fit of parameters to fewer samples than this, or than 5 for each of them, is refused.
+/// A fit with fewer samples than this, or than 5 for each parameter, is rejected.
 const MIN_SAMPLES: usize = 20;
 const SAMPLES_PER_PARAMETER: usize = 5;
 
-/// A controller that misses more of u than this share is refused.
+/// A controller whose output differs from u by more than this share is rejected.
 const LARGEST_MISMATCH: f64 = 0.1;
 
 /// The levels of a record that were estimated.
@@ -78,7 +78,7 @@ pub(crate) enum Refused {
     Higher,
 }
 
-/// J may be above its limit by this part: sums in another order differ by less.
+/// Tolerance of the limit of J, for differences by the order of summation.
 const ROUNDING: f64 = 1e-9;
 
 impl Problem {

@@ -1,4 +1,4 @@
-//! A record of a loop: r, u and y on an even grid, what r and u do between samples, and where zero is.
+//! A record of a loop: r, u and y on an even grid, the hold of r and u, and the operating point.
 
 use std::borrow::Cow;
 
@@ -29,11 +29,11 @@ pub enum Offsets {
     Known(OperatingPoint),
     /// The mean of the first rows, in which the loop rests: at least 1.
     FirstRows(usize),
-    /// The means of the record: right where nothing better is known and the record is long; the model still starts at
-    /// rest, so a transient at the beginning is in error.
+    /// The means of the record: a choice for long records without better knowledge; the model starts at rest, so a transient at the
+    /// beginning causes an error.
     Means,
-    /// Unknown. The batch fit estimates the level of the drive (r, or u in open loop) at which the loop rested and
-    /// the output's level there, beside the parameters. They start from the first row.
+    /// Unknown. The batch fit estimates the level of the drive (r, or u in open loop) at rest and the corresponding output level together
+    /// with the parameters, starting from the first row.
     Estimated,
 }
 
@@ -148,7 +148,7 @@ impl LoopRecord {
         self.readings() < self.len()
     }
 
-    /// y on straight lines where readings are missing.
+    /// y with linear interpolation of missing readings.
     pub(crate) fn y_on_lines(&self) -> Cow<'_, [f64]> {
         match self.lacks_readings() {
             true => Cow::Owned(ct_signals::interpolated(&self.y)),

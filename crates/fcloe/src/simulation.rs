@@ -23,7 +23,7 @@ use ct_lti::{Hold, Polynomial, StateSpace, TransferFunction};
 
 use crate::{ClosedLoop, Controller, Error, PlantModel};
 
-/// Samples that are computed at a time.
+/// Number of samples that are computed at a time.
 pub const BLOCK: usize = 64;
 
 /// The simulated signals at up to [`BLOCK`] successive samples.
@@ -200,7 +200,7 @@ impl LoopSimulator {
         &self.block
     }
 
-    /// y^ at all samples of the drive, from where the loop is.
+    /// y^ at all samples of the drive, from the present state of the loop.
     pub fn outputs(&mut self, drive: &[f64]) -> Vec<f64> {
         let mut y = Vec::with_capacity(drive.len());
         for drive in drive.chunks(BLOCK) {
@@ -210,8 +210,7 @@ impl LoopSimulator {
         y
     }
 
-    /// y^ and u^ at all samples of the drive, from where the loop is; u^ is the command itself, whose sensor's filter
-    /// is not in it.
+    /// y^ and u^ at all samples of the drive, from the present state of the loop; u^ is the command without the sensor's filter.
     pub fn outputs_and_inputs(&mut self, drive: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut y = Vec::with_capacity(drive.len());
         let mut u = Vec::with_capacity(drive.len());

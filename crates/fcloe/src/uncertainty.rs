@@ -34,7 +34,7 @@ pub struct Uncertainty {
     pub std_errors: Vec<f64>,
     /// Noise model of the residual.
     pub noise: NoiseModel,
-    /// Standard errors of a white residual, for comparison: what is usually printed.
+    /// Standard errors for a white residual, for comparison with usual software.
     pub white_std_errors: Vec<f64>,
     /// Degrees of freedom.
     pub freedom: f64,
@@ -113,7 +113,7 @@ impl Problem {
 
         let n = self.samples() as f64;
         let freedom = (n - (q + noise.ar.order()) as f64).max(1.0);
-        // The model's sigma^2 is over n less its order.
+        // The model's sigma^2 is divided by n minus its order.
         let variance = noise.ar.sigma().powi(2) * (n - noise.ar.order() as f64) / freedom;
         let times = |i: usize, j: usize| -> f64 {
             (0..q)

@@ -122,7 +122,7 @@ mod tests {
         assert_eq!(common_clock(&parts), Some(vec![0.0, 110.0, 400.0]));
         assert_eq!(span(&parts), 500.0);
         let clock = Clock::of(&parts);
-        // A held-out record later, one in between, one from its own zero.
+        // Held-out records: a later one, one in between, one with its own zero.
         let test = [
             record(700.0, 800.0),
             record(400.0, 450.0),
@@ -140,7 +140,7 @@ mod tests {
     fn records_from_their_own_zero_share_none() {
         for records in [
             vec![record(0.0, 100.0), record(0.0, 300.0)],
-            // Out of order, overlapping, and begun at the instant at which the other ends.
+            // Out of order, overlapping, and with the same instant as end and start.
             vec![record(200.0, 300.0), record(0.0, 100.0)],
             vec![record(0.0, 100.0), record(50.0, 350.0)],
             vec![record(0.0, 100.0), record(100.0, 300.0)],

@@ -13,7 +13,7 @@ pub enum Error {
     /// No record was given.
     #[error("no record to fit: give at least one")]
     NoRecord,
-    /// A parameter is named that the structure does not have.
+    /// A parameter that the structure does not have.
     #[error("no parameter `{name}` in this model: it has {known}")]
     UnknownParameter {
         /// The name that was given.
@@ -67,7 +67,7 @@ pub enum Error {
     /// Cancelled by [`Setup::stop`](crate::Setup::stop).
     #[error("stopped before it was done")]
     Stopped,
-    /// The loop cannot be simulated without what it was to follow.
+    /// The loop cannot be simulated without its reference.
     #[error(
         "{record}: the record holds no reference, which a controller follows: name its column as reference under [columns]"
     )]

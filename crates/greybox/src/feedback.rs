@@ -32,7 +32,7 @@ use estimation::Triangle;
 
 use crate::Error;
 
-/// The controller on what was measured.
+/// The controller simulated on the measured signals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Replay {
     /// The controller's states when the record begins, those that fit the measured command best.
@@ -45,7 +45,7 @@ pub struct Replay {
     pub moves: f64,
 }
 
-/// Rounds in which the initial states are fitted: without limits the first one is exact.
+/// Rounds of the fit of initial states: without limits the first one is exact.
 const ROUNDS: usize = 6;
 
 /// Runs a controller on the measured reference and reading of a record, and compares the measured command with its own.
@@ -218,7 +218,7 @@ impl Feedback {
         })
     }
 
-    /// Names and bounds of the controller's states in a record: within ten times what the command moves over.
+    /// Names and bounds of the controller's states in a record: within ten times the range of the command.
     pub(crate) fn entries(&self, record: usize, input: (f64, f64)) -> Vec<(String, (f64, f64))> {
         let room = 10.0 * (input.1 - input.0);
         let several = self.controller.states() > 1;
@@ -254,12 +254,12 @@ pub(crate) struct Response {
 }
 
 impl Response {
-    /// A record begins: initial states have columns of their own.
+    /// A record begins: its initial states have separate columns.
     pub(crate) fn reset(&mut self) {
         self.levels.fill(0.0);
     }
 
-    /// Adds to a row of an output what its commands so far did.
+    /// Adds the effect of earlier commands to a row of an output.
     pub(crate) fn add_to(&self, output: usize, row: &mut [f64]) {
         let read = self.plant.outputs[output] * row.len();
         for (value, level) in row.iter_mut().zip(&self.levels[read..]) {

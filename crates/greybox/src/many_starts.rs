@@ -1,4 +1,4 @@
-//! Effects at the actuator with many starts: a plain simulation of each, and a regression, say which are worth linearising.
+//! Effects at the actuator with many starts: a plain simulation and a regression of each show which starts are linearised.
 //!
 //! The reading is linear in the pump's gain `K`, `y = K f(p) + ...`, `p` the command after the effect. What the effect changes in a
 //! simulation with the gain `K0` is `D = K0 f(p) - K0 f(u)`, so the column of the gain at a start is `df/dK + D/K0`, with `df/dK` that of
@@ -14,11 +14,11 @@ use crate::Setup;
 /// Effects that keep much of the command from the plant, and so affect its apparent speed.
 const STICKS: &str = "stiction_backlash";
 const SATURATES: &str = "pump_saturation";
-/// Time constants of linear plants, in samples, from which their fits begin beside the one that the model without them has, ...
+/// Time constants of linear plants, in samples, for further starts in addition to the time constant of the model without the effect, ...
 const TIME_CONSTANTS: [f64; 3] = [1.0, 12.0, 150.0];
 /// ... and one in multiples of the record's length: an integrating plant.
 const INTEGRATES: f64 = 10.0;
-/// Tanks: by how much quicker than the model without them has it.
+/// For tanks: ratios to the speed of the model without the effect.
 const QUICKER: [f64; 3] = [0.3, 3.0, 9.0];
 
 /// Plants that are quicker or slower than one, in front of which something sticks or saturates; none for other effects.
@@ -70,7 +70,7 @@ fn time_constants(setup: &Setup) -> Vec<usize> {
 
 /// Step that is left out if the time limit has passed.
 const STARTS: &str = "further starts of effects at the actuator";
-/// Damping of the step by the other parameters, against what the data do not determine.
+/// Damping of the step in the other parameters, for directions that the data do not determine.
 const DAMPING: f64 = 1e-9;
 /// With more starts than this, an effect at the actuator is simulated from all of them, without derivatives, before it is linearised ...
 const MANY: usize = 20;
@@ -109,7 +109,7 @@ pub fn keep_best_simulated(
     starts.par_extend(best);
 }
 
-/// A start with the other parameters fitted to it in one step, by those of the free ones that are named, where that is a better one.
+/// A start with the other parameters fitted in one step, with derivatives for the given free ones, if the cost falls.
 fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &Noise) -> Vec<f64> {
     let triangle = (!setup.leaves_out(STARTS)).then(|| setup.linearise(&start, noise));
     let Some(triangle) = triangle.flatten() else {
@@ -147,7 +147,7 @@ fn apart(setup: &Setup, placed: Placed) -> Vec<usize> {
 struct Simulated {
     /// Sum of squares after the linear fit.
     left: f64,
-    /// The pump's gain, where it is fitted.
+    /// The pump's gain, if it is fitted.
     gain: Option<f64>,
 }
 
@@ -167,7 +167,7 @@ fn scores_of_simulations(
             Some((at, info.absent))
         })
         .collect();
-    // Starts that differ in more than the effect have their own model without it.
+    // Starts that differ in more than the effect have separate models without the effect.
     let without = |start: &Vec<f64>| {
         let mut without = start.clone();
         for &(at, absent) in &own {
@@ -246,9 +246,9 @@ struct WithoutEffect {
     /// The pump's gain.
     gain: f64,
     residual: Vec<f64>,
-    /// The column of the pump's gain, times the gain; where the gain is known only the simulation itself counts.
+    /// The column of the pump's gain, times the gain; for a known gain, only the simulation itself.
     by_gain: Option<Vec<f64>>,
-    /// The residual and that column together, without what the other parameters explain of them.
+    /// The residual and that column, both without the part that the other parameters explain.
     wanted: Vec<f64>,
     /// The other parameters' columns, orthonormal.
     basis: Vec<Vec<f64>>,
@@ -297,7 +297,7 @@ impl WithoutEffect {
         })
     }
 
-    /// The model with the effect, of which the simulation leaves `left`, once gain and other parameters are fitted.
+    /// The model with the effect, with the residual sum of squares `left` after a fit of the gain and the other parameters.
     fn with(&self, mut left: Vec<f64>) -> Simulated {
         let Some(by_gain) = &self.by_gain else {
             project(&mut left, &self.basis);

@@ -1,4 +1,4 @@
-//! Starts from fits beside an observer: the readings pull the states that they read.
+//! Start values from observer fits: the readings correct the measured states.
 //!
 //! The simulation error of a model that oscillates, or that a loop drives, has many local minima: a slightly wrong frequency is out of
 //! phase after a few periods. Where each state that is read follows its reading at a rate, errors do not add up, and the criterion is
@@ -14,9 +14,9 @@ use estimation::{Noise, Stopping, fit_from, within};
 
 use crate::ModelSetup;
 
-/// Rates at which states follow their readings, one after the other, per interval between rows.
+/// Gains with which states follow their readings, one after the other, per interval between rows.
 const RATES: [f64; 3] = [0.5, 0.1, 0.02];
-/// The fit at a rate: it is a start only.
+/// Stopping criteria of the fit with a gain: its result is only a start.
 const STOPPING: Stopping = Stopping {
     evaluations: 30,
     cost: 1e-4,
@@ -39,7 +39,7 @@ fn shown(spec: &ModelSpec) -> Vec<(usize, usize)> {
     outputs.filter_map(state).collect()
 }
 
-/// The model in which these states follow the readings of their outputs, which are further inputs in this order.
+/// The model in which these states follow the readings of their outputs, which are additional inputs in this order.
 fn observed(spec: &ModelSpec, shown: &[(usize, usize)], rate: f64) -> ModelSpec {
     let mut observed = spec.clone();
     for &(o, i) in shown {

@@ -41,7 +41,7 @@ pub struct ModelSetup<'a> {
 
 /// ... and an initial state within this factor.
 const STATE_REACH: f64 = 300.0;
-/// Rounds in which outputs are weighted again by their noise.
+/// Number of iterations of the output weights.
 const WEIGHTINGS: usize = 3;
 impl<'a> ModelSetup<'a> {
     /// Adds a time limit: once it has passed, or `interrupt` is set, fits take no further steps.
@@ -219,7 +219,7 @@ impl<'a> ModelSetup<'a> {
         self.bounds[i]
     }
 
-    /// An entry is the initial value of a state that an output reads.
+    /// Whether an entry is the initial value of a state that an output measures.
     pub(crate) fn is_read(&self, i: usize) -> bool {
         let spec = self.model.spec();
         i.checked_sub(self.parameter_count()).is_some_and(|i| {
@@ -250,8 +250,8 @@ impl<'a> ModelSetup<'a> {
         }
     }
 
-    /// Fits from many starts. Of several outputs each counts by its noise, which is what the past of its residual does not explain: where
-    /// the model fails at one output, that does not make the others' readings worth more.
+    /// Fits from many starts. Outputs are weighted by their noise, estimated from the part of the residual that its past does not predict:
+    /// a model error at one output does not increase the weight of the others.
     ///
     /// # Errors
     /// Where no start gives a finite simulation.

@@ -14,13 +14,13 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::ModelSetup;
 
-/// Spread of the starts of parameters, of their logarithm: a guess is off by a factor of two as often as not ...
+/// Spread of the starts of parameters, in logarithms: half of the guesses are wrong by more than a factor of two ...
 const SPREAD: f64 = 0.8;
 /// ... and of the initial states that no output measures.
 const STATE_SPREAD: f64 = 0.5;
 /// Number of simulated points per fitted start.
 const POINTS: usize = 16;
-/// The first parts of the records that are fitted one after the other, as shares of each.
+/// The first parts of the records, which are fitted one after the other, as shares of each.
 const HORIZONS: [f64; 3] = [0.03, 0.1, 0.3];
 /// The least samples of a first part for every fitted number.
 const LEAST: usize = 4;
@@ -93,7 +93,7 @@ impl ModelSetup<'_> {
         let Ok(normal) = Normal::new(0.0, 1.0) else {
             return Vec::new();
         };
-        // Every four dimensions of a seed are scrambled alike; the seed of the fit scrambles all.
+        // Groups of four dimensions are scrambled equally; the seed of the fit scrambles all.
         let seed = (seed ^ (seed >> 32)) as u32;
         let spread: Vec<usize> = self
             .free()
@@ -113,7 +113,7 @@ impl ModelSetup<'_> {
         (0..n).map(point).collect()
     }
 
-    /// An entry so many deviations from its start.
+    /// An entry at this number of deviations from its start.
     fn moved(&self, i: usize, draw: f64) -> f64 {
         let (value, (low, high)) = (self.start()[i], self.bound(i));
         if i >= self.parameter_count() {

@@ -78,7 +78,7 @@ fn prediction(
     let mut samples = 0;
     for (r, record) in records.iter().enumerate() {
         let series = |o: usize| &record.outputs[o].values;
-        // Outputs may be sampled at rates of their own: the past of each is its last readings that are there.
+        // Outputs may have different rates: the past of each is its last present readings.
         let there: Vec<Vec<usize>> = (0..outputs).map(|o| read_rows(series(o))).collect();
         let own = &there[output];
         for &k in own {

@@ -1,4 +1,4 @@
-//! The outputs of a fitted model on other inputs, and how well they are known.
+//! The outputs of a fitted model on other inputs, and their uncertainty.
 //!
 //! To first order the simulated output moves with the parameters and the initial states by its exact sensitivities `S_p` and `S_x`:
 //! ```text
@@ -24,11 +24,11 @@ use crate::Error;
 /// Uncertainty of the parameters of a fit, and standard deviation of the readings' noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitUncertainty {
-    /// Positions in the vector of the parameters that have an error: fitted ones that are not at a bound.
+    /// Positions in the vector of the parameters with a standard error: fitted ones that are not at a bound.
     pub entries: Vec<usize>,
     /// Covariance of the parameters, row by row \[product of their units\].
     pub covariance: Vec<Vec<f64>>,
-    /// Degrees of freedom: the quantile of Student's distribution with as many makes a band of a standard error.
+    /// Degrees of freedom: the quantile of Student's distribution times the standard error gives a band.
     pub freedom: f64,
     /// The noise of the residual at each output, with the scale of its innovations \[output unit\].
     pub noise: Noise,
@@ -110,7 +110,7 @@ pub struct InitialStates {
     pub values: Vec<f64>,
     /// Derivatives with respect to [`FitUncertainty::entries`], a row for each state.
     by_parameters: Vec<Vec<f64>>,
-    /// Covariance of what else is not known of them, row by row.
+    /// Covariance of the remaining uncertainty of the states, row by row.
     covariance: Vec<Vec<f64>>,
 }
 
@@ -146,8 +146,7 @@ impl InitialStates {
         states
     }
 
-    /// A function of the parameters, whose slopes are taken by differences over a hundredth of each standard error; `None` where it has no
-    /// value.
+    /// A function of the parameters, with slopes by differences over a hundredth of each standard error; `None` if it has no value.
     #[must_use]
     pub fn of_parameters(
         values: impl Fn(&[f64]) -> Option<Vec<f64>>,
@@ -172,7 +171,7 @@ impl InitialStates {
         Some(states)
     }
 
-    /// Fitted to the readings of a record with the parameters as they are; `None` where the readings do not determine them.
+    /// Fitted to the readings of a record with constant parameters; `None` if the readings do not determine them.
     ///
     /// `frozen` and `model` are the same model against the same one record: the states alone are free in the first, all of
     /// [`FitUncertainty::entries`] too in the second. `x`: the parameters, then where the states start.
@@ -215,7 +214,7 @@ impl InitialStates {
         let Some(inverse) = triangle.covariance(&own) else {
             return Ok(None);
         };
-        // A state that no reading speaks of is neither at a bound nor known.
+        // A state without influence on any reading is neither at a bound nor known.
         let silent = |c: usize| fit.triangle.column_norm(c) <= 0.0;
         if (0..free_states).any(silent) {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! Whether the readings of records lie on a grid, `y = offset + k D`, as those of a converter or of a file with few digits do.
+//! Whether the readings of records are on a grid, `y = offset + k D`, as after a converter or in a file with few digits.
 //!
 //! A converter rounds what the sensor says with its noise, so the readings themselves are the grid: it is seen without any model and
 //! without any fit. Digits of a file are a grid too; whether a grid matters is a question of its step against the noise
@@ -16,13 +16,13 @@ use ct_signals::Record;
 const NEAR: f64 = 0.1;
 /// Share of the readings that must lie on the grid.
 const MOST: f64 = 0.9;
-/// Fewest steps between the least and the largest reading.
+/// Least number of steps between the smallest and the largest reading.
 const FEWEST_STEPS: f64 = 3.0;
-/// Most steps that are looked for.
+/// Largest number of steps for the search.
 const MOST_STEPS: f64 = 2e4;
 /// Fewest readings.
 const FEWEST_READINGS: usize = 20;
-/// Differences whose fractions are candidates, as quantiles, and the whole numbers that they are divided by.
+/// Quantiles of the differences whose fractions are candidates, and the divisors of the differences.
 const QUANTILES: [f64; 6] = [0.0, 0.02, 0.1, 0.25, 0.5, 0.75];
 const DIVISORS: u32 = 12;
 /// Two readings are the same level within this share of the largest reading.
@@ -32,7 +32,7 @@ const PRINTED: f64 = 0.04;
 /// A grid is coarse where its step is at least this part of the median change from one reading to the next. Rounding then adds
 /// more than 1 % to the noise's variance.
 const COARSE: f64 = 0.4;
-/// The chance of a grid among levels that lie anywhere must be less.
+/// Limit of the probability of a grid among random levels.
 const CHANCE: f64 = 1e-3;
 
 /// The grid that readings lie on.
@@ -126,7 +126,7 @@ pub fn reading_grid(records: &[Record], output: usize) -> Option<ReadingGrid> {
     largest.filter(|grid| span >= (FEWEST_STEPS - NEAR) * grid.step)
 }
 
-/// The distinct readings; where most readings are among those that come again and again, these alone.
+/// The distinct readings; if most readings are repeated ones, only these.
 fn levels(sorted: &[f64], same: f64) -> Vec<f64> {
     let mut counted: Vec<(f64, usize)> = Vec::new();
     for &y in sorted {
@@ -183,7 +183,7 @@ fn refined(mut step: f64, levels: &[f64]) -> Option<f64> {
     Some(step)
 }
 
-/// Offset of the grid of that step, share of the readings on it, and how near nine tenths of these are, in steps.
+/// Offset of the grid of that step, share of the readings on it, and distance of nine tenths of these from it, in steps.
 fn held_against(step: f64, readings: &[f64]) -> Option<(f64, f64, f64)> {
     let turn = std::f64::consts::TAU / step;
     let (sin, cos) = readings.iter().fold((0.0, 0.0), |(sin, cos), y| {
@@ -192,7 +192,7 @@ fn held_against(step: f64, readings: &[f64]) -> Option<(f64, f64, f64)> {
     });
     let beside = |offset: f64| move |y: &f64| (y - offset) - ((y - offset) / step).round() * step;
     let middle = sin.atan2(cos) / turn;
-    // The mean angle leans towards what is not on the grid, the median does not.
+    // Readings outside the grid bias the mean angle, but not the median.
     let mut near: Vec<f64> = readings
         .iter()
         .map(beside(middle))
@@ -317,7 +317,7 @@ mod tests {
         assert_eq!(reading_grid(&[course(|t| (t / 50.0).sin())], 0), None);
         assert_eq!(reading_grid(&[course(|_| 3.0)], 0), None);
         assert_eq!(reading_grid(&[course(|_| f64::NAN)], 0), None);
-        // Two readings are no grid, however often they come.
+        // Two readings are no grid, however often they occur.
         assert_eq!(
             reading_grid(&[course(|t| if t < 300.0 { 1.0 } else { 2.7 })], 0),
             None

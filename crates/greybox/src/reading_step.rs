@@ -10,7 +10,7 @@ use crate::reading_grid;
 const ALIGNED: f64 = 0.8;
 /// The most steps between the least and the largest reading that are looked for.
 const MOST_STEPS: f64 = 100.0;
-/// The fewest: below, any few distinct levels would do.
+/// The least number of steps: fewer distinct levels would always fit.
 const FEWEST_STEPS: f64 = 4.0;
 /// Number of readings in the first test.
 const FIRST_LOOK: usize = 400;
@@ -48,7 +48,7 @@ fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
         .copied()
         .step_by(count.div_ceil(FIRST_LOOK))
         .collect();
-    // The largest reading turns by an eighth from one number of steps to the next, so none is passed over.
+    // The phase of the largest reading changes by an eighth from one number of steps to the next, so no peak is missed.
     let grid = 0.125 / reach;
     let count = ((MOST_STEPS - FEWEST_STEPS) / span / grid).min(1e5) as usize;
     let at = |k: usize| FEWEST_STEPS / span + grid * k as f64;

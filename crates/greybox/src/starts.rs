@@ -1,4 +1,4 @@
-//! Starts from all over the plausible region.
+//! Starts over the whole plausible region.
 //!
 //! What a tank's record fixes well is its throughput in the mean; what it may be anything of is its time constants.
 //! So time constants are drawn evenly on a logarithmic scale between the sampling interval and the record's length,
@@ -111,8 +111,8 @@ fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     x
 }
 
-/// Pumps, valves and outlet of joined tanks that rest, a measured one at its mean level, with a throughput; `heads`: of the valves, as
-/// shares of that level.
+/// Pumps, valves and outlet of joined tanks at rest, a measured level at its mean, with a throughput; `heads`: of the valves, as shares of
+/// that level.
 fn joined_tanks(setup: &Setup, (read, mean): (usize, f64), flow: f64, heads: [f64; 2]) -> Vec<f64> {
     let scales = &setup.structure.scales;
     let second = scales.input_2.is_some();
@@ -157,7 +157,7 @@ fn joined_tanks(setup: &Setup, (read, mean): (usize, f64), flow: f64, heads: [f6
     x
 }
 
-/// The levels at which joined tanks would rest under their first commands, but for the measured one, which is read.
+/// The equilibrium levels of joined tanks under their first commands, except for the measured one, which is read.
 fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
     let scales = &setup.structure.scales;
     let orifice = scales.orifice.unwrap_or(1.0);
@@ -182,13 +182,13 @@ fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
     levels.to_vec()
 }
 
-/// The output that reads the level of a vessel, if one does.
+/// The output that reads the level of a vessel, if there is one.
 fn output_of(setup: &Setup, vessel: usize) -> Option<usize> {
     let mut outputs = setup.structure.scales.outputs.iter();
     outputs.position(|output| output.vessel == vessel)
 }
 
-/// The first reading of a vessel's level; `None` where nobody reads it, or it has no sample.
+/// The first reading of a vessel's level; `None` if it is not measured, or has no sample.
 fn first_reading(setup: &Setup, record: &Record, vessel: usize) -> Option<f64> {
     let output = &record.outputs[output_of(setup, vessel)?];
     output.present().next()
@@ -204,8 +204,8 @@ fn mean_level(setup: &Setup, vessel: usize) -> Option<f64> {
     Some(sum / count).filter(|mean| *mean > 0.0)
 }
 
-/// The initial states of the records of a setup from their first readings, for these parameters: a level that is not read, and lags, at
-/// rest under the first command.
+/// The initial states of the records of a setup from their first readings, for these parameters: levels that are not measured, and lags,
+/// are at rest under the first command.
 #[must_use]
 pub fn levels_from_readings(setup: &Setup, parameters: &[f64]) -> Vec<f64> {
     let mut x = parameters.to_vec();
@@ -213,8 +213,8 @@ pub fn levels_from_readings(setup: &Setup, parameters: &[f64]) -> Vec<f64> {
     x.split_off(parameters.len())
 }
 
-/// Appends initial states: a level that is measured from its first reading, an upper one that is not and lags at rest under the first
-/// command, the controller's as they give the measured command.
+/// Appends initial states: a measured level from its first reading, an upper level that is not measured and lags at rest under the first
+/// command, and the controller's from the measured command.
 pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
     for (r, record) in setup.records.iter().enumerate() {
         let structure = &setup.structure;

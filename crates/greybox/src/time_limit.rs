@@ -42,7 +42,7 @@ impl TimeLimit {
         self.until.store(until, Ordering::Relaxed);
     }
 
-    /// The time that is allowed has passed.
+    /// Whether the allowed time has passed.
     #[must_use]
     pub fn passed(&self) -> bool {
         let until = self.until.load(Ordering::Relaxed);

@@ -50,7 +50,7 @@ pub enum Error {
         /// What was given.
         value: f64,
     },
-    /// A bandwidth with which the filters pass nothing, or nothing but rounding.
+    /// A bandwidth for which the filters pass nothing, or only rounding errors.
     #[error(
         "--bandwidth is {found:e} 1/s, but the filters need one from {low:.1e} to {high:.1e} 1/s for this record; without the option it is found"
     )]
@@ -62,7 +62,7 @@ pub enum Error {
         /// The largest, 1/s.
         high: f64,
     },
-    /// The method has come to no model that can be simulated.
+    /// The method has not found a model that can be simulated.
     #[error("{record}: no model of order {order} was found: {why}; try {}another method", or_lower(*.order))]
     NoModel {
         /// Name of the record.
@@ -115,7 +115,7 @@ pub enum Error {
         /// The method that was asked for.
         method: Method,
     },
-    /// Every one of several methods has refused.
+    /// Every one of several methods has failed.
     #[error("{reason}")]
     AllRefused {
         /// Message of the first error.
@@ -129,7 +129,7 @@ pub enum Error {
         /// Name of the record.
         record: String,
     },
-    /// The controller did not give the command that was measured.
+    /// The controller's output is not the measured command.
     #[error(
         "{record}: the measured command disagrees with the controller of the model file, R/S (r - y), by {} {unit} rms, {:.0} % of what it moves: \
          check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",

@@ -1,4 +1,4 @@
-//! Records in which rows or samples of the input are missing, as the methods take them.
+//! Preparation of records with missing rows or samples of the input.
 //!
 //! As everywhere else ([`ct_signals::Gaps`]) the input is held through a gap of at most a tenth of the plant's fastest time constant, which
 //! a first fit says (SRIVC of the order that is asked for). At a longer gap the record is cut.
@@ -36,7 +36,7 @@ pub struct Mended {
 }
 
 impl Mended {
-    /// Readings of the parts that the whole lacks.
+    /// Number of readings of the parts that the whole lacks.
     pub(crate) fn readings_left_out(&self) -> usize {
         let readings = |record: &Record| record.outputs.first().map_or(0, |y| y.present().count());
         let of_parts: usize = self.parts.iter().map(readings).sum();
@@ -94,7 +94,7 @@ pub fn mend(
     Ok((all(&fitted)?, all(&others)?))
 }
 
-/// A record with inputs held for at most `limit`; after longer gaps its whole lacks the readings of `memory` \[s\].
+/// A record with inputs held for at most `limit`; after longer gaps the readings within `memory` \[s\] are left out of the whole record.
 fn cut(record: &Record, limit: f64, memory: f64) -> Result<Mended, Error> {
     let (parts, gaps) = record.without_gaps(limit);
     let (whole, _) = record.without_gaps(f64::INFINITY);
@@ -159,7 +159,7 @@ fn time_constants(
         };
         let found = match refined::plant(records, &request) {
             Ok((plant, true)) => plant,
-            // The lowest order is better than nothing.
+            // With the lowest order, an undetermined result is accepted.
             Ok((plant, false)) if n == 1 => plant,
             Ok(_) => continue,
             Err(error) => {
@@ -173,7 +173,7 @@ fn time_constants(
             &found.a[..]
         };
         if a.len() < 2 {
-            // An integrator alone forgets nothing, and is as fast as it is filled.
+            // A pure integrator never forgets; its filter gives the fast limit.
             let duration = records.iter().map(|mended| mended.whole.duration());
             return Ok(TimeConstants {
                 fastest: duration.fold(f64::INFINITY, f64::min),

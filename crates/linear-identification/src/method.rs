@@ -11,7 +11,7 @@ pub enum Method {
     StabilizedOe,
     /// Recursive least squares on the filtered equation
     CtRls,
-    /// Least squares on filtered signals, of the whole record: biased by noise, a start for the others
+    /// Least squares on filtered signals, of the whole record: biased by noise, useful as a start for the others
     Ls,
     /// Instruments simulated in the loop, of the whole record
     Iv,

@@ -9,11 +9,11 @@ pub struct Request {
     pub method: Method,
     /// The order.
     pub order: Order,
-    /// Memory of the recursion, s; found where not given.
+    /// Memory of the recursion, s; default chosen from the record.
     pub memory: Option<f64>,
-    /// Bandwidth of the state variable filters, 1/s; found where not given.
+    /// Bandwidth of the state variable filters, 1/s; default chosen from the record.
     pub bandwidth: Option<f64>,
-    /// The controller of the loop, time in s; for the methods that have to do with it. Without one they work in open loop.
+    /// The controller of the loop, time in s; for the methods for a loop. Without one they work in open loop.
     pub controller: Option<fcloe::Controller>,
     /// Operating point; for the same methods.
     pub levels: LevelChoice,
@@ -26,7 +26,7 @@ pub struct Request {
 }
 
 impl Request {
-    /// Everything else found, in open loop.
+    /// A request with defaults, in open loop.
     pub fn new(method: Method, order: Order) -> Self {
         Self {
             method,

@@ -1,4 +1,4 @@
-//! Sizes of signals and of simulation errors.
+//! Standard deviations of signals and of simulation errors.
 
 use ct_signals::Channel;
 

@@ -13,7 +13,7 @@ pub struct Settings {
     pub memory: f64,
     /// Bandwidth of the state variable filters, 1/s.
     pub bandwidth: f64,
-    /// Time constant of the best model of first order, s: what the recursion starts from.
+    /// Time constant of the best model of first order, s: start of the recursion.
     pub first_order: f64,
     /// Simulation error of that model, root mean square, in the output's unit.
     pub first_order_rmse: f64,
@@ -33,7 +33,7 @@ pub struct Identification {
     /// Settings of a recursion without a loop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub settings: Option<Settings>,
-    /// a_1 to a_n, b_0 to b_m, offset, at the end of the record. The standard error is of the recursion with its memory.
+    /// a_1 to a_n, b_0 to b_m, offset, at the end of the record. The standard error is that of the recursion with its memory.
     pub parameters: Vec<Parameter>,
     /// Time constants of the model's real poles, s, the slowest first.
     pub time_constants: Vec<f64>,
@@ -46,7 +46,7 @@ pub struct Identification {
     pub fit_percent: f64,
     /// Warnings about the use of the model.
     pub warnings: Vec<String>,
-    /// The parameters over the record; of a recursion.
+    /// The parameters over time; for a recursion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trajectory: Option<Trajectory>,
     /// Additional results of a method for a loop.
@@ -63,7 +63,7 @@ pub struct Identification {
     /// The plant, without offsets.
     #[serde(skip)]
     pub plant: rivc::Plant,
-    /// The record, to be drawn.
+    /// The record for a plot.
     #[serde(skip)]
     pub shown: Shown,
 }

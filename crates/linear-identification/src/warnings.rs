@@ -5,7 +5,7 @@ use missing_effect::Parameter;
 
 use crate::{Method, Order, Settings};
 
-/// A simulation error so many times that of the start is worse.
+/// Ratio of the simulation error to that of the start above which the result is worse.
 const WORSE: f64 = 1.05;
 
 /// The start was better than the end.

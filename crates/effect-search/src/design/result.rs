@@ -121,7 +121,7 @@ pub struct Design {
     pub experiments: Vec<Experiment>,
     /// Repetition of the experiment of the longest record.
     pub again: Option<Experiment>,
-    /// Applied so many times over, the best experiment would decide; `None` where it does already, or would not.
+    /// Number of repetitions after which the best experiment decides; `None` if one is enough, or none would decide.
     pub times_as_long: Option<usize>,
     /// The best experiment.
     pub experiment: Sequences,

@@ -29,7 +29,7 @@ pub fn information(rows: &Triangle, free: &[usize], parameters: usize) -> Triang
     own
 }
 
-/// The least of `|rows|^2` over the first columns, what is known of the leading ones added; the last column is the residual.
+/// The least of `|rows|^2` over the first columns, with the information on the leading ones added; the last column is the residual.
 #[must_use]
 pub fn least(rows: &Triangle, known: &Triangle) -> f64 {
     let columns = rows.columns();

@@ -1,5 +1,5 @@
-//! The sequences among which the experiment is sought: steps, staircases, binary and multi-level sequences, within a range
-//! and a slew, with clock periods relative to the plant's slowest time constant.
+//! Candidate sequences of the experiment: steps, staircases, binary and multi-level sequences, within a range and a slew limit, with clock
+//! periods relative to the plant's slowest time constant.
 
 use ct_signals::{Error, excitation};
 use rand::RngExt;
@@ -42,7 +42,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// In words.
+    /// Name of the kind in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -55,7 +55,7 @@ impl Kind {
     }
 }
 
-/// A sequence and how it came about.
+/// A sequence and its parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
     /// Kind of the sequence.
@@ -78,7 +78,7 @@ pub struct Sequence {
 
 /// Clock periods over the slowest time constant: short ones excite lags, long ones show static curves.
 const CLOCKS: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 2.0, 4.0];
-/// Half periods of a square wave over the slowest time constant; the whole length is one more.
+/// Half periods of a square wave over the slowest time constant; the complete length is used too.
 const STEPS: [f64; 2] = [2.0, 5.0];
 const STAIRCASES: [usize; 3] = [3, 5, 9];
 /// Draws of a multi-level sequence for each clock period.
@@ -124,7 +124,7 @@ fn bits(n: usize, low: f64, high: f64, rng: &mut ChaCha8Rng) -> Result<Vec<f64>,
 /// Where the room holds no sequence: no sample, a range without width.
 pub fn sequences(room: &Room, time_constant: f64, seed: u64) -> Result<Vec<Sequence>, Error> {
     let n = room.samples;
-    // A plant that forgets nothing within the experiment has no time constant that could be a measure.
+    // A plant that does not settle within the experiment has no time constant that can be a scale.
     let slowest = time_constant.min(0.2 * room.duration);
     let samples = |clock: f64| -> usize {
         let most = (LONGEST * n as f64).max(1.0);

@@ -15,14 +15,14 @@ pub(super) struct Outputs {
     pub(super) squares: Squares,
 }
 
-/// Weights are found again so often in a step, and until they change by less than this part.
+/// The weights are updated at most this number of times in a step, or until they change by less than this share.
 pub(super) const ROUNDS: usize = 20;
 
 pub(super) const SAME_WEIGHTS: f64 = 1e-3;
 
 impl Triangle {
-    /// The triangle of the rows of all outputs and of the priors, each times its weight by `squares`, those of the residuals: of an only
-    /// output without priors its own.
+    /// The R factor of the rows of all outputs and of the priors, each times its weight by `squares`: for a single output without priors,
+    /// its own R factor.
     #[must_use]
     pub(crate) fn of_outputs(
         mut triangles: Vec<Self>,
@@ -95,7 +95,7 @@ impl Outputs {
         squares
     }
 
-    /// The triangle of all rows, those of each output and those of the priors times their weight.
+    /// The R factor of all rows, with those of each output and those of the priors times their weight.
     pub(super) fn weighted(&self, weights: &[f64], of_priors: f64) -> Triangle {
         let columns = self.priors.columns();
         let mut all = Triangle::new(columns);

@@ -186,7 +186,7 @@ fn a_start_far_from_a_prior_ends_where_a_near_one_does() {
     assert!((near.x[2] - curves.priors[1].value).abs() < 1e-3);
 }
 
-/// Intervals of 95 % contain the true value in 95 % of the draws of noise and priors, in both metrics, and priors make them shorter.
+/// Intervals of 95 % contain the true value in 95 % of the draws of noise and priors, with both weightings, and priors make them shorter.
 #[test]
 fn intervals_hold_the_truth() {
     const RUNS: u64 = 400;
@@ -252,7 +252,7 @@ fn a_fit_goes_on_where_another_ended_far_from_a_prior() {
         stopping,
     );
     assert_eq!(again.unwrap().x, ended.x);
-    // A start that is worse than one near the prior begins near it.
+    // A start with a higher cost than a point near the prior begins near the prior.
     let mut far = ended.x.clone();
     far[1] = -40.0;
     let near = fit_from(&curves, vec![Start::from(far)], &white, stopping).unwrap();

@@ -5,14 +5,14 @@ use estimation::Triangle;
 
 use crate::Error;
 
-/// A series, and the signals in it that are no noise.
+/// A series, and the deterministic signals in it.
 pub(super) struct Series {
     pub(super) values: Vec<f64>,
     pub(super) beside: Vec<Vec<f64>>,
 }
 
-/// The autoregression of what is left of all series, and minus twice the logarithm of its marginal likelihood, with
-/// the penalty of Bayes' information criterion for its coefficients.
+/// The autoregression of the residuals of all series, and minus twice the logarithm of its marginal likelihood, with the penalty of Bayes'
+/// information criterion for its coefficients.
 pub(super) fn autoregression(
     mut all: Vec<Series>,
     max_order: usize,
@@ -95,7 +95,7 @@ impl Series {
         (whitened, log_det)
     }
 
-    /// Least squares of the values on what is beside the noise; 0 where that is not determined.
+    /// Least squares of the values on the deterministic signals; 0 if not determined.
     pub(super) fn regression(&self) -> (Triangle, Vec<f64>) {
         let q = self.beside.len();
         let mut columns: Vec<&[f64]> = self.beside.iter().map(Vec::as_slice).collect();

@@ -8,8 +8,7 @@ use crate::simulation::BLOCK;
 use crate::{ClosedLoop, Error, LoopSimulator, PlantModel};
 
 impl Problem {
-    /// J and its derivatives at x, or the residual's column alone, unless J is above a limit: that is known before the last sample as a
-    /// rule.
+    /// J and its derivatives at x, or the residual's column alone, unless J exceeds a limit, which is usually known before the last sample.
     pub(crate) fn evaluate(
         &self,
         x: &[f64],
@@ -48,7 +47,7 @@ impl Problem {
             } else {
                 own.1.push_columns(columns);
             }
-            // A cost that is no number is found out below.
+            // A NaN cost is detected below.
             let cost = all.cost() + own.1.cost();
             !(cost > limit && cost.is_finite())
         });
@@ -194,8 +193,8 @@ impl Problem {
     }
 }
 
-/// The residual `y - y^` of all records as one output, NaN where the reading is missing; its entries are theta, and each estimated level's
-/// distance from where it started (drive, then y, record by record). It is not finite where the loop is not stable.
+/// The residual `y - y^` of all records as one output, NaN if the reading is missing; its parameters are theta, and each estimated level's
+/// distance from its start (drive, then y, record by record). It is not finite if the loop is not stable.
 impl Residuals for Problem {
     fn free(&self) -> &[usize] {
         &self.free

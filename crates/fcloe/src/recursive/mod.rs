@@ -37,16 +37,16 @@ pub use settings::{Filter, RecursiveSettings};
 use crate::{ClosedLoop, Controller, Error, Orders, PlantModel};
 use model::MovingLoop;
 
-/// Halvings of a step before it is refused.
+/// Number of halvings of a step before it is rejected.
 const HALVINGS: usize = 20;
 
-/// The rate at which the model's loop has to decay, of the start's slowest.
+/// Least decay rate of the model's loop, relative to the slowest one at the start.
 const DECAY: f64 = 0.01;
 
 /// A parameter smaller than this share of its scale may change by the step limit times this share.
 const SMALL: f64 = 0.1;
 
-/// Sizes of a scale with which P, in the parameters' units, stays in the floating-point range.
+/// Range of a scale for which P, in the parameters' units, does not overflow.
 const SCALES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 
 /// One sample of the loop.
@@ -292,7 +292,7 @@ impl RecursiveEstimator for RecursiveFcloe {
         &self.theta
     }
 
-    /// P in theta: times the noise's variance, the covariance of the estimates, where little is forgotten.
+    /// P in theta: times the noise's variance, it is the covariance of the estimates, if forgetting is slow.
     fn covariance(&self) -> DMatrix<f64> {
         let f = self.rls.covariance();
         DMatrix::from_fn(f.nrows(), f.ncols(), |i, j| {
@@ -317,7 +317,7 @@ mod tests {
         let controller = Controller::pi(0.3, 0.004).unwrap();
         let (f0, eta, fading, dt) = (0.3, 0.01, 200.0, 2.0);
         let mut settings = RecursiveSettings::new(f0, eta, fading, 1e9);
-        // The start is so near that neither limit nor border acts.
+        // The start is so near that neither the step limit nor the stability bound is active.
         settings.range = 1e6;
         let mut estimator = RecursiveFcloe::new(&plant, &controller, settings).unwrap();
         let mut f = DMatrix::identity(4, 4) * f0;

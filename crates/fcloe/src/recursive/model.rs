@@ -1,4 +1,4 @@
-//! The model's loop and the sensitivities' chains while the parameters move.
+//! The model's loop and the filters of the sensitivities for time-varying parameters.
 //!
 //! Equations, for monic `A`, `S` (coefficients over the leading one: alpha, beta, s, r), observer forms, so that the
 //! states stay continuous in meaning when theta moves: they are kept as they are.
@@ -20,7 +20,7 @@
 
 use crate::{Controller, Orders};
 
-/// More substeps than this are refused: a root that is 10 000 times faster than the sampling.
+/// Limit of substeps: a root that is 10 000 times faster than the sampling needs more.
 const MAX_SUBSTEPS: f64 = 1e4;
 
 /// A loop whose parameters may change between samples. Allocates when it is made.
@@ -148,8 +148,8 @@ impl MovingLoop {
         (substeps <= MAX_SUBSTEPS).then_some(substeps)
     }
 
-    /// Moves all states over dt, the drive held. False where there would be too many substeps, or where the states
-    /// leave the range of numbers: then they are at rest again.
+    /// Advances all states over dt with a constant drive. Returns false if there are too many substeps, or if the states overflow: then
+    /// they are set to rest.
     pub(super) fn advance(&mut self, drive: f64, dt: f64) -> bool {
         let Some(substeps) = self.substeps(dt) else {
             return false;

@@ -9,14 +9,14 @@ use crate::{Error, OperatingPoint};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {
-    /// P^ of the start, for good: what condition (14) is about.
+    /// P^ of the start, constant: the filter of condition (14).
     Fixed,
-    /// P^ of the present estimates. From bad starts it converges far more often.
+    /// P^ of the present estimates. From bad starts this filter converges far more often.
     Adaptive,
 }
 
-/// Settings of the recursive estimator. Values that were tried, for a reference of amplitude 1 and closed-loop poles
-/// about 0.01 rad/s, sampled every second, at 20 to 30 dB:
+/// Settings of the recursive estimator. These values were tested for a reference of amplitude 1 and closed-loop poles about 0.01 rad/s,
+/// sampled every second, at 20 to 30 dB:
 ///
 /// | plant | gain | forgetting factor a second | fading | step limit |
 /// |---|---|---|---|---|

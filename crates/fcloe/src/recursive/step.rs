@@ -16,7 +16,7 @@ impl RecursiveFcloe {
         self.model.sensitivities(drive, &self.scale, &mut self.s);
         let l = self.forgetting_factor(dt);
         let eta = -l.ln() / dt;
-        // eta/(1 - l), which is 1/dt where nothing is forgotten.
+        // eta/(1 - l), or 1/dt without forgetting.
         let c = if 1.0 - l > 1e-12 {
             eta / (1.0 - l)
         } else {

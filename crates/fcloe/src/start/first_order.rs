@@ -1,5 +1,4 @@
-//! The start of the paper, for plants of first order: least squares and instruments on signals through one state
-//! variable filter.
+//! The paper's start for plants of first order: least squares and instruments with one state variable filter.
 //!
 //! Model: `y' = -1/tau y + K/tau u`, and so for the filtered signals (Baysse, Carrillo, Habbadi, (21) to (23)):
 //! ```text
@@ -26,7 +25,7 @@ pub enum Discretisation {
     Euler,
     /// Exact for held signals, `Y_f = (1 - e^{-lambda Ts})/Ts (y - y_f)`.
     ZeroOrderHold,
-    /// Exact for held signals, but `Y_f = lambda (y - y_f)` as it is printed: inconsistent, to reproduce results.
+    /// Exact for held signals, but `Y_f = lambda (y - y_f)` as printed: inconsistent, for reproduction of results.
     ZeroOrderHoldAsPrinted,
 }
 
@@ -48,7 +47,7 @@ impl Discretisation {
 pub enum Form {
     /// `[sum phi^ phi']^-1 sum phi^ Y`.
     Standard,
-    /// `[sum phi^ phi^']^-1 sum phi^ Y`, (26) as it is printed: biased even in open loop, to reproduce results.
+    /// `[sum phi^ phi^']^-1 sum phi^ Y`, (26) as printed: biased even in open loop, for reproduction of results.
     AsPrinted,
 }
 

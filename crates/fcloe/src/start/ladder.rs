@@ -24,20 +24,20 @@ pub enum Stage {
     LeastSquares,
     /// Instruments from the loop.
     Instruments,
-    /// SRIVC: filter and instruments renewed with the estimates.
+    /// SRIVC: filter and instruments updated with the estimates.
     Srivc,
     /// All poles at one place, and the gain from the correlation of y and u with r: no other candidate had a stable loop.
     Guess,
 }
 
-/// A plant whose loop is stable.
+/// A plant with a stable loop.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
     /// The plant.
     pub plant: PlantModel,
     /// Source of the candidate.
     pub stage: Stage,
-    /// Bandwidth of the filter it began with \[1/time\].
+    /// Bandwidth of the first filter \[1/time\].
     pub lambda: f64,
     /// Root mean square of `y - y^` with its loop simulated from r, unit of y.
     pub residual_rms: f64,
@@ -96,7 +96,7 @@ pub fn lambda_ladder(
     Ok((0..=rungs as usize).map(at).collect())
 }
 
-/// Candidates for the batch fit, the best first, none twice; the recursive estimator takes the first.
+/// Candidates for the batch fit, the best first, without duplicates; the recursive estimator uses the first.
 ///
 /// # Errors
 /// Those of [`LoopRecord::validate`]; [`Error::NoRecord`]; [`Error::RegressionWithoutInput`], [`Error::MissingReference`];
@@ -210,7 +210,7 @@ fn residual(records: &[LoopRecord], controller: &Controller, plant: &PlantModel)
     rms.is_finite().then_some(rms)
 }
 
-/// `K/(1 + p/pole)^n` with the gain that y and u have in step with r, and parts of it; in open loop, in step with u.
+/// `K/(1 + p/pole)^n` with the gain from the correlation of y and u with r, and fractions of it; in open loop, with u.
 fn guesses(
     records: &[LoopRecord],
     controller: &Controller,

@@ -27,10 +27,10 @@ use ct_lti::Polynomial;
 use super::signals::{Signals, Sums};
 use crate::{ClosedLoop, Controller, Error, LoopRecord, Orders, PlantModel};
 
-/// The share of the readings that have to be left for least squares where readings are missing.
+/// The share of the readings that must be usable for least squares with missing readings.
 const LEAST_LEFT: f64 = 0.3;
 
-/// A refinement ends where no parameter changes by more than this share of itself.
+/// A refinement ends if every parameter changes by at most this share of its value.
 const RESTS: f64 = 1e-4;
 
 /// Least squares. `filter` is E, Hurwitz, of degree n, its scale being of no importance: `(p + lambda)^n`, say, lambda 2
@@ -124,19 +124,19 @@ pub(super) fn rows(
         })
 }
 
-/// The last of a refinement.
+/// Result of a refinement.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Refinement {
-    /// The last plant whose loop is stable.
+    /// The last plant with a stable loop.
     pub plant: PlantModel,
     /// Regressions that gave such a plant.
     pub iterations: usize,
-    /// Whether the estimates came to rest.
+    /// Whether the estimates have converged.
     pub rests: bool,
 }
 
-/// SRIVC, in a loop CLSRIVC: instruments and filter renewed with the estimates, at most `most` times. It ends early, with the last plant
-/// whose loop is stable, where the next one's is not, or where A^ is not Hurwitz and so is no filter.
+/// SRIVC, in a loop CLSRIVC: instruments and filter updated with the estimates, at most `most` times. It ends early, with the last plant
+/// that has a stable loop, if the next loop is unstable, or if A^ is not Hurwitz and cannot be a filter.
 ///
 /// # Errors
 /// [`Error::UnstableLoop`] for the start; those of [`LoopRecord::validate`], [`Error::RegressionWithoutInput`],

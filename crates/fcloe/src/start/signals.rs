@@ -93,8 +93,8 @@ impl Signals {
         self
     }
 
-    /// Shows the number of the sample, and y_f and u_f with their derivatives, 0 to n, at each sample; not where a reading is missing, nor
-    /// where the filter has not forgotten a long gap ([`ReadingFilter`]).
+    /// Passes the number of the sample, and y_f and u_f with their derivatives, 0 to n, to a function; not for a missing reading, nor
+    /// before the filter has forgotten a long gap ([`ReadingFilter`]).
     pub(super) fn filtered(
         &self,
         filter: &Polynomial,
@@ -157,7 +157,7 @@ impl Sums {
         Ok(x.column(0).iter().copied().collect())
     }
 
-    /// `[sum z phi']^-1 X`, after a scaling of rows and columns that takes the units out.
+    /// `[sum z phi']^-1 X`, after a scaling of rows and columns that makes the result independent of units.
     pub(super) fn solve_for(&self, x: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let p = self.v.len();
         let undetermined = Error::NotDetermined {
@@ -187,7 +187,7 @@ impl Sums {
     }
 }
 
-/// [`Sums`] of all rows, solved.
+/// Solution of [`Sums`] of all rows.
 pub(super) fn solve<'a>(
     p: usize,
     rows: impl Iterator<Item = (&'a [f64], &'a [f64], f64)>,

@@ -32,11 +32,11 @@ use crate::{ClosedLoop, Controller, Error, LoopRecord, PlantModel};
 
 /// Orders of autoregressive noise that are tried: 0 to this.
 const MAX_ORDER: usize = 8;
-/// An inverse whose output has more than so many times the squares of its input grows without bound.
+/// An inverse whose output has more than this multiple of the squares of its input is unstable.
 const UNBOUNDED: f64 = 1e8;
 
-/// Standard errors of `theta` of a plant that [`instruments`](super::instruments) gave, with the filter it was given last, or
-/// [`srivc`](super::srivc) (the filter is then A^).
+/// Standard errors of `theta` of a plant from [`instruments`](super::instruments), with its last filter, or from [`srivc`](super::srivc)
+/// (the filter is then A^).
 ///
 /// # Errors
 /// As [`instruments`](super::instruments); [`Error::NotDetermined`] too where a variance is not finite; those of [`ArModel::fit`].
@@ -97,7 +97,7 @@ pub fn standard_errors(
     }
     let there = segments.iter().copied().flatten().filter(|w| !w.is_nan());
     let samples = there.count() as f64;
-    // The variance of the innovations is over the samples less their order.
+    // The variance of the innovations is divided by the number of samples minus the order.
     let order = ar.order() as f64;
     let variance = ar.sigma().powi(2) * (samples - order) / (samples - order - p as f64).max(1.0);
     let half = sums.solve_for(&middle)?;

@@ -149,7 +149,7 @@ fn a_controller_that_matches_is_believed() {
     Problem::new(&[record], &pi(), ORDERS).unwrap();
     let printed = Controller::pi(0.2292, 1.0 / 480.0).unwrap();
     let mismatch = controller_mismatch(&clean, &printed).unwrap().unwrap();
-    // Digits lost in print show, without noise, but are no reason to refuse.
+    // Rounding of the coefficients is visible without noise, but is no reason for rejection.
     assert!(mismatch.systematic > 50.0 * own.systematic);
     assert!(mismatch.systematic < 0.01 * mismatch.size);
 }
@@ -243,7 +243,7 @@ fn models_and_settings_that_are_none() {
         coordinates: Coordinates::Delta,
         ..Settings::default()
     };
-    // K = 0 leaves the integrator without a loop: refused before anything else.
+    // K = 0 leaves the integrator without a loop: rejected before other checks.
     assert!(problem.fit(&zero.unwrap(), &delta).is_err());
     let tolerance = Settings {
         tolerance: 0.0,

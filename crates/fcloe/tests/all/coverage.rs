@@ -1,5 +1,5 @@
-//! Intervals of 95 % contain the true value in 95 % of simulated runs, whether the noise circulates in the loop or not, which the fit is
-//! not told. The whole of it, 4000 runs each, is the example `coverage`.
+//! Intervals of 95 % contain the true value in 95 % of simulated runs, with fed-back noise and with output noise; the fit does not know
+//! which. The complete study, 4000 runs each, is the example `coverage`.
 
 #[path = "support/rig.rs"]
 mod rig;
@@ -11,7 +11,7 @@ use rig::{Coverage, Rig};
 
 const RUNS: u64 = 400;
 
-/// Outside of these, on either side, in one of 200 draws of 400 with p = 0.95.
+/// By chance outside of these limits, on either side, in one of 200 draws of 400 with p = 0.95.
 fn plausible(hits: usize) -> bool {
     (368..=391).contains(&hits)
 }
@@ -64,8 +64,8 @@ fn estimated_levels_and_open_loop() {
     check(&Rig::open_loop());
 }
 
-/// 30 % of the readings are missing, and a block of 10 rows: the noise after the loop is found from those that are there. Fewer runs than
-/// above: each takes some 50 filters of the residual. `RUNS=400` takes as many.
+/// 30 % of the readings are missing, and a block of 10 rows: the noise model of the loop is estimated from the present ones. Fewer runs
+/// than above, because each needs some 50 filters of the residual; `RUNS=400` runs more.
 #[test]
 fn missing_readings() {
     let asked = std::env::var("RUNS")
@@ -153,7 +153,8 @@ fn instruments_know_their_errors() {
         for (of, most) in found.iter().zip([2.0, 1.25]) {
             for (hits, variance_ratio) in of {
                 assert!((0.85..most).contains(variance_ratio), "{found:.2?}");
-                // Lines between samples bias plants of second order by half a standard error, and are wrong for an output that jumps.
+                // Linear interpolation between samples biases plants of second order by half a standard error, and is wrong for an output
+                // with steps.
                 let orders = rig.plant.orders();
                 let least = match orders.n {
                     n if n == orders.m => 0,

@@ -5,8 +5,8 @@ use fcloe::{ClosedLoop, Controller, LoopSimulator, PlantModel};
 
 use crate::support::drive;
 
-/// Largest difference of both sides over the largest error of the loop, where `(theta - theta^)' sigma` is taken for straight between
-/// samples; each held value of the drive spans `parts` of them.
+/// Largest difference of both sides over the largest error of the loop, with `(theta - theta^)' sigma` linear between samples; each held
+/// value of the drive spans `parts` of them.
 fn difference(
     plant: &PlantModel,
     model: &PlantModel,

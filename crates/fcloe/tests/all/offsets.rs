@@ -1,4 +1,4 @@
-//! Levels of r, u and y: known, read off the first rows, estimated; and what wrong ones cost. Several records.
+//! Levels of r, u and y: known, from the first rows, estimated; and the effect of wrong ones. Several records.
 
 use crate::support::drive;
 use ct_lti::Hold;
@@ -67,7 +67,7 @@ fn levels_known_read_or_estimated_give_the_plant() {
     }
 }
 
-/// Estimated though the record begins in the middle of a step, where the first row is no operating point.
+/// The levels are estimated although the record begins during a transient, where the first row is no operating point.
 #[test]
 fn levels_are_estimated_from_a_wrong_first_row() {
     let point = OperatingPoint {

@@ -1,4 +1,4 @@
-//! Noise-free data give the plant back; every method ends in the same place; theta and delta are the same iteration.
+//! Noise-free data give the true plant; every method ends in the same minimum; theta and delta give the same iteration.
 
 use crate::support::drive;
 use ct_lti::Hold;
@@ -232,7 +232,7 @@ fn what_the_controller_is_not_told() {
     );
 }
 
-/// J and one step's parts, for the start that the iteration begins with.
+/// J and the parts of the first step, from the start of the iteration.
 fn first_step(
     problem: &Problem,
     start: &PlantModel,

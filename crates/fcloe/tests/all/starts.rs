@@ -1,5 +1,5 @@
-//! The starts: against the noise-free truth, against the statistics of the paper's first table, and for plants of
-//! higher order with noise in the loop.
+//! Start values: compared with the noise-free truth, with the statistics of the paper's first table, and for plants of higher order with
+//! noise in the loop.
 
 use ct_lti::{Hold, Polynomial};
 use ct_signals::excitation;
@@ -14,7 +14,7 @@ use rand_chacha::rand_core::SeedableRng;
 
 const LAMBDA: f64 = 40.0 / 110.0;
 
-/// The first table's loop, with a set of its unstated conditions that fits it; noise in the loop at 20 dB.
+/// The first table's loop, with assumptions that reproduce it; noise in the loop at 20 dB.
 fn first_table(seed: Option<u64>) -> (LoopRecord, Controller) {
     let pattern = [0.82, 0.82, -0.82, -0.82, 0.82, -0.82, 0.82];
     let r = excitation::levels(2800, 400, &pattern).unwrap();
@@ -59,7 +59,7 @@ fn near((gain, tau): (f64, f64), expected: (f64, f64), within: (f64, f64)) {
     );
 }
 
-/// The factor in Y_f has to be the filter's own: with lambda in place of it, tau is 92.8 without any noise.
+/// The factor in Y_f has to be that of the filter: with lambda instead, tau is 92.8 without any noise.
 #[test]
 fn noise_free_each_discretisation_in_its_own_way() {
     let (record, controller) = first_table(None);
@@ -104,8 +104,8 @@ fn the_first_tables_statistics() {
     near(printed, (5.962, 79.40), (0.024, 1.57));
 }
 
-/// In open loop, noise on the record: least squares is biased, the standard instruments are not, those of the printed
-/// form are; the general forms with instruments are not either, and their least squares hardly.
+/// In open loop with output noise: least squares is biased, the standard instruments are not, those of the printed form are; the general
+/// forms with instruments are not biased either, and their least squares only slightly.
 #[test]
 fn each_start_in_open_loop() {
     const RUNS: u64 = 20;
@@ -141,7 +141,7 @@ fn each_start_in_open_loop() {
     near(refined, (6.0, 110.0), (0.03, 1.0));
 }
 
-/// Instruments from r are not biased by noise that circulates, where those from the measured u are.
+/// Instruments from r are not biased by fed-back noise, while those from the measured u are.
 #[test]
 fn instruments_from_the_reference() {
     const RUNS: u64 = 20;
@@ -209,7 +209,7 @@ fn the_pipeline_leads_to_the_minimum() {
     }
 }
 
-/// The refinement's own means, noise in the loop: within four standard errors of the truth, but for the lines between samples.
+/// Means of the refinement, noise in the loop: within four standard errors of the truth, apart from interpolation between samples.
 #[test]
 fn refinement_without_bias() {
     let (plant, controller, r) = second_order();
@@ -239,7 +239,7 @@ fn refinement_without_bias() {
     }
 }
 
-/// A ladder from a guess lies at 2 to 10 times the loop's poles; one without spans the record.
+/// With a guess, the bandwidths are 2 to 10 times the loop's poles; without one they span the record.
 #[test]
 fn ladders() {
     let (record, controller) = first_table(None);
@@ -254,7 +254,7 @@ fn ladders() {
     assert!((ladder.last().unwrap() - 0.5).abs() < 1e-12);
 }
 
-/// Bandwidths far too high make regressions of noise; the guess steps in, and the fit goes on from it.
+/// Bandwidths that are far too high give useless regressions; the guess is used instead, and the fit continues from it.
 #[test]
 fn a_guess_where_regressions_fail() {
     let (plant, controller, r) = second_order();

@@ -1,4 +1,4 @@
-//! A setup from a model and its records: what is free, within which bounds, from where.
+//! Builds a setup from a model and its records: free parameters, bounds, and start values.
 
 use ct_model::{About, Given, Model, Variable};
 use ct_signals::Record;
@@ -12,7 +12,7 @@ use crate::clock::Clock;
 /// If the text sets no bound, a parameter stays within this factor of its value in the text, ...
 const REACH: f64 = 30.0;
 
-/// Scales of the noise have settled when none changes by more than this share.
+/// The scales of the noise have converged if none changes by more than this share.
 pub(super) const SETTLED: f64 = 0.02;
 
 /// Bounds of the text, and where it has none a factor of the value there: a fit that diverges says nothing. Nothing bounds a value of zero.

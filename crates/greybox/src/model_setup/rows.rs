@@ -33,8 +33,8 @@ impl<'a> ModelSetup<'a> {
         Some(all)
     }
 
-    /// Simulates all records with derivatives by some entries, at most `L` of them at once, and shows the outputs row by row with the
-    /// entries of the signals.
+    /// Simulates all records with derivatives with respect to some entries, at most `L` of them at once, and passes the outputs row by row
+    /// with the entries of the signals to a function.
     fn each_instant<const L: usize>(
         &self,
         x: &[f64],
@@ -94,8 +94,7 @@ impl<'a> ModelSetup<'a> {
         Some(())
     }
 
-    /// [`Residuals::each_row`]; no generic function, so that simulations with derivatives are compiled here and not again in every crate
-    /// that fits.
+    /// [`Residuals::each_row`]; not a generic function, so that simulations with derivatives are compiled only in this crate.
     #[inline(never)]
     fn show_rows(&self, x: &[f64], each: &mut dyn FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
         // A record has the parameters and its own states.

@@ -1,5 +1,5 @@
-//! Intervals of 95 % contain the true value in 95 % of simulated records, for every parameter and initial level, whatever the noise's
-//! spectrum, which the fit is not told.
+//! Intervals of 95 % contain the true value in 95 % of simulated records, for every parameter and initial level, and for every spectrum of
+//! the noise, which is unknown to the fit.
 
 use crate::support::Rig;
 use ct_signals::{ArModel, Record};
@@ -167,7 +167,7 @@ fn missing_readings() {
     }
 }
 
-/// The correlation that is estimated from a fit's residual is the noise's: a model of the bare residual is too fast.
+/// The correlation estimated from a fit's residual is that of the noise: a model of the uncorrected residual is too fast.
 #[test]
 fn the_colour_of_the_noise_is_not_biased_by_the_fit() {
     let rig = Rig {

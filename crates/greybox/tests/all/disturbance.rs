@@ -96,7 +96,7 @@ impl Disturbed {
             }
             let gain = half[own].unwrap();
             assert!(gain < 0.2 * self.gain.abs(), "the gain is known: {gain}");
-            // The throughput has both inflows.
+            // The throughput consists of both inflows.
             let scales = setup.scales_at(&fit.x).unwrap();
             let mean = |input: usize| {
                 let values = &records[0].inputs[input].values;

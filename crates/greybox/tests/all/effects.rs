@@ -28,8 +28,8 @@ struct Case {
     parameters: Vec<f64>,
 }
 
-/// Every effect that has a threshold, a time, a period or steps, and those that are smooth, on both kinds of outlet, for one
-/// and two tanks, in either.
+/// Every effect with a threshold, a time, a period or steps, and the smooth ones, for both kinds of outlet, for one and two tanks, in
+/// either tank.
 fn cases() -> Vec<Case> {
     let t = SAMPLES as f64 * INTERVAL;
     let mut cases = Vec::new();
@@ -69,7 +69,7 @@ fn cases() -> Vec<Case> {
             // A good third of what comes in.
             add(plant, "const_leak", 0, vec![0.35 * flow]);
         }
-        // A little above the lowest fifth of the commands' range.
+        // Slightly above the lowest fifth of the commands' range.
         add(plant, "pump_saturation", 0, vec![4.4]);
         add(plant, "pump_gain_drift", 0, vec![0.04, 0.25 * t]);
         add(plant, "stiction_backlash", 0, vec![0.4, 0.0, 0.0]);
@@ -153,8 +153,8 @@ impl Case {
     }
 }
 
-/// The believed model from the plant's own numbers: two tanks in series fit almost as well with their time constants
-/// swapped, and which of the two basins is the right one is not for the effect's starts to find.
+/// The believed model from the plant's true parameters: two tanks in series fit almost as well with exchanged time constants, and the
+/// choice between the two minima is not the task of the effect's starts.
 fn base_fit<'a>(case: &Case, records: &'a [Record]) -> (Setup<'a>, Vec<f64>, f64) {
     let fixed = BTreeMap::new;
     let setup = Setup::from_records(case.plant, known(case.plant), &[], records, fixed()).unwrap();
@@ -169,7 +169,7 @@ fn base_fit<'a>(case: &Case, records: &'a [Record]) -> (Setup<'a>, Vec<f64>, f64
 
 /// Result of one record.
 struct Outcome {
-    /// Error of every parameter in standard errors; none for one that ends at a bound.
+    /// Error of every parameter in standard errors; none if it ends at a bound.
     z: Vec<Option<f64>>,
     estimate: Vec<f64>,
     /// Error of the fit over the noise.

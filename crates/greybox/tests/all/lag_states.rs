@@ -89,7 +89,7 @@ fn the_lag_that_is_there_fits_better_than_the_other() {
                 // must not occur. By chance 25 successes occur once in five thousand.
                 assert!(free.1 <= 1, "{id} {time_constant}: {free:?}");
                 assert!(!two || free.0 >= 25, "{id} {time_constant}: {free:?}");
-                // Taken for at rest, one of the two is the better imitation of what came before.
+                // With the lag at rest, one of the two fits the unknown past better.
                 assert!(lag == 0 || rest.1 > 5, "{id} {time_constant}: {rest:?}");
             }
         }

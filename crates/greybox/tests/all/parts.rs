@@ -1,4 +1,4 @@
-//! Parts of one experiment share a clock: what follows time runs through them as through the whole record.
+//! Parts of one experiment share a clock: functions of time continue through them as in the whole record.
 
 use std::collections::BTreeMap;
 
@@ -142,7 +142,7 @@ fn a_held_out_record_continues_the_clock_where_it_lies_after() {
     let held_out = |record: &Record| {
         let records = std::slice::from_ref(record);
         let own = setup.with_records(records).unwrap();
-        // Another structure does not forget it.
+        // A change of the structure does not reset it.
         let own = own.with_structure(own.structure.clone()).unwrap();
         own.simulate(&x).unwrap().output.concat()
     };

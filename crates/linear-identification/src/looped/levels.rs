@@ -6,8 +6,8 @@ use serde::Serialize;
 use super::Task;
 use crate::{Error, Method, residual::limits};
 
-/// A loop rests in the first rows if there are so many in which the drive is constant, and neither output nor command would go further than
-/// this share of its range at their present pace, in the time that the record itself takes to forget.
+/// A loop is at rest in the first rows if there are enough rows with a constant drive, and neither output nor command would change by more
+/// than this share of its range at their present rate, in the time of the record's own memory.
 const ROWS_AT_REST: usize = 6;
 const MOVES: f64 = 0.03;
 /// A difference below this number of standard errors is noise.

@@ -1,5 +1,4 @@
-//! The methods that have to do with a loop: regressions, and closed-loop output error, batch and recursive. Without a controller they
-//! identify in open loop.
+//! The methods for a loop: regressions, and closed-loop output error, batch and recursive. Without a controller they identify in open loop.
 
 mod batch;
 mod levels;
@@ -24,14 +23,14 @@ use crate::{
 };
 pub use levels::LevelChoice;
 
-/// Points of the picture of condition (14).
+/// Number of points of the plot of condition (14).
 const POINTS: usize = 240;
 /// A controller whose output differs from the command by more than this share causes a warning.
 const MISSED: f64 = 0.03;
 /// A command at its limits in more than this share of the rows causes a warning.
 const LIMITED: f64 = 0.01;
 
-/// A simulation error below this share of the output's deviation is not compared with another.
+/// A simulation error below this share of the output's standard deviation is not compared.
 const SURELY_GOOD: f64 = 0.02;
 /// If the recursion's final model has a simulation error above the batch fit's times this factor, the final model is not the plant of the
 /// record.
@@ -58,7 +57,7 @@ pub struct InLoop {
     pub memory: Option<f64>,
     /// State of a recursion at its end.
     pub health: Option<LoopHealth>,
-    /// Condition (14) of a recursion with the filter of the start, if the estimates are the plant; not where it is doubtful that they are.
+    /// Condition (14) of a recursion with the filter of the start, if the estimates are the true plant; none if this is doubtful.
     pub convergence: Option<Convergence>,
 }
 
@@ -98,7 +97,7 @@ pub struct Convergence {
     pub locus: Vec<(f64, f64, f64)>,
 }
 
-/// A record, its loop, and what is asked.
+/// A record, its loop, and the request.
 struct Task<'a> {
     record: &'a Record,
     request: &'a Request,
@@ -126,7 +125,7 @@ struct Run {
     memory: f64,
 }
 
-/// Identifies; everything that [`crate::identify()`] refuses, and what `fcloe` refuses.
+/// Identifies. Errors: those of [`crate::identify()`] and of `fcloe`.
 pub(super) fn identify(record: &Record, request: &Request) -> Result<Identification, Error> {
     positive("--memory", "s", request.memory)?;
     positive("--bandwidth", "1/s", request.bandwidth)?;
@@ -286,7 +285,7 @@ impl Task<'_> {
         })
     }
 
-    /// Condition (14) of a recursion with the filter of the start, if the end is the truth.
+    /// Condition (14) of a recursion with the filter of the start, if the final estimates are the true plant.
     fn convergence(&self, start: &Start, end: &PlantModel) -> Result<Convergence, Error> {
         let start = PlantModel::from_theta(self.orders, &start.theta)?;
         let of = |plant| ClosedLoop::new(plant, &self.controller);
@@ -335,7 +334,7 @@ impl Task<'_> {
     }
 }
 
-/// The controller is a little off.
+/// Warning about a small difference between controller and command.
 fn missed(mismatch: &Mismatch) -> Option<String> {
     let share = mismatch.systematic / mismatch.size;
     (share > MISSED).then(|| {

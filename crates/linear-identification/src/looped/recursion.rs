@@ -10,19 +10,19 @@ use super::levels::chosen;
 use super::{Found, LevelChoice, Run, Start, Task};
 use crate::{Error, Trajectory, residual::rms};
 
-/// The part of the record that a recursion is started from.
+/// The share of the record for the start of a recursion.
 const BEGINNING: f64 = 0.3;
-/// The memory that is not asked for: this part of the record, and so many time constants.
+/// The default memory: this share of the record, and this number of time constants.
 const MEMORY_PART: f64 = 0.2;
 const MEMORY_TIME_CONSTANTS: f64 = 10.0;
 
 impl Task<'_> {
-    /// Sample by sample, from what the beginning of the record gives.
+    /// Recursion from the estimates of the beginning of the record.
     pub(super) fn recursion(&self, record: LoopRecord) -> Result<Found, Error> {
         let rows = ((BEGINNING * record.len() as f64) as usize).max(1);
         let part =
             |signal: &Option<Vec<f64>>| signal.as_ref().map(|v| v[..rows.min(v.len())].to_vec());
-        // Levels that are not to be found are those of the whole record: the means of its beginning are others.
+        // If the levels are not estimated, those of the whole record are used: means of its beginning differ.
         let levels_from = chosen(&record);
         let record = match self.finds_levels(&record) {
             true => record,
@@ -111,7 +111,7 @@ impl Task<'_> {
         })
     }
 
-    /// Whether the levels are to be found with the start.
+    /// Whether the levels are estimated together with the start.
     fn finds_levels(&self, record: &LoopRecord) -> bool {
         record.offsets == Offsets::Means && self.request.levels == LevelChoice::Auto
     }
@@ -125,7 +125,7 @@ impl Task<'_> {
         }
         let found = self.regression(record.clone(), true);
         match found {
-            // Filters do not run through long gaps; the simulation of the output error does.
+            // Filters are not continued through long gaps; the simulation of the output error is.
             Err(Error::Loop(fcloe::Error::Gaps { .. })) => self.batch(record),
             found => found,
         }

@@ -12,7 +12,7 @@ const INSTRUMENTS: usize = 3;
 const REFINEMENTS: usize = 10;
 
 impl Task<'_> {
-    /// The regression whose loop gives the record best, over the bandwidths.
+    /// The regression whose loop simulates the record best, over the bandwidths.
     pub(super) fn regression(
         &self,
         record: LoopRecord,

@@ -1,4 +1,4 @@
-//! Standard errors along the way, from the scatter of the estimating equations.
+//! Standard errors over time, from the variance of the estimating equations.
 //!
 //! With `R = P^-1` and the estimates `theta^` of now, what the stretch from one kept point to the next has said against them is
 //! ```text
@@ -18,7 +18,7 @@ use super::path::{Path, Point};
 use super::scaled::Scaled;
 use crate::Trajectory;
 
-/// Stretches that the parameters must be outnumbered by.
+/// Least number of segments per parameter.
 const SPARE: f64 = 2.0;
 
 /// The parameters in their units over the record, with standard errors.

@@ -29,7 +29,7 @@ const LEAST_WAY: f64 = 0.2;
 /// Gain and time constant over the level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Drift {
-    /// Mean output that the recursion remembers, in the output's unit, rising.
+    /// Mean output within the recursion's memory, in the output's unit, rising.
     pub level: Vec<f64>,
     /// Static gain `b_0` as a function of the level.
     pub gain: OverLevel,
@@ -62,8 +62,8 @@ pub struct OverLevel {
     pub values: Vec<f64>,
     /// Standard errors of the means.
     pub std_errors: Vec<f64>,
-    /// Difference between the highest and the lowest level, in its standard errors. The two estimates are taken for independent; where
-    /// they share data the difference is known better than that.
+    /// Difference between the highest and the lowest level, in its standard errors. The two estimates are treated as independent; with
+    /// common data the difference is more accurate.
     pub difference: f64,
 }
 
@@ -157,12 +157,12 @@ pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order)
         memory_part: 1.0 / (scaled.eta * duration),
         level_part: (high - low) / (range.1 - range.0),
     };
-    // one stretch alone, or standard errors of 0: nothing to compare
+    // a single interval, or standard errors of 0: no comparison
     let known = [&drift.gain, &drift.time_constant].map(|over| over.difference.is_finite());
     (known == [true, true]).then_some(drift)
 }
 
-/// The level that is remembered at every sample, scaled.
+/// The remembered level at every sample, scaled.
 fn remembered(scaled: &Scaled) -> Vec<f64> {
     let (mut level, mut length) = (0.0, 0.0);
     let mut levels = Vec::with_capacity(scaled.y.len());

@@ -26,7 +26,7 @@ const SHORTEST_LAG: f64 = 0.05;
 
 /// Output error of a model in parallel.
 pub(super) fn output_error(scaled: &Scaled, order: Order) -> Result<Path, Error> {
-    // The crate's sizes are known when it is built: one for each order.
+    // The crate's sizes are fixed at compile time: one instance for each order.
     macro_rules! sizes {
         ($($n:literal, $m:literal => $p:literal;)*) => {
             match (order.n, order.m) {
@@ -137,7 +137,8 @@ fn at_rest<const N: usize>(scaled: &Scaled) -> [f64; N] {
     state
 }
 
-/// The widest bounds on c about the start with which C/A0 - 1/2 is strictly positive real for the plants about it, and how far those reach.
+/// The widest bounds on c around the start for which C/A0 - 1/2 is strictly positive real for the plants around it, and the range of these
+/// plants.
 fn filter_bounds<const N: usize>(a: &[f64; N]) -> Result<(Bounds<N>, Option<f64>), Error> {
     for reach in PLAUSIBLE {
         let plausible = about(a, reach)?;
@@ -157,7 +158,7 @@ fn about<const N: usize>(a: &[f64; N], factor: f64) -> Result<Bounds<N>, Error> 
     Ok(bounds.map_err(stabilized_oe::Error::from)?)
 }
 
-/// The plant that was found is none of those for which convergence is sure.
+/// Convergence is not guaranteed for the identified plant.
 fn left_plausible<const N: usize>(
     path: &Path,
     reach: Option<f64>,

@@ -25,8 +25,8 @@ pub(super) struct Point {
 pub(super) struct Path {
     pub order: Order,
     pub points: Vec<Point>,
-    /// Bounds on the parameters have acted in the second half: the scatter of the estimates contains no information about their errors
-    /// then.
+    /// Bounds on the parameters were active in the second half: then the variance of the estimates contains no information about their
+    /// errors.
     pub held: bool,
     pub warnings: Vec<String>,
 }
@@ -74,7 +74,7 @@ pub(super) fn is_kept(k: usize, count: usize) -> bool {
 pub(super) struct Learnt {
     time: f64,
     pub rows: usize,
-    /// Whether all readings are there: then the time is the record's own, to the last digit.
+    /// Whether all readings are present: then the time equals the record's own exactly.
     whole: bool,
 }
 

@@ -12,7 +12,7 @@ const GRID: usize = 60;
 /// Bandwidth of the filters, over the inverse of the time constant of first order. Higher lets noise through, lower hides fast dynamics.
 const BANDWIDTH: f64 = 3.0;
 
-/// Below this over the time constant of first order the filters hide what is looked for.
+/// Below this multiple of the inverse time constant of first order, the filters suppress the dynamics of interest.
 const LEAST_BANDWIDTH: f64 = 0.1;
 
 /// At frequencies below that, or above the sampling rate, by more than this factor the filtered signals vanish.
@@ -21,7 +21,7 @@ const WIDEST: f64 = 100.0;
 /// The least memory, in time constants.
 const LEAST_MEMORY: f64 = 10.0;
 
-/// The memory is this part of the record where that is more.
+/// The memory is this share of the record, if that is longer.
 const MEMORY_PART: f64 = 0.2;
 
 /// A record, scaled.
@@ -37,7 +37,7 @@ pub(super) struct Scaled {
     unit: f64,
     /// Median step of the time, in the same unit.
     pub interval: f64,
-    /// Time as it is in the record, s.
+    /// Time of the record, s.
     pub seconds: Vec<f64>,
     /// Means and standard deviations of input and output.
     input: (f64, f64),
@@ -197,8 +197,8 @@ fn moments(values: &[f64]) -> (f64, f64) {
     (mean, (squares / n).sqrt())
 }
 
-/// Time constant, gain and offset of the model of first order with the least simulation error, that error, and whether it lies at
-/// the edge of the grid.
+/// Time constant, gain and offset of the model of first order with the least simulation error, that error, and whether the time constant is
+/// at an end of the grid.
 fn first_order(record: &Record, u: &[f64], y: &[f64], hold: Hold) -> (f64, [f64; 2], f64, bool) {
     let (shortest, longest) = (record.sample_interval(), record.duration());
     let ratio = (longest / shortest).max(1.0);
@@ -232,7 +232,7 @@ fn lagged(time: &[f64], u: &[f64], time_constant: f64, hold: Hold) -> Option<Vec
     Some(lagged)
 }
 
-/// `y = K x + d` and a decaying initial state, by least squares over the readings that are there: the squared error, and K and d.
+/// `y = K x + d` and a decaying initial state, by least squares over the present readings: the squared error, and K and d.
 fn line(time: &[f64], x: &[f64], y: &[f64], time_constant: f64) -> (f64, [f64; 2]) {
     let begin = time.first().copied().unwrap_or(0.0);
     let there: Vec<usize> = (0..x.len()).filter(|k| !y[*k].is_nan()).collect();

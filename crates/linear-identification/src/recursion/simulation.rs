@@ -9,7 +9,7 @@ use crate::{Error, Order};
 /// A free response is significant if this share of it is present at the end of the record.
 const LASTING: f64 = 0.2;
 
-/// The simulated output in its unit, from an initial state that is fitted; a warning where that state explains what it should not.
+/// The simulated output in its unit, from a fitted initial state; with a warning if this state explains too much.
 pub(super) fn simulate(
     scaled: &Scaled,
     order: Order,
@@ -46,7 +46,7 @@ struct Driven<'a> {
     y: &'a [f64],
 }
 
-/// A simulated output: what the input does, and what the initial state does.
+/// A simulated output: the response to the input, and that to the initial state.
 struct Response {
     forced: Vec<f64>,
     fading: Vec<f64>,

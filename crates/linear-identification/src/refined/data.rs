@@ -22,7 +22,7 @@ pub(crate) fn parts(records: &[Mended], structure: &Structure) -> (Vec<(Record, 
         let mut first = true;
         for record in &mended.parts {
             let data = part(record, in_loop, !first);
-            // A record that is not cut is refused with what it lacks.
+            // A record that is not cut is rejected with the reason.
             if mended.parts.len() == 1 || data.is_long_enough(structure) {
                 all.push((record.clone(), data));
                 first = false;

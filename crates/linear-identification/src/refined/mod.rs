@@ -30,13 +30,13 @@ use crate::{
     warnings::{doubtful, too_fast},
 };
 
-/// A delay that is looked for without a limit is at most this part of the shortest record.
+/// The default limit of an estimated delay as a share of the shortest record.
 const PART: f64 = 0.1;
-/// Instruments from a reference that explains less of the input are weak.
+/// Instruments from a reference that explains a smaller share of the input are weak.
 const EXPLAINED: f64 = 0.2;
 
 /// The plant alone, of one order, without a delay, and whether it is determined: the iteration has converged, and the highest coefficient
-/// of A differs from zero.
+/// of A differs significantly from zero.
 pub(super) fn plant(records: &[Mended], request: &Request) -> Result<(rivc::Plant, bool), Error> {
     let (structure, settings) = asked(records, request);
     let (parts, _) = parts(records, &structure);
@@ -309,7 +309,7 @@ fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, Stri
     }
 }
 
-/// The record's name in front, once.
+/// Puts the record's name in front, once.
 fn named(records: &[Record], error: rivc::Error) -> Error {
     let what = error.to_string();
     let own = records.iter().find_map(|record| {

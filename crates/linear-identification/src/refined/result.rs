@@ -32,6 +32,6 @@ pub struct Refined {
 pub struct RecordNoise {
     /// Coefficients of the noise model; none for white noise.
     pub coefficients: Vec<f64>,
-    /// Standard deviation of what drives it, output unit.
+    /// Standard deviation of the innovations, output unit.
     pub deviation: f64,
 }

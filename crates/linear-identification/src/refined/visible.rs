@@ -4,7 +4,7 @@ use ct_signals::{Record, quoted, residual_tests};
 
 use crate::{Error, Shown};
 
-/// Lags of the test that the error has nothing of a signal, at most.
+/// Largest number of lags for the test that the error does not depend on a signal.
 const MOST_LAGS: usize = 25;
 /// Significance level: a correlation of a signal with the error below this p-value is reported.
 const UNLIKELY: f64 = 0.01;

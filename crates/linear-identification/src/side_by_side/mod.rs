@@ -69,8 +69,8 @@ impl Method {
     }
 }
 
-/// Identifies by each of the methods with each of the orders, in parallel; `requests` holds what is asked of each method, its order aside.
-/// The record comes with others that are not fitted, and with whether it is of a loop.
+/// Identifies by each of the methods with each of the orders, in parallel; `requests` contains the options of each method without its
+/// order. The record comes with other records that are not fitted, and with whether it is of a loop.
 ///
 /// # Errors
 /// [`Error::AllRefused`] where every method refuses, with the reason of the first.

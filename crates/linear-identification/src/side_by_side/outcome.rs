@@ -34,7 +34,7 @@ pub(super) fn outcome(
     let of_plant = found.parameters.iter();
     let of_plant = of_plant.filter(|p| !p.name.starts_with("offset"));
     let estimated = of_plant.clone().count();
-    // A delay may well be 0.
+    // A delay may be 0.
     let of_plant = of_plant.filter(|p| !p.name.starts_with("delay"));
     let parts: Vec<Option<f64>> = of_plant
         .map(|p| {

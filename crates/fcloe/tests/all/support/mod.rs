@@ -1,4 +1,4 @@
-//! An integration of the loop that shares nothing with the crate's, and a drive that excites it.
+//! An integration of the loop that is independent of the crate's, and a drive that excites the loop.
 #![allow(dead_code)]
 
 use ct_lti::StateSpace;
@@ -66,7 +66,7 @@ impl System<f64, DVector<f64>> for &Loop {
     }
 }
 
-/// y and u at the samples, integrated afresh from each to the next.
+/// y and u at the samples, integrated from each sample to the next.
 pub fn integrate(
     plant: &PlantModel,
     controller: &Controller,

@@ -16,8 +16,7 @@ pub(super) fn records() -> u64 {
     std::env::var("RECORDS").map_or(RECORDS, |records| records.parse().unwrap())
 }
 
-/// The pooled share of covered rows is near 95 %: in 93 to 97 % for 200 fits or more, for fewer as much wider as the mean of fewer
-/// scatters.
+/// The pooled share of covered rows is near 95 %: within 93 to 97 % for 200 fits or more, and a wider range for fewer fits.
 fn check(name: &str, shares: &[f64]) {
     let n = shares.len() as f64;
     let mean = shares.iter().sum::<f64>() / n;

@@ -8,7 +8,7 @@ use crate::{Method, Order, Settings};
 /// Ratio of the simulation error to that of the start above which the result is worse.
 const WORSE: f64 = 1.05;
 
-/// The start was better than the end.
+/// The start has a smaller error than the final estimates.
 pub(crate) fn worse_than_first_order(
     (method, order): (Method, Order),
     rmse: f64,
@@ -60,7 +60,7 @@ pub(crate) fn doubtful(parameters: &[Parameter], order: Order) -> Vec<String> {
     highest.into_iter().filter_map(doubtful).collect()
 }
 
-/// Standard errors need more stretches of a time constant within the memory than there are parameters.
+/// Standard errors need more intervals of one time constant within the memory than there are parameters.
 pub(crate) fn unsure(parameters: &[Parameter], settings: &Settings) -> Option<String> {
     if parameters.iter().all(|p| p.std_error.is_some()) {
         return None;
@@ -84,7 +84,7 @@ pub(crate) fn too_fast(time_constants: &[f64], record: &Record, order: Order) ->
     ))
 }
 
-/// The first of what to try: `--order 2,0, or `; nothing where there is no lower order.
+/// First suggestion: `--order 2,0, or `; empty without a lower order.
 pub(crate) fn or_lower(order: Order) -> String {
     order
         .lower()

@@ -26,8 +26,7 @@ use crate::{
     sentences,
 };
 
-/// Share of a diagnosis' time limit that a comparison has, and of that the shares after which its phases end: further starts, single
-/// effects.
+/// Share of a diagnosis' time limit for a comparison, and the shares of this after which its phases end: further starts, single effects.
 const SHARE: f64 = 0.2;
 const FITTED: f64 = 0.6;
 const TRIED: f64 = 0.8;
@@ -62,9 +61,9 @@ fn of_one_model<'a>(options: &Options<'a>) -> Options<'a> {
 
 /// The believed model for a comparison.
 pub(crate) struct Believed<'a> {
-    /// The fit that is shown.
+    /// The displayed fit.
     pub shown: Node<'a>,
-    /// The fit under the noise model of its residual.
+    /// The fit with the noise model of its residual.
     own: Fit,
     left: Option<Left>,
     pub lacking: bool,
@@ -93,7 +92,7 @@ pub(crate) fn believed<'a>(
     let left = remains(&base, &own)?;
     let lacking = tempted || left.is_some();
     let floor = floors(problem, &own.noise, "the residual of the believed model");
-    // In the metric of a noise that drifts a simulation may drift off.
+    // With a noise model that drifts, the simulation of the prewhitened fit may drift.
     let shown = if lacking || wanders(&base, &own.noise) {
         base
     } else {

@@ -51,7 +51,7 @@ pub enum Error {
         /// Number of outputs.
         outputs: usize,
     },
-    /// The controller and the fitted plant do not make a stable loop.
+    /// The loop of the controller and the fitted plant is unstable.
     #[error(
         "controller: the loop of {controller} and the fitted plant is unstable (its output grows {} a sample): check the sign and the unit of the gain, and that integral_time is in seconds",
         growth(*radius)

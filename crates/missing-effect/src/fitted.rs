@@ -22,7 +22,7 @@ pub struct Fitted<'f, 'a> {
     pub lacking: bool,
 }
 
-/// Fits the believed model as [`crate::compare`] does, and hands the fit on.
+/// Fits the believed model as [`crate::compare`] does, and passes the fit on.
 ///
 /// # Errors
 /// Where the records, the plant or the fit do not allow it.

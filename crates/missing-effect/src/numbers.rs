@@ -1,4 +1,4 @@
-//! Numbers for people: as many digits as they deserve, and columns of them.
+//! Numbers for display: with the significant digits, and columns of them.
 
 pub use ct_signals::duration;
 
@@ -79,7 +79,7 @@ pub fn exponent(value: f64) -> i32 {
     if value == 0.0 {
         return 0;
     }
-    // The printed form does not round: log10 would make 0.001 a power of -2.99.
+    // The printed form is exact: log10 would make 0.001 a power of -2.99.
     format!("{:e}", value.abs())
         .split_once('e')
         .and_then(|(_, exponent)| exponent.parse().ok())

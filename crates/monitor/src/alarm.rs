@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{TimeAxis, isolate::Suspect, watched::Raised};
 
-/// The number of the schema of [`Alarm`]; it rises when a key changes its meaning.
+/// The version of the schema of [`Alarm`]; it rises when a key changes its meaning.
 pub const SCHEMA: u32 = 1;
 
 /// Whether an alarm is new.
@@ -15,7 +15,7 @@ pub const SCHEMA: u32 = 1;
 pub enum Stage {
     /// The model has stopped fitting.
     Alarm,
-    /// More rows have come since, and it was looked again.
+    /// More rows have come since, and they were evaluated.
     Update,
     /// The last evaluation; the model keeps its learned parameters.
     Final,
@@ -27,7 +27,7 @@ pub enum Stage {
 pub enum Verdict {
     /// One effect of the catalogue explains the rows, and no other effect does.
     Effect,
-    /// Several explain them, and cannot be distinguished yet.
+    /// Several effects explain the rows, and cannot be distinguished yet.
     Undecided,
     /// No effect of the catalogue explains the rows.
     Unexplained,
@@ -38,7 +38,7 @@ pub enum Verdict {
 pub struct Alarm {
     /// [`SCHEMA`].
     pub schema: u32,
-    /// New, or more is known of it.
+    /// Whether the alarm is new, or updated.
     pub event: Stage,
     /// Time of the row after which it was raised \[s\].
     pub time: f64,
@@ -46,7 +46,7 @@ pub struct Alarm {
     pub since: Option<f64>,
     /// Verdict on the rows.
     pub verdict: Verdict,
-    /// The effects that cannot be distinguished, best first; empty where nothing explains the rows.
+    /// The effects that cannot be distinguished, best first; empty if no effect explains the rows.
     pub effects: Vec<String>,
     /// Fall of the Bayesian information criterion with the best of them.
     pub evidence: Option<f64>,
@@ -54,7 +54,7 @@ pub struct Alarm {
     pub next: Option<Other>,
     /// The size of the best effect.
     pub size: Option<Size>,
-    /// The score that passed the threshold when the alarm was raised, and the threshold.
+    /// The score above the threshold at the alarm, and the threshold.
     pub score: f64,
     /// Threshold of `score`.
     pub threshold: f64,
@@ -83,7 +83,7 @@ pub struct Size {
     pub value: f64,
     /// Unit of the size; empty for a share.
     pub unit: String,
-    /// The vessel, of several; of an effect at a sensor the one whose level that reads, of several outputs.
+    /// The vessel, if there are several; for an effect at a sensor the vessel whose level it reads, if there are several outputs.
     pub vessel: Option<String>,
 }
 

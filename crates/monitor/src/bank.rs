@@ -1,4 +1,4 @@
-//! Scores: does the learned model still fit, in each direction in which it may change, over windows of several lengths?
+//! Scores: tests whether the learned model still fits, in each direction of a possible change, over windows of several lengths.
 //!
 //! For a direction `i` (a parameter of the plant, or an offset of one output) let `s_io` be the derivative of the reading of output `o`,
 //! whitened by the noise's spectrum and in units of its innovations, and `e_o` the whitened residual. With `l = exp(-1/W)`, a sample adds
@@ -33,7 +33,8 @@ pub(crate) fn windows(time_constant: f64) -> [f64; WINDOWS.len()] {
 pub(crate) struct Bank {
     lengths: Vec<f64>,
     keep: Vec<f64>,
-    /// Parameters, which come first among the directions, and directions: after them an offset of each output.
+    /// Number of parameters, which come first among the directions, and of directions: after the parameters there is an offset of each
+    /// output.
     parameters: usize,
     directions: usize,
     /// One sum for each window and direction.

@@ -4,10 +4,10 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The plant and its effects do not go together.
+    /// The plant and its effects are incompatible.
     #[error(transparent)]
     Structure(#[from] plants::Error),
-    /// An effect that follows the time since a record began.
+    /// An effect that is a function of the time since a record began.
     #[error(
         "{effect} follows the time since a record began, and a monitored plant has no start time: remove it, the monitor looks for it by itself"
     )]
@@ -28,7 +28,7 @@ pub enum Error {
         "the model has a measured disturbance, and a row of the monitor has one input: delete disturbance under [known] and its column"
     )]
     Disturbance,
-    /// A user's own model that follows the time itself.
+    /// A user's own model that depends on time explicitly.
     #[error(
         "the model uses `time`, and a monitored plant has no start time: give what follows the clock as an input"
     )]
@@ -48,7 +48,7 @@ pub enum Error {
         /// Allowed range.
         range: &'static str,
     },
-    /// A state that another version wrote.
+    /// A state from another version.
     #[error(
         "the state is of version {found}, and this program reads version {known}: begin without it"
     )]
@@ -66,7 +66,7 @@ pub enum Error {
         /// The differences, in the words of the model file.
         differences: String,
     },
-    /// A state whose numbers do not go together.
+    /// A state with inconsistent numbers.
     #[error("the state is damaged: {what}; delete it to start again")]
     Damaged {
         /// Inconsistency.
@@ -101,7 +101,7 @@ pub enum Refused {
         /// Limit of the absolute value.
         limit: f64,
     },
-    /// A command that no pump of this range gets: simulated, it would bury the model for hours.
+    /// A command far outside the range of this pump: simulated, it would make the model useless for hours.
     #[error("{value} is beyond the command's full range, input_range = {range}")]
     BeyondRange {
         /// The value.
@@ -109,7 +109,7 @@ pub enum Refused {
         /// The full range.
         range: f64,
     },
-    /// A reading that no sensor of this tank gives, however wrong it is.
+    /// A reading that a sensor of this tank cannot give, even with a large error.
     #[error("{value} is far above the tank, tank_height = {height}")]
     AboveTank {
         /// The value.

@@ -15,16 +15,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Each, Notice, Refused, Row};
 
-/// Steps from which the usual one is taken.
+/// Number of steps from which the usual one is computed.
 const STEPS: usize = 21;
 /// A step above this many of the longest usual ones is a gap.
 const GAP: f64 = 1.5;
-/// Steps of another length in a row that make it the usual one.
+/// Number of consecutive steps of another length that make it the usual one.
 const OTHER: usize = 20;
 /// Number of consecutive rows with earlier times after which the clock counts as set back: more than a logger repeats after a broken
 /// connection.
 const BACK: usize = 100;
-/// A gap of more than so many usual steps begins a new stretch.
+/// A gap of more than this number of usual steps starts a new part.
 const BRIDGED: f64 = 5.0;
 /// Larger values would overflow in the powers that a fit computes.
 const LARGEST: f64 = 1e15;
@@ -36,7 +36,7 @@ pub(crate) const LONGEST_BLOCK: usize = 1 << 24;
 /// A reading of each output; `None` where it is lost.
 pub(crate) type Readings = Each<Option<f64>>;
 
-/// A row, or the mean of a block of rows, as it is watched.
+/// A row, or the mean of a block of rows, for monitoring.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Sample {
     /// \[s\]
@@ -56,7 +56,7 @@ pub(crate) enum Follows {
     On,
     /// After a long gap.
     Gap,
-    /// The first one of another sampling interval.
+    /// The first sample with another sampling interval.
     Interval,
 }
 
@@ -67,7 +67,7 @@ pub(crate) struct Taken {
     pub notice: Option<Notice>,
 }
 
-/// A value that can be computed with; `at`: of the inputs or the outputs which.
+/// Checks that a value can be used in computations; `at`: index of the input or output.
 pub(crate) fn usable(column: &'static str, at: usize, value: f64) -> Result<f64, Refused> {
     if !value.is_finite() {
         return Err(Refused::NotFinite { column, at, value });
@@ -97,7 +97,7 @@ pub(crate) struct Intake {
     steps: Vec<f64>,
     /// Median and longest of the usual steps.
     usual: Option<(f64, f64)>,
-    /// Steps of another length in a row.
+    /// Number of consecutive steps of another length.
     other: usize,
     /// Sum of the block's times (since its first), and of each of its inputs; rows in it; its first time.
     sum: f64,
@@ -111,12 +111,12 @@ pub(crate) struct Intake {
 /// The readings of an output.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct Output {
-    /// Sum of the block's.
+    /// Sum of the block's readings.
     sum: f64,
-    /// The latest one of the stretch, and rows without one since.
+    /// The latest reading of the part, and rows without a reading since.
     reading: Option<f64>,
     without: usize,
-    /// Rows of the block with one.
+    /// Number of rows of the block with a reading.
     readings: usize,
 }
 
@@ -139,7 +139,7 @@ impl Intake {
         }
     }
 
-    /// The numbers that a file may have spoilt.
+    /// The numbers that a damaged file may have changed.
     pub(crate) fn sound(&self, inputs: usize, outputs: usize) -> bool {
         (1..=LONGEST_BLOCK).contains(&self.every)
             && self.rows <= MOST_ROWS
@@ -303,7 +303,8 @@ impl Intake {
 }
 
 impl Output {
-    /// Adds a reading to the block of so many rows, this one among them, and what the rows of the block right before it lack.
+    /// Adds a reading to a block of the given number of rows, including this one and the missing readings of the rows of the block directly
+    /// before it.
     fn read(&mut self, reading: f64, filled: usize) {
         let in_block = self.without.min(filled - 1);
         let before = self.reading.unwrap_or(reading);

@@ -1,4 +1,4 @@
-//! Isolation: which effect of the catalogue began, and when, explains the latest rows.
+//! Isolation: the effect of the catalogue, and its onset, that explains the latest rows.
 //!
 //! An effect that begins at row `k` is fitted to the rows of all outputs from `k` on by `greybox`, in the metric of the learned noise:
 //! every parameter of the plant as it was learned, the levels at `k` as the learned model has them, only the effect's own parameters free.
@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use self::search::Search;
 use crate::{Each, intake::Sample, learn::Learned, lost::interpolated};
 
-/// Effects that begin while a plant runs. What is a plant's shape, a wrong law or a lag does not.
+/// Effects that can begin while a plant runs. The plant's shape, a wrong law or a lag are not among them.
 const BEGIN: [&str; 12] = [
     "stiction_backlash",
     "pump_deadzone",
@@ -43,7 +43,7 @@ const ONSETS: [f64; 13] = [
 ];
 /// At every such onset the catalogue's starts are tried again.
 const AFRESH: usize = 4;
-/// An onset has at least so many rows after it.
+/// Least number of rows after an onset.
 pub(crate) const FEWEST: usize = 8;
 /// A drift of the pump is linear if its settling time is at its upper bound.
 const EVEN: (&str, &str) = ("pump_gain_drift", "time_constant");
@@ -83,7 +83,7 @@ impl Kept {
     }
 }
 
-/// An effect that explains the latest rows, as well as it can.
+/// An effect with its best explanation of the latest rows.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Suspect {
     pub placed: Placed,
@@ -117,7 +117,7 @@ impl Left {
 }
 
 impl Suspect {
-    /// Belongs to the group of the best.
+    /// Whether the effect belongs to the group of the best.
     pub(crate) fn near(&self, best: &Self) -> bool {
         self.plausible && best.evidence - self.evidence < GROUP_MARGIN
     }
@@ -205,7 +205,7 @@ pub(crate) fn isolate(
     best
 }
 
-/// Innovations of an output in their standard deviations, of lost readings too: as a fit to the filled record has them.
+/// Innovations of an output in standard deviations, also for missing readings: according to a fit to the interpolated record.
 fn innovations(rows: &[Kept], output: usize, residuals: &[f64], noise: &ArModel) -> Vec<f64> {
     let p = noise.order();
     (0..rows.len())

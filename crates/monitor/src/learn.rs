@@ -14,11 +14,11 @@ use crate::{intake::Sample, lost::expect, lost::interpolated, scatter::Limit};
 /// A command with a smaller relative change is constant.
 const STILL: f64 = 1e-9;
 
-/// Fewest rows with a reading of each output, as a part of all.
+/// Least share of rows with a reading of each output.
 pub(crate) const READ: f64 = 0.5;
 
-/// Fits in turn with what is expected of lost readings: each leaves of the error of the one before the share of the information that is
-/// lost.
+/// Number of iterated fits with expected values for missing readings: each reduces the preceding error by the share of the missing
+/// information.
 const ROUNDS: usize = 2;
 
 const NO_NOISE: &str =
@@ -64,7 +64,7 @@ pub(crate) fn record<'a>(
 /// State of a sticking valve within its band at the start of a record.
 pub(crate) const BEGIN: &str = "stiction_backlash.begin";
 
-/// The fit, and the levels at the first row; in words why there is none.
+/// The fit, and the levels at the first row; or the reason in words why there is none.
 ///
 /// Where readings are lost, what is expected of them under the fitted model and its noise can replace them, and the fit is repeated (after
 /// the EM algorithm, A. P. Dempster, N. M. Laird, D. B. Rubin, J. Royal Statistical Society B 39, 1977, without the covariance of what is
@@ -255,7 +255,7 @@ pub(crate) fn output_noise(
     })
 }
 
-/// The fit once more, with what is expected of lost readings beside it in the record.
+/// The fit repeated with the expected values of missing readings in the record.
 fn again(
     setup: &Setup,
     records: &mut [Record; 1],

@@ -2,7 +2,7 @@
 
 use ct_signals::ArModel;
 
-/// Sweeps over the lost values; one is enough where no two lie within the noise's order.
+/// Sweeps over the missing values; one is enough if no two are within the noise's order.
 const SWEEPS: usize = 30;
 
 /// Linear interpolation of missing values, at an end with the nearest value; `None` if there is no value.

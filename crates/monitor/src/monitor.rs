@@ -26,14 +26,14 @@ pub struct Row {
     pub time: f64,
     /// Inputs in the order of the model \[their units\].
     pub inputs: Each<f64>,
-    /// Readings in the order of the outputs \[their units\], made before the inputs act. NaN where one is lost: the inputs and the other
-    /// readings of the row are used all the same.
+    /// Readings in the order of the outputs \[their units\], taken before the inputs act. NaN for a missing one: the inputs and the other
+    /// readings of the row are still used.
     pub outputs: Each<f64>,
 }
 
 impl Row {
-    /// A row of time \[s\], the only input \[its unit\] and readings \[their units\]; outputs without one have lost it, and readings after
-    /// the last output are not looked at.
+    /// A row of time \[s\], the only input \[its unit\] and readings \[their units\]; outputs without a reading count as missing, and
+    /// readings after the last output are ignored.
     #[must_use]
     pub fn new(time: f64, input: f64, readings: &[f64]) -> Self {
         Self::with_inputs(time, &[input], readings)
@@ -64,16 +64,16 @@ pub struct Step {
     pub lost: Each<Option<Refused>>,
     /// Notices about the rows or the phase.
     pub notices: [Option<Notice>; 2],
-    /// The model does not fit any more, or more is known of that.
+    /// Alarm that the model does not fit any more, or an update of an alarm.
     pub alarm: Option<Alarm>,
-    /// Outputs whose noise has grown, or is back where it was.
+    /// Outputs whose noise has increased, or is back at the learned level.
     pub scatter: Vec<ScatterAlarm>,
 }
 
 /// Prediction error of the learned model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
-    /// Measured minus model, which runs on the command alone \[output unit\].
+    /// Measured minus the model's simulation from the command alone \[output unit\].
     pub residual: f64,
     /// Innovation in standard deviations: the part of the residual that its past does not predict.
     pub standardised: f64,
@@ -91,7 +91,7 @@ pub enum Notice {
         to: f64,
         /// Number of missing rows.
         missing: u64,
-        /// The command is taken to have been held; else what is not known of the levels is waited for.
+        /// Whether the command is assumed to have been held; otherwise the monitor waits for new levels.
         bridged: bool,
     },
     /// The clock was set back, as 100 consecutive rows show: these rows are used from here on, as after a long gap.
@@ -118,7 +118,7 @@ pub enum Notice {
         time_constant: f64,
         /// Standard deviation of the noise at each output \[output unit\].
         noise: Vec<f64>,
-        /// Rows are watched in blocks of so many.
+        /// Number of rows in a block.
         every: usize,
         /// Threshold of a score; far above 6 if the noise is so slow that these rows hardly determine its variance.
         threshold: f64,
@@ -169,7 +169,7 @@ impl State {
     }
 }
 
-/// A monitor; `'a` is how long a user's own model lives.
+/// A monitor; `'a` is the lifetime of a user's own model.
 pub struct Monitor<'a> {
     model: Watched<'a>,
     intake: Intake,
@@ -203,7 +203,7 @@ impl<'a> Monitor<'a> {
         })
     }
 
-    /// Goes on where a saved monitor was; with the same model and settings what follows is the same, bit for bit.
+    /// Continues a saved monitor; with the same model and settings all results are the same, bit for bit.
     ///
     /// # Errors
     /// As [`Monitor::new`], and [`Error::Version`], [`Error::OtherModel`], [`Error::Damaged`].
@@ -243,7 +243,7 @@ impl<'a> Monitor<'a> {
         &self.core.axis
     }
 
-    /// Says when the times of the rows are zero: to be known before the first row.
+    /// Sets the date of time zero; call it before the first row.
     pub fn set_axis(&mut self, axis: TimeAxis) {
         self.core.axis = axis;
     }
@@ -304,13 +304,13 @@ impl<'a> Monitor<'a> {
         Ok(step)
     }
 
-    /// Rows that were taken since the beginning, before a restoration too.
+    /// Number of rows since the beginning, including rows before a restoration.
     #[must_use]
     pub fn rows(&self) -> u64 {
         self.intake.rows
     }
 
-    /// Time of the latest row that was taken \[s\], before a restoration too.
+    /// Time of the latest row \[s\], also from before a restoration.
     #[must_use]
     pub fn last_time(&self) -> Option<f64> {
         self.intake.last

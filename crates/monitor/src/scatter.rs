@@ -1,4 +1,4 @@
-//! The size of an output's innovations: has their scatter grown, whatever their structure?
+//! Noise monitor: tests whether the variance of an output's innovations has increased, whatever their structure is.
 //!
 //! The scores ask whether the residual has a structure, so innovations that only grow, as those of a loose cable do, fit. Here the rows
 //! are taken in pairs: `d = |e_2j - e_2j-1|` is the scatter from a row to the next, which a residual that moves slowly leaves as it is, so
@@ -83,7 +83,7 @@ impl Limit {
         0
     }
 
-    /// The mean of that number and a standard deviation more: what a block has as a rule.
+    /// The mean of that number plus a standard deviation: a typical value for a block.
     fn usual(&self, length: usize) -> f64 {
         let (k, rest, b) = (
             self.beyond as f64,
@@ -355,7 +355,7 @@ mod tests {
         let grown: Vec<f64> = student(3000, 1e6, 3).iter().map(|e| 1.4 * e).collect();
         let (at, back) = seen(&grown);
         assert!(back && at.is_some_and(|(k, ratio)| k < 2048 && (1.2..1.8).contains(&ratio)));
-        // A slow residual is none of its business.
+        // A slow residual must not cause a noise alarm.
         let slow: Vec<f64> = student(3000, 1e6, 4)
             .iter()
             .enumerate()

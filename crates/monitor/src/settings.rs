@@ -5,8 +5,8 @@ use crate::Error;
 /// Settings of the monitor. Every field has a default: `Settings::default()`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Mean number of rows between false alarms of all kinds, from 1000 on; usually 1e6. Rows count as they come, also where they are
-    /// watched in blocks.
+    /// Mean number of rows between false alarms of all kinds, from 1000 on; default 1e6. Input rows are counted, also if they are processed
+    /// in blocks.
     pub rows_between_false_alarms: f64,
     /// Least number of rows for learning, 100 to 1024; default 1000.
     pub learning_rows: usize,

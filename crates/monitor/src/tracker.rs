@@ -85,7 +85,7 @@ impl Tracker {
     /// seconds after the sample before.
     pub(crate) fn update<'a>(&mut self, rows: impl Iterator<Item = &'a [f64]>, h: f64) {
         for (i, row) in rows.enumerate() {
-            // Rows of one instant: what was known before is forgotten once.
+            // Rows of one instant: forgetting is applied once.
             let weights = if i == 0 { self.weights } else { self.together };
             self.take(row, h, &weights);
         }

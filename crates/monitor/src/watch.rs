@@ -94,7 +94,7 @@ impl<'a> Watch<'a> {
         })
     }
 
-    /// Follows the plant to its next row.
+    /// Simulates the plant to the next row.
     pub(crate) fn follow(&mut self, sample: &Sample) -> Said {
         if let Some(last) = &self.last {
             self.model.advance(self.hold, last, sample);

@@ -17,7 +17,7 @@ use crate::{
 #[derive(Clone)]
 pub struct Watched<'a>(pub(crate) Arc<dyn Believed<'a> + 'a>);
 
-/// An alarm as it was raised, and when it is looked at again.
+/// An alarm, and the times of its evaluations.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Raised {
     pub stage: Stage,
@@ -41,13 +41,13 @@ pub(crate) trait Believed<'a>: Send + Sync {
     fn states(&self) -> usize;
     /// What the inputs do between rows.
     fn hold(&self) -> Hold;
-    /// An input that no row of this plant has.
+    /// An input outside the possible range of this plant.
     fn check_input(&self, value: f64) -> Result<(), Refused>;
-    /// A reading that no sensor of this plant gives.
+    /// A reading outside the possible range of this plant's sensors.
     fn check_reading(&self, value: f64) -> Result<(), Refused>;
     /// Properties that a saved state has to agree with.
     fn fingerprint(&self) -> Fingerprint;
-    /// The model fitted to rows, and the states at the first of them; in words why it cannot be.
+    /// The model fitted to rows, and the states at the first of them; or the reason in words why there is none.
     fn learn(&self, samples: &[Sample], hold: Hold) -> Result<(Learned, Vec<f64>), String>;
     /// Name and unit of each parameter, in the order of [`Learned::theta`]; or the reason in words why there are none.
     fn parameters(&self, learned: &Learned, units: &Units)
@@ -57,7 +57,7 @@ pub(crate) trait Believed<'a>: Send + Sync {
     /// The learned model from these states on; `at_rest`: the input before the first row.
     fn run(&self, learned: &Learned, states: &[f64], at_rest: f64)
     -> Option<Box<dyn Running + 'a>>;
-    /// Puts the states that are read where they are read.
+    /// Sets the measured states to their readings.
     fn put_readings(&self, states: &mut Each<f64>, readings: &Readings);
     /// The name of an output, of several.
     fn output_name(&self, output: usize) -> Option<String>;

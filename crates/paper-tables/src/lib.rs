@@ -1,5 +1,5 @@
-//! The tables of two papers, computed again: the figures that a paper prints beside those of many runs of the same experiment, each with
-//! another noise.
+//! The tables of two papers, computed again: the printed figures compared with those of many runs of the same experiment with different
+//! noises.
 //!
 //! A paper prints one run, or a few, of a noise that is not known. Its figures are consistent with a computation where they lie among those
 //! of many runs; more cannot be said without its noise. What a paper does not print (the excitation, the step, the starting values) was

@@ -93,7 +93,7 @@ impl Diagnosis {
 
 #[pymethods]
 impl Diagnosis {
-    /// The result as `ctid diagnose --json` writes it, without its mark.
+    /// The result in the form of `ctid diagnose --json`, without its mark.
     fn json(&self) -> PyResult<String> {
         json(&self.found)
     }
@@ -111,7 +111,7 @@ impl Diagnosis {
         py.detach(|| diagnosed_page(&self.model.file, &self.records, &self.found).html())
     }
 
-    /// The model with the effects that were found, and its values in the last step.
+    /// The model with the found effects, and its values in the last step.
     #[getter]
     fn model(&self) -> PyResult<Model> {
         let mut file = self.model.file.clone();

@@ -14,9 +14,9 @@ use crate::{
 /// Largest ratio of the mean squared residual of an alternative to that of an effect that is a function of time.
 pub(crate) const NEARLY: f64 = 1.05;
 
-/// An effect, what cannot be distinguished from it, and where it may act.
+/// An effect, the alternatives that cannot be distinguished from it, and the places where it may act.
 pub(crate) struct Group {
-    /// Identifiers: the effect itself, then what fits as well in its place, best first.
+    /// Identifiers: the effect itself, then the alternatives, best first.
     pub members: Vec<String>,
     /// The places of the effect itself, most likely first, if there are several.
     pub places: Vec<PlaceScore>,
@@ -49,7 +49,7 @@ pub(crate) fn groups<'a>(
                 .collect();
             // With white-noise weighting, each sample of a coloured residual counts for less than one.
             let behind = |node: &Node| (node.fit.bic() - last.fit.bic()) / per_sample;
-            // A size at its edge speaks against an alternative, but where the final model has it too.
+            // A size at a bound is evidence against an alternative, unless the final model has it too.
             let possible = |node: &Node| {
                 let narrow = in_loop && node.narrow_stiction().is_some();
                 let at_the_edge = |placed: &Placed| {

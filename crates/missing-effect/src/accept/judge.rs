@@ -34,7 +34,7 @@ pub(crate) const WHOLE: f64 = 0.9;
 /// Effects are a partial explanation from this share on.
 pub(crate) const PART: f64 = 0.38;
 
-/// A noise floor below this part of the error is none.
+/// A noise floor below this share of the error counts as zero.
 const NOTHING: f64 = 1e-9;
 
 /// Grade of the explanation by a set of effects.
@@ -55,13 +55,13 @@ pub(crate) struct Judge<'s, 'a> {
     pub wandering: bool,
     /// The records come from a loop that is not simulated.
     pub in_loop: bool,
-    /// Models are compared and shown by their simulation error.
+    /// Whether models are compared and shown by their simulation error.
     pub by_simulation: bool,
-    /// The set was cut to as many effects as may be added.
+    /// Whether the set was cut to the permitted number of effects.
     pub stopped: bool,
     /// Structure of the residual after a level shift of the reading, if the structure is a level shift.
     pub jumped: Option<Left>,
-    /// The single effects, in the metric in which they were refitted last.
+    /// The single effects, with the weighting of their last refit.
     pub singles: &'s [Node<'a>],
     /// The sets that the search has fitted.
     pub searched: &'s [&'s Node<'a>],
@@ -71,7 +71,7 @@ pub(crate) struct Judge<'s, 'a> {
 pub(crate) struct Judged<'a> {
     pub course: Course<'a>,
     pub grade: Grade,
-    /// The share of the excess error that it explains.
+    /// The share of the excess error that the set explains.
     pub share: f64,
     /// For an accepted set: the alternatives to each of its effects, and the places where each may act.
     pub groups: Vec<Group>,
@@ -270,8 +270,8 @@ impl<'a> Course<'a> {
     }
 }
 
-/// The share of the excess error, in mean square above the noise floor, that a model explains of its base; of several outputs each error is
-/// taken over the floor of its output.
+/// The share of the excess error, in mean square above the noise floor, that a model explains relative to its base; for several outputs
+/// each error is divided by the floor of its output.
 pub(crate) fn explained(base: &Node, last: &Node, floor: &[f64]) -> Result<f64, Error> {
     let series = |node: &Node| node.setup.disturbance(&node.fit.x);
     let (before, after) = (series(base)?, series(last)?);
@@ -281,7 +281,7 @@ pub(crate) fn explained(base: &Node, last: &Node, floor: &[f64]) -> Result<f64, 
     let scales: Vec<f64> = floor.iter().zip(&rms).map(least).collect();
     let mean_square = |series: &[Vec<f64>]| base.setup.weighted_rms(series, &scales).powi(2);
     let (before, after) = (mean_square(&before), mean_square(&after));
-    // A slow noise may be larger in the long run than it was in the record.
+    // A slow noise may have a larger variance in the long run than in the record.
     let floor = after.min(1.0);
     Ok((before - after) / (before - floor).max(f64::MIN_POSITIVE))
 }

@@ -18,7 +18,7 @@ use crate::{
     },
 };
 
-/// Instants that are tried, those where the whitened residual is largest.
+/// Number of instants that are tried, those with the largest whitened residual.
 const INSTANTS: usize = 4;
 /// The first size of the level shift is the difference of the residual's means over this number of samples before and after.
 const AROUND: usize = 8;
@@ -30,7 +30,7 @@ const INSTANT: f64 = 1.0;
 pub(crate) struct Jump {
     /// Criterion of the model with the level shift.
     pub bic: f64,
-    /// The last sample before it.
+    /// The last sample before the level shift.
     before: usize,
     /// The output with the level shift.
     output: usize,
@@ -122,7 +122,7 @@ mod tests {
     /// The records do not begin at zero \[s\].
     const BEGIN: f64 = 100.0;
 
-    /// A linear tank whose reading is another from a sample on.
+    /// A linear tank whose reading is shifted from a sample on.
     fn problem(by: f64, records: usize, seed: u64) -> Problem {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let plant = Plant::SingleTankLinear;

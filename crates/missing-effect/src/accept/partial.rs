@@ -34,14 +34,14 @@ use crate::{
     search::find::Found,
 };
 
-/// Sets of one size that are refitted, those with the least simulation error.
+/// Number of sets of one size that are refitted, those with the least simulation error.
 const REFITTED: usize = 6;
-/// Largest set, but for the confirmed one.
+/// Largest size of a set, except for the confirmed one.
 const MOST: usize = 3;
 /// A larger set leaves at most this share of the excess error of the smaller set.
 const LEFT: f64 = 0.5;
 
-/// A set explains this part of the mean squared error at least on a half of the record that was not fitted.
+/// Least share of the mean squared error that a set explains on a half of the record that was not fitted.
 const CARRIED_OVER: f64 = 0.3;
 
 /// Largest ratio of the innovation variance with a set to that with the base: a set that compensates for a slow course by its own fast
@@ -57,21 +57,21 @@ const PART_BY_SHAPE: f64 = 0.15;
 /// Reason for rejecting a narrow band of stiction.
 const NARROW_BAND: &str = "in a loop that is not simulated, a disturbance fed back through the command looks like a periodic effect";
 
-/// A set that was tested, and with what result.
+/// A tested set with its result.
 pub(crate) struct Tested<'a> {
     /// The set, fitted to the simulation error.
     pub node: Node<'a>,
     /// The share of the excess error that it explains.
     pub share: f64,
-    /// Fall of the criterion, each model under its own noise model.
+    /// Fall of the criterion, each model with a separate noise model.
     pub bic_fall: f64,
-    /// The record has the shape of a valve that sticks, and the set is that.
+    /// The record has the signature of valve stiction, and the set is stiction.
     pub shape: bool,
     /// Reasons for the rejection; empty if the set is accepted.
     pub reasons: Vec<String>,
 }
 
-/// The set that explains the largest part of the excess error, accepted or, where none is, the best that was refused.
+/// The set that explains the largest part of the excess error: an accepted one or, if there is none, the best rejected one.
 ///
 /// `floor`: standard deviation of each output's noise \[output unit\]; `in_loop`: the records come from a loop that is not simulated.
 pub(crate) fn largest_part<'a>(
@@ -272,7 +272,7 @@ fn test<'a>(
         if rougher.any(|rougher| rougher) {
             reasons.push("the changes from sample to sample contradict it".to_string());
         }
-        // A share that is no number is none.
+        // A share that is NaN counts as zero.
         if carried_over(base, &node)?.max(0.0) < CARRIED_OVER {
             reasons.push(
                 "what is fitted to one half of the record does not predict the other".to_string(),

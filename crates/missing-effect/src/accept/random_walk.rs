@@ -29,15 +29,16 @@ use crate::{
     },
 };
 
-/// Decades of `q` that are searched, and values in each.
+/// Number of decades of `q` in the search, and values in each.
 const DECADES: std::ops::Range<i32> = -9..2;
 const EACH: i32 = 6;
 
-/// The chi-square law holds roughly here, as the walk's size is chosen and the fit is one step: so many times less risk is taken.
+/// The chi-square distribution is only approximate here, because the walk's size is fitted and the fit is one step: therefore the
+/// significance level is divided by this.
 const STRICTER: f64 = 3.0;
 
-/// A walk bends the parameters by moves of the output of about this rms, over that of the noise, at most: that of a walk which ends at half
-/// the size of the noise.
+/// A walk changes the output through the parameters by about this rms relative to the noise, at most: that of a walk that ends at half the
+/// size of the noise.
 const BENDING: f64 = 0.35;
 
 /// The random walks that may replace effects.
@@ -45,7 +46,7 @@ const BENDING: f64 = 0.35;
 pub(crate) struct Walk {
     /// The first value is unknown (diffuse start); otherwise it is zero, so that a constant offset is no random walk.
     pub anywhere: bool,
-    /// Standard deviation at the end of a record over that of the noise, at most.
+    /// Largest standard deviation at the end of a record relative to the noise.
     pub largest: f64,
     /// Whether the parameters are fitted again together with the walk.
     pub fitted_again: bool,
@@ -71,9 +72,9 @@ impl Walk {
     };
 }
 
-/// Residuals whitened by the noise model of their output, over its innovations, beside their derivatives by the free parameters, row by
-/// row, a series for each record and output; the residual is the last column. The first samples of a record are left out: they have no
-/// complete past, and are scaled otherwise, so that a level other than zero would look like a jump.
+/// Residuals whitened by the noise model of their output, divided by its innovations, with their derivatives with respect to the free
+/// parameters, row by row, a series for each record and output; the residual is the last column. The first samples of a record are left
+/// out: they have no complete past and another scaling, so that a constant level would look like a step.
 struct Whitened {
     columns: usize,
     series: Vec<Vec<f64>>,
@@ -111,8 +112,8 @@ impl Whitened {
         }
     }
 
-    /// Minus twice the logarithm of the likelihood under white noise and a random walk, at its best over the parameters (one step of
-    /// Gauss-Newton weighted by this noise model, within [`BENDING`]) and over `q`.
+    /// Minus twice the logarithm of the likelihood with white noise and a random walk, minimised over the parameters (one Gauss-Newton step
+    /// weighted by this noise model, within [`BENDING`]) and over `q`.
     fn deviance(&self, walk: Walk) -> f64 {
         let rows = |values: &Vec<f64>| values.len() / self.columns;
         let longest = self.series.iter().map(rows).max().unwrap_or(1);
@@ -183,7 +184,7 @@ impl Whitened {
 /// random walk.
 pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node, walk: Walk) -> Result<bool, Error> {
     let noise = colour(gained)?;
-    // A model that cannot be simulated any more is beyond nothing.
+    // A model that cannot be simulated any more is not significant.
     let (Some(with), Some(without)) = (
         of_node(gained, &noise, walk),
         of_node(lacking, &noise, walk),
@@ -227,8 +228,7 @@ mod tests {
 
     const N: usize = 600;
 
-    /// Noise of this correlation from sample to sample, a random walk of this standard deviation at the end, and a line that rises by so
-    /// much.
+    /// Noise with this correlation from sample to sample, a random walk with this standard deviation at the end, and a line with this rise.
     fn series(correlation: f64, walk: f64, rise: f64, seed: u64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (mut level, mut noise): (f64, f64) = (0.0, 0.0);
@@ -269,7 +269,7 @@ mod tests {
             };
             of(centred) - of(gained)
         };
-        // Beyond the penalty of a parameter and the margin.
+        // Larger than the penalty of a parameter and the margin.
         let named = |correlation: f64, walk: f64, rise: f64| {
             (0..100)
                 .filter(|&seed| fall(correlation, walk, rise, seed) > (N as f64).ln() + BIC_MARGIN)
@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn parameters_are_fitted_again_beside_the_walk_as_far_as_it_bends_them() {
-        // The parameter's derivative is a line; the line in the series is one that the parameter should follow, or a much steeper one.
+        // The parameter's derivative is a line; the line in the series agrees with the parameter, or is much steeper.
         let fits = |rise: f64| {
             let series = series(0.0, 0.1, rise, 5);
             let t = |k: usize| k as f64 / N as f64;
@@ -333,7 +333,7 @@ mod tests {
 
     #[test]
     fn a_small_walk_is_small_beside_the_noise_itself() {
-        // A line beside noise with a long memory is distinguished from a walk as large as the noise better than from one of any size.
+        // With noise of a long memory, a line is better distinguished from a walk as large as the noise than from a walk of any size.
         let noise = Noise::of(vec![ArModel::from_coefficients(&[0.8], 0.6).unwrap()]);
         let falls = (0..40).map(|seed| {
             let series = series(0.8, 0.0, 5.0, seed);

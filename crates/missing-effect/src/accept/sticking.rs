@@ -30,11 +30,11 @@ const OF_RECORD: f64 = 0.35;
 struct Shape {
     jumps: usize,
     plateaus: usize,
-    /// The part of the record that plateaus cover.
+    /// The share of the record that plateaus cover.
     share: f64,
 }
 
-/// Whether some record has the shape of a valve that sticks.
+/// Whether some record has the signature of valve stiction.
 pub(crate) fn sticks(records: &[Record]) -> bool {
     series(records).any(|(record, output)| {
         let shape = shape(&record.inputs[0].values, &output.interpolated());

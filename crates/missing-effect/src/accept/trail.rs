@@ -13,7 +13,7 @@ use crate::{
     },
 };
 
-/// Further starts of every step, because its minimum must not hang on where the search came from: so many, ...
+/// Further starts of every step, because its minimum must not depend on the path of the search: this many, ...
 const STARTS_AROUND: usize = 6;
 /// ... and the same number again until the minimum is found twice; largest number of rounds for intermediate models and for the last one.
 /// The model that names the effects has to meet the same condition as the believed one.
@@ -41,7 +41,7 @@ pub(crate) fn trail<'a>(
             break;
         };
         let mut node = refine(&first, noise, &[])?;
-        // The end of the search has no vote: how often its minimum is found is counted over the starts around it.
+        // Starts from the search are not counted: how often the minimum is found is counted over the starts around it.
         (node.fit.starts, node.fit.agree) = (0, 0);
         let rounds = if k + 1 == last.added.len() {
             ROUNDS.1
@@ -55,7 +55,7 @@ pub(crate) fn trail<'a>(
         }
         trail.push(node);
     }
-    // Out of time the models on the way may have ended above the set that they lead to.
+    // If the time is over, intermediate models may have a higher cost than the final set.
     if let Some(end) = trail.last_mut()
         && end.added.len() == last.added.len()
         && end.added.iter().all(|placed| last.added.contains(placed))

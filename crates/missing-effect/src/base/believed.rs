@@ -91,15 +91,16 @@ pub(crate) fn base<'a>(
         fit,
         added: Vec::new(),
     };
-    // Random starts hardly find the places of many effects at once, nor, where most levels are hidden, that of one: a leak of
-    // the first of three tanks ended at the plant without it from every start.
+    // Random starts rarely find the places of many effects at once, or of one effect if most levels are not measured: a leak of the first
+    // of three tanks ended at zero from every start.
     if !problem.effects.is_empty() {
         begun_again(&mut node, &problem.effects, &white)?;
     }
     enclose(problem, options, node)
 }
 
-/// A start of a plant with effects: the plant is fitted without them, and one after the other is put on, first what lowers the error most.
+/// A start of a plant with effects: the plant is fitted without them, then effects are added one after the other, each time the one that
+/// lowers the error most.
 ///
 /// From random starts of all at once hardly any fit of several effects finds its way. `None`: the plant has no effects.
 fn one_by_one(setup: &Setup, seed: u64) -> Result<Option<Vec<f64>>, Error> {

@@ -127,8 +127,7 @@ fn disagreement(replays: &[Replay]) -> (f64, f64) {
         )
 }
 
-/// p-value of the test that the command does not depend on past residuals; of several records the smallest, corrected for
-/// having taken it.
+/// p-value of the test that the command does not depend on past residuals; of several records the smallest, corrected for the selection.
 fn feedback_p(node: &Node) -> Result<f64, Error> {
     let residuals = node.setup.residuals(&node.fit.x)?;
     let outputs = node.setup.outputs();

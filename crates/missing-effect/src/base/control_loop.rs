@@ -1,5 +1,5 @@
-//! The fitted plant linearised: its slowest time constant, and whether the loop that the model file describes can have
-//! produced the record: an unstable one cannot.
+//! Linearisation of the fitted plant: its slowest time constant, and whether the loop in the model file is stable; an unstable loop cannot
+//! have produced the record.
 
 use greybox::LinearPlant;
 use nalgebra::DMatrix;
@@ -7,7 +7,7 @@ use plants::controller::Controller;
 
 use crate::{Error, fit::node::Node};
 
-/// A loop that grows e-fold so often over the longest record cannot have produced it.
+/// A loop that grows by this number of factors e over the longest record cannot have produced it.
 const GROWTH: f64 = 1.0;
 
 /// Rejects a controller that makes the fitted plant unstable at its operating point.
@@ -68,7 +68,7 @@ pub(crate) fn slowest_time_constant(node: &Node) -> Result<f64, Error> {
     })
 }
 
-/// The fastest time constant of a fitted plant at its operating point \[s\], a tenth of a sampling interval at least.
+/// The fastest time constant of a fitted plant at its operating point \[s\], at least a tenth of a sampling interval.
 pub(crate) fn fastest_time_constant(node: &Node) -> Result<f64, Error> {
     let a = linearised(node)?.a;
     let a = DMatrix::from_fn(a.len(), a.len(), |i, j| a[i][j]);

@@ -15,9 +15,9 @@ pub struct Problem {
     pub plant: Plant,
     /// Known constants of the plant.
     pub known: Known,
-    /// The effects that are on already.
+    /// The effects in the model.
     pub effects: Vec<Placed>,
-    /// Terms of the user's own that are on already; a fit changes their scale.
+    /// Terms of the user's own in the model; a fit changes their scale.
     pub terms: Vec<Term>,
     /// First guesses, by name: `alpha`, `overflow.rim`.
     pub start: BTreeMap<String, f64>,
@@ -38,7 +38,7 @@ pub struct Problem {
 pub struct Options<'a> {
     /// Largest number of effects to add.
     pub max_effects: usize,
-    /// Random starts of the base fit, at least ten; more are drawn until the best minimum is found twice.
+    /// Random starts of the base fit, at least ten; more are used until the best minimum is found twice.
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
@@ -50,11 +50,11 @@ pub struct Options<'a> {
     /// Time limit of the search: steps beyond it are left out, and [`crate::Effort`] lists them. `None`: no limit. A result depends on the
     /// speed of the computer only if the limit is reached.
     pub time_limit: Option<Duration>,
-    /// Interruption flag: when set, the search ends soon with the best that was found so far.
+    /// Interruption flag: when set, the search ends soon with the best result so far.
     pub interrupt: Option<&'a AtomicBool>,
 }
 
-/// A limit for a person who waits: the program's. [`Options::default`] has none, so that results do not depend on the machine.
+/// Time limit of the interactive program. [`Options::default`] has none, so that results do not depend on the computer.
 pub const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 impl Default for Options<'_> {

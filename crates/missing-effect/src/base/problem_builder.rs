@@ -42,7 +42,7 @@ impl ProblemBuilder {
         self
     }
 
-    /// Terms of the user's own that are on already.
+    /// Terms of the user's own in the model.
     pub fn terms(mut self, terms: impl Into<Vec<Term>>) -> Self {
         self.problem.terms = terms.into();
         self

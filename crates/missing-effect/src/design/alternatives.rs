@@ -14,7 +14,7 @@ use effect_search::design::{Kind, Power, Prospect, Sequence, power, prospect, ti
 const MOST_TIMES: f64 = 20.0;
 
 impl Search<'_, '_> {
-    /// Played how many times over the experiment decides, if it does.
+    /// Number of repetitions after which the experiment decides, if it does.
     pub fn times_as_long(
         &self,
         (best, sequence): &Tried,
@@ -44,7 +44,7 @@ impl Search<'_, '_> {
         let best = promised
             .first()
             .and_then(|best| self.confirmed(best, &wider, before));
-        // The best of a few that were drawn at random is not what the range would give.
+        // The best of a few random experiments does not represent the range.
         let best = best.filter(|_| !self.leaves_out("a wider range"));
         Ok(best.map(|best| Wider {
             low: wider.low,
@@ -95,7 +95,7 @@ impl Search<'_, '_> {
             let known = &before.known[1 - truth];
             second_sensor::in_experiment(&simulated[truth], node, other, known, self.metric)
         };
-        // Records that were recorded again have decided nothing yet: what is ahead is what a parameter costs.
+        // Repeated records have not decided anything before: the criteria differ only by the penalty of a parameter.
         let [a, b] = self.nodes.each_ref().map(|node| node.fit.price);
         let fewer = b - a;
         let fresh = |if_true: [f64; 2]| -> Power { power(if_true, [fewer, -fewer]) };

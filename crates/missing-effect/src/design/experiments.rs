@@ -1,4 +1,4 @@
-//! The search among the sequences: all of them linearised, the most promising refitted.
+//! The search among the sequences: all are linearised, and those with the largest predicted power are refitted.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -23,9 +23,9 @@ const ROUND: usize = 6;
 const MOST_REFITS: usize = 30;
 /// Number of sequences that are tried whatever the time limit is.
 const FEWEST: usize = 2;
-/// A sequence that drives a controller to a limit is applied so that it crosses its range in so many time constants.
+/// A sequence that drives a controller to a limit is slowed down so that it crosses its range in this number of time constants.
 const SLOWER: [f64; 2] = [1.0, 4.0];
-/// A level below this share of the highest one is none.
+/// A level below this share of the highest one counts as empty.
 const DRAINED: f64 = 1e-6;
 
 /// Data of the search.
@@ -45,7 +45,7 @@ pub(crate) struct Found {
     pub overfull: usize,
     pub limited: usize,
     pub best: Candidate,
-    /// The best one's sequence.
+    /// The sequence of the best experiment.
     pub values: Vec<f64>,
     pub again: Option<Candidate>,
     pub wider: Option<Wider>,
@@ -53,7 +53,7 @@ pub(crate) struct Found {
     pub second_sensor: Option<SecondSensor>,
 }
 
-/// A sequence and what it promises.
+/// A sequence and its predicted power.
 pub(crate) type Tried = (Candidate, Sequence);
 
 /// Information of each model from the records, and the distance of each from the other's simulation of them.
@@ -62,7 +62,7 @@ pub(crate) struct Before {
     noise_free: [Vec<Record>; 2],
     /// `misfit[i]`: misfit of the other model to the response of model `i`.
     pub misfit: [f64; 2],
-    /// Smallest and largest level of each vessel, by either.
+    /// Smallest and largest level of each vessel, for either model.
     levels: Vec<(f64, f64)>,
 }
 
@@ -77,7 +77,7 @@ impl Search<'_, '_> {
         [self.ahead(), -self.ahead()]
     }
 
-    /// Whether a part has to be left out because of the time limit, or because the user gave up.
+    /// Whether a part has to be left out because of the time limit or a cancellation.
     pub fn leaves_out(&self, part: &str) -> bool {
         self.nodes[0].setup.leaves_out(part)
     }
@@ -171,7 +171,7 @@ impl Search<'_, '_> {
         })
     }
 
-    /// A sequence, linearised; made slower where it would drive the controller to a limit.
+    /// A sequence, linearised; slowed down if it would drive the controller to a limit.
     fn off_the_limits(
         &self,
         sequence: Sequence,
@@ -264,7 +264,7 @@ impl Search<'_, '_> {
         let finite = tried.len();
         tried.retain(|(candidate, _)| !self.overfills(candidate));
         let overfull = finite - tried.len();
-        // At a limit the loop is open, and a fit of the loop only nearly right. Where nothing stays off the limits, so be it.
+        // At a limit the loop is open, and a fit of the loop is only approximate. If every sequence reaches a limit, this is accepted.
         let mut limited = tried.iter().filter(|(tried, _)| tried.at_limit).count();
         if limited < tried.len() {
             tried.retain(|(candidate, _)| !candidate.at_limit);
@@ -312,7 +312,7 @@ impl Search<'_, '_> {
 
     pub fn run(&self, bounds: &Bounds, seed: u64) -> Result<Found, Error> {
         let before = self.before()?;
-        // A misfit that is too large before the experiment would make the experiment's too small.
+        // A misfit that is too large before the experiment would make that of the experiment too small.
         if self.nodes[0].setup.out_of_time() {
             return Err(Refused::OutOfTime.into());
         }
@@ -337,7 +337,7 @@ impl Search<'_, '_> {
         };
         let instead = || !self.leaves_out("what could be done instead");
         let again = instead().then(|| self.again(bounds, &before)).flatten();
-        // More than plenty needs no wider range.
+        // With ample power no wider range is needed.
         let wider = if best.power.power < PLENTY && instead() {
             self.wider(bounds, seed, &before)?
         } else {

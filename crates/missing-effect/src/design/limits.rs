@@ -19,7 +19,7 @@ fn at_least(value: f64) -> String {
 /// Limits of an experiment; `None` is derived from the records.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
-    /// Smallest and largest value of what is applied: the command, or in a loop the reference. Without it what the records visited.
+    /// Smallest and largest value of the applied signal: the command, or in a loop the reference. By default the range of the records.
     pub range: Option<(f64, f64)>,
     /// Largest change of the applied signal per second; none by default.
     pub slew: Option<f64>,
@@ -96,9 +96,9 @@ pub enum Refused {
         low: f64,
         /// Second end.
         high: f64,
-        /// Lower end of what is possible.
+        /// Lower end of the possible range.
         from: f64,
-        /// Upper end of what is possible.
+        /// Upper end of the possible range.
         to: f64,
         /// Name of the bound.
         what: &'static str,
@@ -142,7 +142,7 @@ pub enum Refused {
         duration: f64,
         /// Samples in it.
         samples: usize,
-        /// The most.
+        /// Largest number of samples.
         most: usize,
         /// The sampling interval \[s\].
         interval: f64,
@@ -156,7 +156,7 @@ pub enum Refused {
         moves: f64,
         /// The length \[s\].
         duration: f64,
-        /// The range's width.
+        /// Width of the range.
         span: f64,
     },
     /// The limit on the time has passed before anything could be said.
@@ -164,7 +164,7 @@ pub enum Refused {
         "the time did not suffice to fit both effects and to try experiments; allow more (--effort thorough), or give fewer rows or a shorter --duration"
     )]
     OutOfTime,
-    /// Everything that was tried would overfill a tank.
+    /// Every tried sequence would overfill a tank.
     #[error(
         "every experiment between {} and {} would lead above the tank_height of {}; give a --range that stays lower",
         shown(*low),
@@ -181,7 +181,7 @@ pub enum Refused {
     },
 }
 
-/// The most samples of an experiment: a week at one a second is too many to search among.
+/// Largest number of samples of an experiment: a week at one sample per second is too long for the search.
 const MOST_SAMPLES: usize = 200_000;
 
 /// The checked limits, in seconds and the units of the applied signal.
@@ -219,14 +219,14 @@ fn visited(records: &[Record], looped: bool) -> (f64, f64) {
         })
 }
 
-/// The limits of what can be applied at all, and what sets them.
+/// The limits of the applied signal, and their origin.
 fn possible(problem: &Problem, looped: bool) -> Option<(f64, f64, &'static str)> {
     if looped {
         let height = problem.known.tank_height?;
         return Some((0.0, height, "the tank_height of the model file"));
     }
     let most = problem.known.input_range?;
-    // A command that has been negative may be so again.
+    // A command that has been negative may be negative again.
     let low = visited(&problem.records, false).0.min(0.0);
     Some((low, most, "the input_range of the model file"))
 }

@@ -247,7 +247,7 @@ fn fitted<'a>(
     })
 }
 
-/// Sum of the squares by which two fits differ on the records, outputs by their weights.
+/// Sum of squared differences of two fits on the records, outputs weighted.
 fn apart([a, b]: [&Node; 2]) -> f64 {
     let residuals = |node: &Node| {
         let series = node.setup.residuals(&node.fit.x)?;

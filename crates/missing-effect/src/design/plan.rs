@@ -1,4 +1,4 @@
-//! The result of a design: plain structs, written as JSON as they stand; everything that is printed is derived from them.
+//! The result of a design: plain structs, written to JSON unchanged; all printed text is derived from them.
 
 use effect_search::design::{Kind, Power, Prospect};
 use plants::Domain;
@@ -14,7 +14,7 @@ pub struct Alternative {
     pub effect: String,
     /// The vessel it acts in, where the plant has more than one: `upper` or `lower`.
     pub place: Option<String>,
-    /// The size that the records give it.
+    /// Size of the effect on the records.
     pub size: Option<Parameter>,
     /// The size is at a bound of its plausible range.
     pub at_the_edge: bool,
@@ -94,13 +94,13 @@ pub struct SecondSensor {
 /// The sequence to apply to the plant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sequence {
-    /// Name of what is applied: that of the command, or in a loop that of the reference.
+    /// Name of the applied signal: the command, or in a loop the reference.
     pub name: String,
     /// Its unit.
     pub unit: String,
     /// Instants \[s\].
     pub time: Vec<f64>,
-    /// Values, each held until the next instant as the model file has it.
+    /// Values, each held until the next instant according to the model file.
     pub values: Vec<f64>,
 }
 
@@ -115,7 +115,7 @@ pub struct Design {
     pub bic_ahead: f64,
     /// Expected result of the best experiment.
     pub prospect: Prospect,
-    /// The reference of the loop is applied, not the command.
+    /// Whether the reference of the loop is applied, not the command.
     pub in_loop: bool,
     /// The limits in force.
     pub limits: Bounds,
@@ -129,7 +129,7 @@ pub struct Design {
     pub again: Option<Candidate>,
     /// The best experiment of a wider range, if a wider range is possible.
     pub wider: Option<Wider>,
-    /// Repeated so many times, the best experiment would decide; `None` where it does already, or would not.
+    /// Number of repetitions after which the best experiment decides; `None` if one is enough, or none would decide.
     pub times_as_long: Option<usize>,
     /// Benefit of a second sensor, if the plant has another level.
     pub second_sensor: Option<SecondSensor>,

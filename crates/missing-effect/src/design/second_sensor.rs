@@ -20,7 +20,7 @@ pub(crate) fn place(structure: &Structure) -> Option<usize> {
     (0..structure.plant.vessels()).find(|vessel| !measured(*vessel))
 }
 
-/// The structure with that sensor as its last output.
+/// The structure with the additional sensor as its last output.
 fn with_sensor(structure: &Structure) -> Option<Structure> {
     let vessel = place(structure)?;
     let mut with = structure.clone();
@@ -44,7 +44,7 @@ fn with_output(records: &[Record]) -> Vec<Record> {
     records
 }
 
-/// The setup of a node's structure with that sensor on records that have it.
+/// The setup of a model's structure with the additional sensor on records that have it.
 fn setup<'a>(node: &Node, records: &'a [Record]) -> Option<Setup<'a>> {
     let structure = with_sensor(&node.setup.structure)?;
     let mut setup = Setup::new(structure, records, node.setup.fixed.clone()).ok()?;
@@ -62,7 +62,7 @@ fn shown(truth: &Node, records: &[Record], x: &[f64]) -> Option<Vec<Record>> {
     Some(records)
 }
 
-/// The folded rows of a model against what the other shows, that sensor among the outputs.
+/// The R factor of a model compared with the other's simulation, with the additional sensor among the outputs.
 ///
 /// Where the areas are not known, a level of the other tank is known in units of its own alone: then its sensor's scale and zero are
 /// fitted too.
@@ -97,7 +97,7 @@ fn rows(stand_in: &Node, x: &[f64], records: &[Record], metric: &Metric) -> Opti
     Some(rows.fold(&all, &Noise::of(models), &weights))
 }
 
-/// The separation in records like the existing ones, with that level measured too.
+/// The separation in records like the existing ones, with the level measured too.
 pub(crate) fn in_existing(truth: &Node, stand_in: &Node, metric: &Metric) -> Option<f64> {
     let records = noise_free(truth).ok()?;
     let records = shown(truth, &records, &unlooped(truth))?;
@@ -119,7 +119,7 @@ pub(crate) fn in_existing(truth: &Node, stand_in: &Node, metric: &Metric) -> Opt
     Some(least(&rows, &Triangle::new(0)) / metric.variance())
 }
 
-/// The separation in an experiment that was simulated with the truth, with that level measured too.
+/// The separation in an experiment simulated with the true model, with the level measured too.
 pub(crate) fn in_experiment(
     simulated: &SimulatedExperiment,
     truth: &Node,

@@ -10,7 +10,7 @@ use crate::{
     sentences::{with_error, with_unit},
 };
 
-/// Criteria that differ by less are equal, in words.
+/// Criteria with a smaller difference are called equal.
 const TWIN: f64 = 0.01;
 
 /// An effect, with its tank if there are two, and its size.
@@ -36,7 +36,7 @@ pub(super) fn named(alternative: &Alternative, domain: Domain) -> String {
     }
 }
 
-/// A probability that is not called certain or impossible.
+/// A probability in words, never certain or impossible.
 fn probability(p: f64) -> String {
     if p > 0.99 {
         "above 0.99".to_string()

@@ -29,12 +29,12 @@ use crate::{
 /// Starts around B's fit, in addition to the fit itself.
 const STARTS_AROUND: usize = 4;
 
-/// The metric in which both are compared.
+/// The noise model for the comparison of both.
 #[derive(Debug, Clone)]
 pub(crate) struct Metric {
     /// The noise.
     pub noise: Noise,
-    /// Standard deviation of its innovations at each output \[output unit\].
+    /// Standard deviation of the innovations at each output \[output unit\].
     pub scales: Vec<f64>,
 }
 
@@ -80,7 +80,7 @@ pub(crate) fn information(node: &Node, metric: &Metric) -> Triangle {
     effect_search::design::information(rows, setup.free(), setup.parameter_count())
 }
 
-/// A model's vector for an experiment: its parameters, the levels at which it begins, lags at rest.
+/// A model's vector for an experiment: its parameters, its initial levels, lags at rest.
 pub(crate) fn vector(node: &Node, setup: &Setup, simulated: &SimulatedExperiment) -> Vec<f64> {
     let mut x = node.fit.x[..node.setup.parameter_count()].to_vec();
     x.extend(&simulated.initial);
@@ -88,7 +88,7 @@ pub(crate) fn vector(node: &Node, setup: &Setup, simulated: &SimulatedExperiment
     x
 }
 
-/// The linear form: what a model cannot imitate of an experiment that was simulated with the other.
+/// The linear form: the part of an experiment, simulated with one model, that the other model cannot fit.
 pub(crate) fn linear(
     simulated: &SimulatedExperiment,
     stand_in: &Node,
@@ -112,7 +112,7 @@ pub(crate) fn noise_free(truth: &Node) -> Result<Vec<Record>, Error> {
     Ok(records)
 }
 
-/// The parameters and the plant's initial states of a node, in the order of a setup without a loop.
+/// The parameters and the plant's initial states of a model, in the order of a setup without a loop.
 pub(crate) fn unlooped(node: &Node) -> Vec<f64> {
     let mut x = node.fit.x[..node.setup.parameter_count()].to_vec();
     for r in 0..node.setup.records.len() {

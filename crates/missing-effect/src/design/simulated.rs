@@ -1,4 +1,4 @@
-//! An experiment simulated with a fitted model: without noise, from rest, in the loop where there is one.
+//! An experiment simulated with a fitted model: without noise, from rest, in the loop if there is one.
 
 use ct_signals::{Hold, Record};
 use plants::{Command, MAX_VESSELS, Simulator, Structure, controller::Controller};
@@ -17,11 +17,11 @@ pub(crate) enum Loop<'a> {
 /// Result of a simulated experiment.
 #[derive(Debug, Clone)]
 pub(crate) struct SimulatedExperiment {
-    /// The record that the experiment would give, free of noise.
+    /// The record of the experiment, without noise.
     pub record: Record,
-    /// Levels when it began.
+    /// Initial levels.
     pub initial: Vec<f64>,
-    /// A controller came to a limit.
+    /// Whether a controller reached a limit.
     pub at_limit: bool,
     /// Smallest and largest level of each vessel.
     pub levels: Vec<(f64, f64)>,
@@ -30,7 +30,7 @@ pub(crate) struct SimulatedExperiment {
 /// Time constants for the plant to settle, and the largest number of samples for this in a loop.
 const SETTLE: f64 = 12.0;
 const MOST_SETTLING: usize = 20_000;
-/// Parts of a time constant in which a plant without a loop settles.
+/// Steps per time constant for the settling of a plant without a loop.
 const PARTS: f64 = 4.0;
 
 /// Steady state under the first value: levels, and the command.
@@ -41,8 +41,7 @@ struct Rest {
     regulator: Option<plants::controller::Regulator<f64>>,
 }
 
-/// The structure in which the plant settles, and its parameters: what follows the clock begins with the record, and has not
-/// run before.
+/// The structure in which the plant settles, and its parameters: functions of time begin with the record and are not active before.
 fn settling(node: &Node) -> (Structure, Vec<f64>) {
     let setup = &node.setup;
     let mut structure = setup.structure.clone();

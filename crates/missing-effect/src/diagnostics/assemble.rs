@@ -1,4 +1,4 @@
-//! A result without its findings: the models that were fitted, the noise floors, the records.
+//! The parts of a result without the findings: fitted models, noise floors, records.
 
 use ct_signals::Clock;
 use greybox::Noise;

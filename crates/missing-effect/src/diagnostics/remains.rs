@@ -1,4 +1,4 @@
-//! Whether what a model leaves is noise: what an autoregressive noise cannot be.
+//! Tests whether the residual of a model is stationary AR noise that is independent of the input.
 //!
 //! An autoregressive model fits anything, a random walk included: that a residual *can* be whitened says nothing. Noise is
 //! what is independent of the command, has no place in time, no period, and forgets faster than the process does.
@@ -28,7 +28,7 @@ use crate::{
     fit::{node::Node, noise_model::slowness_of},
 };
 
-/// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
+/// Significance level of each residual test, corrected for the number of its comparisons.
 const NOT_NOISE: f64 = 1e-4;
 
 /// Structure of a residual that noise does not explain; the first one found.
@@ -55,8 +55,8 @@ pub(crate) struct Left {
 }
 
 impl Left {
-    /// The size of the noise above which there is something to explain. A drift is a noise too, in whose metric effects are confirmed as in
-    /// any other; what else remains is in the noise model by mistake, but hardly in what it cannot predict. By output.
+    /// The noise level above which there is something to explain. A drift is noise too, and effects are confirmed with it as weighting;
+    /// other unexplained structure is absorbed by the noise model, but hardly enters its innovations. By output.
     pub(crate) fn above(&self, noise: &Noise) -> Vec<f64> {
         let size = |noise: &ArModel| match self.what {
             Remains::Slow(..) => noise.stationary_std(),
@@ -168,7 +168,7 @@ fn least_p(
     Ok(((least * count).min(1.0), at))
 }
 
-/// A period of a residual, or else an instant.
+/// A period of a residual, or otherwise an instant.
 fn place_in_time(
     record: &Record,
     residual: &[f64],

@@ -58,7 +58,7 @@ fn testable<T>(test: Result<T, ct_signals::Error>) -> Result<Option<T>, ct_signa
     }
 }
 
-/// The residual tests of an output, on the first record or, where that is cut, its longest part.
+/// The residual tests of an output, on the first record or, if that is cut, its longest part.
 fn tests(node: &Node, residuals: &[Vec<f64>], output: usize) -> Result<ResidualTests, Error> {
     let setup = &node.setup;
     let samples_of = |residual: &[f64]| residual.iter().filter(|e| !e.is_nan()).count();

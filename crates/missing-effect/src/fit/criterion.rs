@@ -4,15 +4,14 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::node::Node;
 
-/// An effect is accepted where its criterion falls by more than this ...
+/// An effect is accepted if its criterion falls by more than this ...
 pub(crate) const BIC_MARGIN: f64 = 6.0;
 /// ... and if chance would cause such a fall less often than this, over all candidates.
 const FALSE_CLAIM: f64 = 0.003;
 /// An alternative to another effect is within this distance of its criterion.
 pub const GROUP_MARGIN: f64 = 6.0;
 
-/// Whether a set of effects lowers the deviance by more than chance would where there is nothing; each in the same metric, or
-/// each in its own.
+/// Whether a set of effects lowers the deviance significantly, both with the same weighting, or each with its own.
 ///
 /// Chi-square, corrected (Bonferroni) for all that the search looked at, with a share of the risk for each effect: one that
 /// has a single start is not made to pay for another with many.
@@ -26,7 +25,7 @@ pub(crate) fn beyond_chance(gained: &Node, lacking: &Node) -> bool {
     chance_of(gained, lacking, chance)
 }
 
-/// Whether a probability is small enough, corrected for all that the search looked at, to claim what one set has beyond another.
+/// Whether a p-value is small enough, corrected for all trials of the search, to accept the difference between two sets.
 pub(crate) fn chance_of(gained: &Node, lacking: &Node, chance: f64) -> bool {
     let candidates = lacking.setup.structure.candidates().len() as f64;
     let looks: f64 = gained

@@ -1,4 +1,4 @@
-//! The step of a coarse sensor under noise: what a model does not explain is a sawtooth of what it reads.
+//! The quantisation step of a coarse sensor with noise: the residual is a sawtooth function of the reading.
 //!
 //! `D round(y/D) - y` turns once from one multiple of `D` to the next. A fit follows a step only while the highest reading
 //! is as many steps as it really is: one more or less is the minimum of another sawtooth. So the steps are looked
@@ -14,13 +14,13 @@ use crate::{
     fit::{node::Node, noise_model::NOISE_ORDER},
 };
 
-/// The effect whose step it is.
+/// The effect with this step.
 pub(crate) const EFFECT: &str = "coarse_quantisation";
 const STEP: &str = "coarse_quantisation.step";
 
-/// The highest reading turns by this part from one step that is looked at to the next.
+/// The phase of the highest reading changes by this share from one tested step to the next.
 const TURN: f64 = 0.25;
-/// Finer steps that are looked at between two, around the best.
+/// Number of finer steps between two, around the best.
 const FINER: usize = 16;
 /// The fewest and the most steps between the lowest and the highest reading.
 const STEPS: (f64, f64) = (2.0, 300.0);
@@ -54,7 +54,7 @@ pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, 
     let (span, reach) = (high - low, low.abs().max(high.abs()));
     let grid = TURN / reach;
     let affordable = STEPS.0 + LOOKED_AT / samples as f64 * grid * span;
-    // A step below the noise is a noise too.
+    // A quantisation step below the noise acts as noise.
     let most = (span / noise.sigma()).min(STEPS.1).min(affordable);
     if !(span > 0.0 && reach.is_finite() && most > STEPS.0) {
         return Ok(None);
@@ -100,7 +100,7 @@ fn without_sawtooth(model: &[f64], residual: &[f64], turns: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Sum of squares of what a noise's past does not predicts, from where it has a whole past.
+/// Sum of squares of the innovations of a noise, from the row with a complete past.
 fn innovations(series: &[f64], noise: &ArModel) -> f64 {
     if series.iter().any(|value| value.is_nan()) {
         let whitened = noise.whiten(series);
@@ -171,7 +171,7 @@ mod tests {
             vessel: 0,
         };
         let setup = Parent::new(&node).with(placed).unwrap();
-        // The step itself, begun with and without noise before the rounding.
+        // The step itself, from starts with and without noise before the quantisation.
         assert_eq!(setup.structure.ways(placed), 2.0 + found.of);
     }
 }

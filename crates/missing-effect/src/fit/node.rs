@@ -1,4 +1,4 @@
-//! A set of effects with its fit, and the fits of what it is changed to.
+//! A set of effects with its fit, and the fits of its extensions and reductions.
 
 use greybox::{Fit, Noise, Setup, Start, Stopping, fit_from, fit_onward, random_starts};
 use plants::{ParameterInfo, Placed};
@@ -11,7 +11,7 @@ pub(crate) const STOPPING: Stopping = Stopping {
     cost: 1e-9,
 };
 
-/// A first fit needs no more than this: its rank is sought, not its digits.
+/// Stopping criteria of a first fit, which only has to give a rank.
 pub(crate) const ROUGH: Stopping = Stopping {
     evaluations: 20,
     cost: 1e-3,
@@ -26,7 +26,7 @@ pub(crate) const FINE: Stopping = Stopping {
     evaluations: 80,
     cost: 1e-8,
 };
-/// Random starts of a set without one of its effects, where it cannot be simulated with the parameters that it had.
+/// Random starts of a set without one of its effects, if it cannot be simulated with its present parameters.
 const OTHER_STARTS: usize = 12;
 /// Valve stiction, and the width of its band relative to the range of the command below which feedback resembles it.
 pub(crate) const STICTION: &str = "stiction_backlash";
@@ -77,7 +77,7 @@ pub(crate) fn position_of(setup: &Setup, placed: Placed, parameter: &str) -> Opt
     setup.names().iter().position(|known| *known == name)
 }
 
-/// The parent's vector in the child's order; what the parent does not have is zero.
+/// The parent's vector in the child's order; additional entries are zero.
 pub(crate) fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
     child
         .names()
@@ -93,7 +93,7 @@ pub(crate) fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
         .collect()
 }
 
-/// Fits a node's structure again to the end, from where it is and from the given further starts.
+/// Fits a model's structure again to convergence, from its estimates and from the given further starts.
 pub(crate) fn refine<'a>(
     node: &Node<'a>,
     noise: &Noise,
@@ -118,7 +118,7 @@ pub(crate) fn fitted<'a>(
     })
 }
 
-/// The node without one of its effects, refitted from where it was.
+/// The model without one of its effects, refitted from its estimates.
 pub(crate) fn without<'a>(
     node: &Node<'a>,
     position: usize,
@@ -142,7 +142,7 @@ pub(crate) fn without<'a>(
     Ok(Node { setup, fit, added })
 }
 
-/// The node without its effects that follow the clock alone, refitted from where it was.
+/// The model without its functions of time, refitted from its estimates.
 pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     let mut node = node.clone();
     while let Some(position) = node.added.iter().position(|placed| placed.effect.by_clock) {
@@ -157,8 +157,8 @@ pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes
 }
 
-/// Values of series that follow each other as the outputs of records do, without those whose sample is missing: record by record, in the
-/// order of time, each times the weight of its output.
+/// Values of series in the order of the outputs of records, without missing samples: record by record, in the order of time, each times the
+/// weight of its output.
 pub(crate) fn in_time(setup: &Setup, series: &[Vec<f64>], weights: &[f64]) -> Vec<f64> {
     let (outputs, mut all) = (setup.outputs(), Vec::with_capacity(setup.samples()));
     for (record, series) in setup.records.iter().zip(series.chunks_exact(outputs)) {

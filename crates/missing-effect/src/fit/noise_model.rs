@@ -1,4 +1,4 @@
-//! The noise floor: the noise model of the residual of the richest model in play.
+//! The noise floor: the noise model of the residual of the largest accepted model.
 
 use ct_signals::ArModel;
 use greybox::{Noise, Setup, noise_of, prewhitened};
@@ -37,7 +37,7 @@ pub(crate) fn in_own_noise<'a>(node: &Node<'a>) -> Result<Node<'a>, Error> {
     })
 }
 
-/// The noise model of residuals as they are, without what the fit has taken from the noise.
+/// The noise model of residuals without correction for the part of the noise that the fit has absorbed.
 pub(crate) fn residual_colour(setup: &Setup, residuals: &[Vec<f64>]) -> Result<Noise, Error> {
     let noise = Noise::fit(residuals, setup.outputs(), NOISE_ORDER);
     Ok(noise.map_err(greybox::Error::from)?)
@@ -63,8 +63,8 @@ pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
     Ok(deviance + log_det + node.setup.price(noise.order()))
 }
 
-/// The noise's spectrum at frequency zero over its mean: by how much slow parameters are less certain than under
-/// white noise of the same size.
+/// The noise's spectrum at frequency zero over its mean: factor by which slow parameters are less certain than with white noise of the same
+/// variance.
 pub(crate) fn slowness_of(noise: &ArModel) -> f64 {
     let sum: f64 = noise.coefficients().iter().sum();
     ((noise.sigma() / (1.0 - sum)).powi(2) / noise.stationary_std().powi(2)).max(1.0)
@@ -86,10 +86,10 @@ pub(crate) fn slowness(noise: &Noise, samples: &[usize]) -> f64 {
     samples.iter().sum::<usize>() as f64 / independent.max(f64::MIN_POSITIVE)
 }
 
-/// Independent samples that a parameter should have for a fit in the noise's metric.
+/// Least number of independent samples per parameter for a prewhitened fit.
 const SAMPLES_PER_PARAMETER: f64 = 10.0;
 
-/// Whether the residual of the richest model drifts so slowly that hardly any independent samples are left.
+/// Whether the residual of the largest model drifts so slowly that hardly any independent samples are left.
 ///
 /// A fit in the metric of such a "noise" looks at fast changes alone and lets the simulation drift off; more often than
 /// not it is structure that the catalogue does not hold. Then effects are still confirmed in that metric, which is the

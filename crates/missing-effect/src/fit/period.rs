@@ -1,4 +1,4 @@
-//! The period of an oscillation: the strongest line of what a model does not explain, and which of many periods show most in it.
+//! The period of an oscillation: the strongest line of the residual, and the largest lines among many periods.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ use super::{
     series::{series, standardised},
 };
 
-/// The parameter that has as many minima as a spectrum has lines, and how many of its starts are looked at.
+/// The parameter with as many minima as a spectrum has lines, and the number of its starts.
 const PERIOD: &str = "periodic_disturbance.period";
 const PERIODS_SHOWN: usize = 6;
 
@@ -90,7 +90,7 @@ pub(crate) fn period_of(setup: &Setup) -> Option<usize> {
 }
 
 /// The period with the largest line in a model's residual \[s\].
-// A cell is filled by it: it must not wait for other threads, for the reason that is given at the hidden step.
+// The value is stored in a cell: the computation must not wait for other threads, for the reason given for the hidden step.
 pub(crate) fn strongest_period(node: &Node) -> Option<f64> {
     let residuals = node.setup.disturbance(&node.fit.x).ok()?;
     let lines = residuals.iter().zip(series(node.setup.records));

@@ -6,7 +6,7 @@ use plants::{Outlet, Placed};
 
 use crate::fit::node::{Node, transfer};
 
-/// A level this many times the largest reading is not physical where the height of the tanks is not known, ...
+/// A level above the largest reading by this factor is not physical if the height of the tanks is not known, ...
 const HIGHEST: f64 = 100.0;
 /// ... and one this many times that height where the height is known: a small error of an area shifts levels that are not measured.
 const ABOVE_RIM: f64 = 1.5;
@@ -17,7 +17,7 @@ const LIMIT: &str = "sensor_saturation";
 const RISES: f64 = 0.5;
 const BEYOND: usize = 50;
 
-/// A reading that drops back by this part of the step within so many samples drops; ...
+/// A reading drops if it falls back by this share of the step within this number of samples; ...
 const DROPS: &str = "sensor_hysteresis";
 const FALLEN: f64 = 0.7;
 const DURATION: usize = 6;
@@ -52,7 +52,7 @@ impl Node<'_> {
         self.physical() && !self.reads_beyond_limit() && !self.drops_unseen()
     }
 
-    /// The reading still rises with the level where the model has it at the sensor's limit: then the limit is not the sensor's.
+    /// The reading still rises with the level although the model is at the sensor's limit: then the limit is not real.
     fn reads_beyond_limit(&self) -> bool {
         let structure = &self.setup.structure;
         let Some(placed) = self.added.iter().find(|placed| placed.effect.id == LIMIT) else {
@@ -100,7 +100,7 @@ impl Node<'_> {
         })
     }
 
-    /// The model's reading drops, or rises, by a step at instants at which the record does not.
+    /// The model's reading has a step at instants at which the record has none.
     fn drops_unseen(&self) -> bool {
         let Some(placed) = self.added.iter().find(|placed| placed.effect.id == DROPS) else {
             return false;

@@ -15,7 +15,7 @@ use crate::fit::{
 
 /// Damping of the step for the predicted reduction, against directions that the data do not determine.
 const PROMISE_DAMPING: f64 = 1e-6;
-/// Starts of a new effect that are followed down, the most promising of its grid.
+/// Number of starts of a new effect that are fitted, those with the largest predicted reduction.
 const FOLLOWED: usize = 2;
 
 /// Distance of starts on the coarser grid for an effect in addition to two or more others.
@@ -111,7 +111,7 @@ pub(crate) fn propose<'a>(
     })
 }
 
-/// The most promising starts of a new effect, the other parameters being where they are in `from`, and the best one's promise.
+/// The best starts of a new effect by predicted reduction, with the other parameters from `from`, and the largest predicted reduction.
 pub(crate) fn promising(
     from: &Node,
     setup: &Setup,
@@ -142,7 +142,7 @@ pub(crate) fn promising(
     Some((promise, starts))
 }
 
-/// At most so many of a list, evenly over it.
+/// A limited number of items of a list, evenly spaced.
 fn every_so_many(starts: Vec<Vec<f64>>, most: usize) -> Vec<Vec<f64>> {
     let step = starts.len().div_ceil(most);
     starts.into_iter().step_by(step.max(1)).collect()
@@ -162,7 +162,7 @@ pub(crate) fn realise<'a>(
     Some(widened(node, noise, stopping))
 }
 
-/// The node with the range of its newest size widened and fitted again, where that ended at the bound and a larger size fits better.
+/// The model with a wider range of its newest size, fitted again, if the size ended at the bound and a larger size fits better.
 fn widened<'a>(node: Node<'a>, noise: &Noise, stopping: Stopping) -> Node<'a> {
     let again = || {
         let placed = *node.added.last()?;
@@ -235,8 +235,7 @@ pub(crate) fn any_promise(
     })
 }
 
-/// The node with one given effect more, fitted so far; `known` is a fit of a larger set, whose values serve as a
-/// further start.
+/// The model with one given additional effect, fitted; `known` is a fit of a larger set, whose values are a further start.
 pub(crate) fn place<'a>(
     parent: &Node<'a>,
     placed: Placed,
@@ -246,7 +245,7 @@ pub(crate) fn place<'a>(
 ) -> Option<Node<'a>> {
     let from = Parent::new(parent);
     let proposal = propose(&from, placed, noise).or_else(|| {
-        // Out of time the larger set's values are the only start.
+        // If the time is over, the larger set's values are the only start.
         let setup = from.with(placed)?;
         let mut added = parent.added.clone();
         added.push(placed);
@@ -259,7 +258,7 @@ pub(crate) fn place<'a>(
     });
     let mut proposal = proposal?;
     let start = transfer(known, &proposal.setup);
-    // First, since out of time one start is followed.
+    // First in the list, because only one start is used if the time is over.
     proposal.starts.insert(0, start.into());
     realise(proposal, noise, stopping)
 }

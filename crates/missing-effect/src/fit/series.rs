@@ -2,7 +2,7 @@
 
 use ct_signals::{Channel, Record};
 
-/// Every output with the record that it is of.
+/// Every output with its record.
 pub(crate) fn series(records: &[Record]) -> impl Iterator<Item = (&Record, &Channel)> {
     records
         .iter()

@@ -1,5 +1,4 @@
-//! The result of a diagnosis: plain structs, written as JSON as they stand; everything that is
-//! printed or plotted is derived from them.
+//! The result of a diagnosis: plain structs, written to JSON unchanged; all printed and plotted results are derived from them.
 
 mod control_loop;
 mod gaps;
@@ -46,7 +45,7 @@ pub struct Effort {
     pub limit: Option<f64>,
     /// Steps of the search that were cut short or left out; empty where all were done.
     pub left_out: Vec<String>,
-    /// The user ended the search, and this is the best so far.
+    /// The user ended the search, and this is the best result so far.
     pub interrupted: bool,
 }
 
@@ -90,7 +89,7 @@ pub struct Diagnosis {
     pub noise: Vec<NoiseFloor>,
     /// The single effects under both weightings.
     pub rankings: Rankings,
-    /// The limit on the time, and what it left out.
+    /// The time limit, and the steps that were left out.
     pub effort: Effort,
     /// The scores of the single effects at the first step, best first.
     pub scores: Vec<Score>,

@@ -52,8 +52,7 @@ impl Floors {
         self
     }
 
-    /// The floors where the residual is not noise alone: what a model lacks is in the residual too, but hardly in what
-    /// cannot be predicted from the residual's own past.
+    /// The noise floors if the residual is not noise alone: the residual contains the model error too, but its innovations hardly do.
     pub fn of_what_is_new(mut self) -> Self {
         for floor in &mut self.0 {
             floor.level = floor.innovation;

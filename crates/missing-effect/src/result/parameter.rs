@@ -1,4 +1,4 @@
-//! A fitted parameter with its standard error and what was known of it before.
+//! A fitted parameter with its standard error and its prior.
 
 use greybox::PriorValue;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ pub struct Parameter {
     pub prior: Option<PriorValue>,
 }
 
-/// Records that are further from a prior than so many standard errors of the two together disagree with it.
+/// A record disagrees with a prior if their distance exceeds this number of standard errors of both together.
 const DISAGREES: f64 = 3.0;
 
 impl Parameter {

@@ -53,7 +53,7 @@ pub struct Acceptance {
     /// Least `share` of a partial explanation.
     #[serde(deserialize_with = "crate::result::number")]
     pub required_partial: f64,
-    /// Standard deviation of the noise that is no excess, by output \[output unit\].
+    /// Standard deviation of the noise that is not excess error, by output \[output unit\].
     pub floor: PerOutput,
     /// Fall of the criterion (BIC), each model with the noise model of its own residual.
     pub bic_fall: Option<f64>,

@@ -127,8 +127,8 @@ pub struct OutputStep {
     pub failures: Failures,
 }
 
-/// The mean squared error on held-out records, split into what an offset, a gain and neither of them explains, as root mean
-/// squares \[output unit\].
+/// The mean squared error on held-out records, split into the parts of an offset, a gain and the rest, as root mean squares \[output
+/// unit\].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOutError {
     /// Mean of measured minus model, record by record.

@@ -60,7 +60,7 @@ fn variable_name<'de, D: serde::Deserializer<'de>>(from: D) -> Result<&'static s
     known.ok_or_else(|| serde::de::Error::custom(format_args!("no variable is called `{name}`")))
 }
 
-/// A stretch of time in which the missing term is clearly not zero.
+/// An interval in which the missing term differs clearly from zero.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Window {
     /// Begin in the record's time \[s\].
@@ -131,7 +131,7 @@ pub struct Primitive {
     pub name: Name,
     /// Location of a threshold or a step, or the period of an oscillation, in the variable's unit.
     pub at: Option<f64>,
-    /// Effects of the catalogue that leave such a shape.
+    /// Effects of the catalogue with such a shape.
     #[serde(deserialize_with = "effect_names")]
     pub effects: Vec<&'static str>,
 }

@@ -39,7 +39,7 @@ pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>,
 /// correction: on the emulated rig of a closed loop a raised outlet replaced the pump's dead zone, and a nonlinear pump the difference.
 /// With the dead zone the nonlinearity is not needed.
 pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
-    // Every round ends with fewer effects, or with a lower criterion of as many.
+    // Every round ends with fewer effects, or with a lower criterion for the same number.
     while node.added.len() > 1 {
         let mut others: Vec<Node<'a>> = (0..node.added.len())
             .into_par_iter()
@@ -78,7 +78,7 @@ pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>,
     Ok(node)
 }
 
-/// The node without the effect whose loss costs least; `None` where it has none.
+/// The model without the effect whose removal costs least; `None` without effects.
 pub(crate) fn least_useful<'a>(node: &Node<'a>, noise: &Noise) -> Result<Option<Node<'a>>, Error> {
     Ok(least_bic(each_lacking(node, noise)?.into_iter()))
 }

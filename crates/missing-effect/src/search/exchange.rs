@@ -12,11 +12,11 @@ use crate::{
     },
 };
 
-/// A rough fit this near in the criterion may come within a group's margin.
+/// A rough fit within this distance of the criterion may come within a group's margin.
 pub(crate) const NEAR: f64 = 25.0;
 /// Number of alternatives that are refitted for each effect: this many by predicted reduction, and this many after a few iterations.
 const EXCHANGED: usize = 12;
-/// In a set of more than so many effects half as many, and a few steps for so many: a fit costs several times as much.
+/// In larger sets half as many alternatives are refitted, and fewer for a few iterations, because a fit takes several times as long.
 const LARGE: usize = 2;
 const QUICKLY: usize = 16;
 /// A swap that is worse by more than this share of an effect's own gain after a few steps is dropped.
@@ -53,7 +53,7 @@ pub(crate) fn exchanges<'a>(
             near.then(|| fitted(&begun, noise, ROUGH, carried.as_slice()).ok())?
         })
         .map(|rough| {
-            // Who comes near is fitted to the end: a group's edge is finer than a rough fit.
+            // Alternatives near the margin are fitted to convergence: the margin is finer than the accuracy of a rough fit.
             if rough.fit.bic() - node.fit.bic() < NEAR {
                 refine(&rough, noise, &[]).unwrap_or(rough)
             } else {

@@ -16,7 +16,7 @@ use crate::{
 /// Structure of the residual of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rest {
-    /// More than noise, or an effect more promises what it would cost.
+    /// More than noise, or a further effect has a predicted reduction above its penalty.
     Structure,
     /// Coloured noise; the noise model may have absorbed an effect.
     Coloured,

@@ -1,4 +1,4 @@
-//! The search: a set of effects, and the noise in whose metric it is confirmed.
+//! The search: a set of effects, and the noise model for its confirmation.
 
 use greybox::Noise;
 use rayon::prelude::*;
@@ -19,25 +19,25 @@ use crate::{
     },
 };
 
-/// Sets grown side by side, and refits of a size.
+/// Number of sets that are extended in parallel, and of refits per size.
 const BEAM: usize = 3;
 const REFITS: usize = 12;
-/// Sets are grown side by side up to so many effects, ...
+/// Sets are extended in parallel up to this number of effects, ...
 const SIDE_BY_SIDE: usize = 3;
 /// ... and one by one up to this number while the criterion falls.
 const RICHEST: usize = 6;
-/// In the metric of a noise that drifts they are grown to so many.
+/// With a drifting noise model, sets are grown up to this number.
 const WANDERING: usize = 2;
 
 /// Result of the search.
 pub(crate) struct Found<'a> {
-    /// The richest model in play, by simulation error; its residual gives the noise.
+    /// The largest accepted model by simulation error; its residual gives the noise model.
     pub richest: Node<'a>,
     /// The noise model in whose weighting effects are confirmed; its memory is limited.
     pub noise: Noise,
-    /// The memory of the residual's own noise model was longer, so that it may hold slow physics.
+    /// The residual's own noise model has a longer memory, so it may contain slow physics.
     pub limited: bool,
-    /// The base, and what is confirmed, weighted by the noise model.
+    /// The base, and the confirmed set, with the noise weighting.
     pub base: Node<'a>,
     pub confirmed: Node<'a>,
     /// The sets that were grown by simulation error.
@@ -58,7 +58,7 @@ impl<'a> Found<'a> {
     }
 }
 
-/// Searches sets of effects of at most `most`, or more where the noise needs them.
+/// Searches sets of at most `most` effects, or more if the noise model requires it.
 pub(crate) fn find<'a>(
     base: &Node<'a>,
     most: usize,
@@ -121,9 +121,9 @@ pub(crate) fn find<'a>(
     let by_simulation = wandering && !confirmed.added.is_empty();
     let mut prewhitened = None;
     if noise.order() > 0 && !base.setup.leaves_out("the prewhitened search") {
-        // The noise's spectrum is known now: the search is repeated in its metric. Where the residual drifts this is no less called for: to
-        // the simulation error a slow noise looks like many effects, and the true one may not be among the sets that were grown there. But
-        // then such a metric may let the simulation drift off, which is not taken; and of many effects it tells little.
+        // The noise model is known now: the search is repeated with this weighting. A drifting residual needs this too: for the simulation
+        // error a slow noise looks like many effects, and the true one may not be among the grown sets. But with such a weighting the
+        // simulation may drift, and such sets are not accepted; and it contains little information about many effects.
         let breadth = Breadth {
             most: if by_simulation {
                 WANDERING
@@ -172,7 +172,7 @@ pub(crate) fn find<'a>(
     })
 }
 
-/// The best of all sizes: a larger set must pay for itself against every smaller one.
+/// The best of all sizes: a larger set must lower the criterion compared with every smaller one.
 fn chosen<'a>(sizes: &[Vec<Node<'a>>], base: &Node<'a>) -> Node<'a> {
     sizes
         .iter()
@@ -193,7 +193,7 @@ fn drifts_off(before: &Node, after: &Node) -> Result<bool, Error> {
     Ok(refine(before, &white, &[])?.gain_over(&refine(after, &white, &[])?) > BIC_MARGIN)
 }
 
-/// The best set of at most so many effects: of a set that is too large, or of those that were grown.
+/// The best set with at most this number of effects: a reduction of a set that is too large, or one of the grown sets.
 pub(crate) fn shortened<'a>(
     mut node: Node<'a>,
     sizes: &[Vec<Node<'a>>],

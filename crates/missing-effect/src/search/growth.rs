@@ -1,4 +1,4 @@
-//! The joint search: effects interact, so sets of effects are grown side by side, not one after the other.
+//! The joint search: effects interact, so several sets of effects are extended in parallel, and not one after the other.
 //!
 //! On the measured Cascaded Tanks data a pump dead zone alone lowers the error from 0.67 to 0.60 V and an overflow
 //! alone to 0.52 V, both together to 0.33 V: a search that stops at the first effect that does not pay misses such pairs.
@@ -16,7 +16,7 @@ use crate::{
     search::{exhausted::Rest, pairs::joint_pairs},
 };
 
-/// Sets are one where what they explain differs by less than this part of it.
+/// Sets are equivalent if their explained parts differ by less than this share.
 const SAME_TAKEN: f64 = 0.15;
 
 /// Breadth of the search.
@@ -24,7 +24,7 @@ const SAME_TAKEN: f64 = 0.15;
 pub(crate) struct Breadth {
     /// Sets that are grown from one size to the next.
     pub beam: usize,
-    /// Sets of one size that are refitted, the most promising first.
+    /// Number of sets of one size that are refitted, with the largest predicted reduction first.
     pub refits: usize,
     /// Largest number of effects.
     pub most: usize,
@@ -94,7 +94,7 @@ pub(crate) struct Grown<'a> {
     unpromising: Vec<Proposal<'a>>,
     /// The set at which the search converged, if it ended so.
     exhausted: Option<Vec<Placed>>,
-    /// The last size was worth it.
+    /// Whether the last size lowered the criterion enough.
     paid: bool,
 }
 
@@ -105,7 +105,7 @@ impl<'a> Grown<'a> {
         self.exhausted.as_ref().is_some_and(same)
     }
 
-    /// Whether sets of so many effects were grown, and still paid.
+    /// Whether sets of this number of effects were grown, and still lowered the criterion enough.
     pub fn goes_on(&self, size: usize) -> bool {
         self.sizes.len() > size && self.exhausted.is_none() && self.paid
     }
@@ -177,7 +177,7 @@ pub(crate) fn grow<'a>(
                 break;
             }
         }
-        // The first sizes are searched wider: a pair may pay where neither of its effects does.
+        // The search is wider for the first sizes: a pair may lower the criterion although neither of its effects does.
         let factor = if size <= 2 { 2 } else { 1 };
         let mut proposals = if size == 1 {
             proposals(base, noise)
@@ -235,7 +235,7 @@ pub(crate) fn by_clock(node: &Node) -> bool {
     node.added.iter().any(|placed| placed.effect.by_clock)
 }
 
-/// The sets of one size extended by one effect, each set once, the most promising first.
+/// The sets of one size extended by one effect, without duplicates, with the largest predicted reduction first.
 pub(crate) fn extensions<'a>(
     base: &Node<'a>,
     parents: &[Node<'a>],

@@ -21,7 +21,7 @@ use crate::fit::{
     proposal::Proposal,
 };
 
-/// Points at which a candidate is linearised, at most.
+/// Largest number of points of linearisation of a candidate.
 const POINTS: usize = 3;
 /// For sets with more samples times columns than this, the inner products are not computed.
 const LARGEST: usize = 40_000_000;
@@ -34,7 +34,7 @@ struct Linearised<'a> {
     /// The effect's parameters at the point, and the complete vector.
     x: Vec<f64>,
     setup: Setup<'a>,
-    /// Whitened: the effect's columns, then what the effect changes in the residual.
+    /// Whitened: the effect's columns, then the effect's change of the residual.
     columns: Vec<Vec<f64>>,
     /// Range of each parameter of the effect, down and up.
     room: Vec<(f64, f64)>,
@@ -123,7 +123,7 @@ pub(crate) fn joint_pairs<'a>(
     proposals
 }
 
-/// Whitened columns of a setup's rows that are wanted, and the residual; `None` where the simulation is not finite.
+/// Whitened columns of the selected rows of a setup, and the residual; `None` if the simulation is not finite.
 fn whitened(
     setup: &Setup,
     x: &[f64],
@@ -194,7 +194,7 @@ fn inner_products(columns: &[&[f64]]) -> DMatrix<f64> {
     DMatrix::from_fn(n, n, |i, j| if j <= i { rows[i][j] } else { rows[j][i] })
 }
 
-/// The cost of a pair as it is predicted; `own` columns of the base come first, the base's residual last.
+/// The predicted cost of a pair; the base has `own` columns, which come first, and the base's residual is last.
 fn predicted(gram: &DMatrix<f64>, own: usize, pair: [(usize, &Linearised); 2]) -> Option<f64> {
     let last = gram.ncols() - 1;
     // The target is r_0 + d_i + d_j.

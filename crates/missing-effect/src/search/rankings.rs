@@ -6,7 +6,7 @@ use crate::{
     search::find::Found,
 };
 
-/// The single effects under both weightings, those that were promising enough for a refit.
+/// The single effects under both weightings, those with a sufficient predicted reduction for a refit.
 pub(crate) fn rankings(found: &Found, base: &Node) -> Rankings {
     let first_of_each = |nodes: &[Node]| {
         let mut ranked: Vec<String> = Vec::new();

@@ -10,13 +10,13 @@ use crate::{
     fit::node::Node,
 };
 
-/// Shown at 1 % false alarm with 90 % power, in standard errors.
+/// Minimum detectable size with a false alarm rate of 1 % and a power of 90 %, in standard errors.
 const VISIBLE: f64 = 2.576 + 1.282;
 /// An effect is not detectable if less than this share of its signature is independent of the fitted parameters.
 const ABSORBED: f64 = 1e-6;
 
-/// The scores, in the order of `single`; `noise` is the metric in which both were fitted, `floors` the standard
-/// deviations of the outputs' noise \[output unit\].
+/// The scores, in the order of `single`; `noise` is the weighting of both fits, `floors` the standard deviations of the outputs' noise
+/// \[output unit\].
 pub(crate) fn scores(base: &Node, single: &[Node], noise: &Noise, floors: &[f64]) -> Vec<Score> {
     single
         .par_iter()

@@ -93,7 +93,7 @@ pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
     })
 }
 
-/// The held-out error is this many times the fitted one where what was fitted does not carry over.
+/// Ratio of the held-out error to the fitted one above which the fitted model does not hold for another record.
 const CARRIES_OVER: f64 = 2.0;
 
 /// Remark: whether the fitted model holds for another record.

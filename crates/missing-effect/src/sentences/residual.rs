@@ -11,7 +11,7 @@ use crate::{
 
 /// Structure in the residual of a step, as the end of a sentence.
 pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
-    // A comparison has not looked into the catalogue.
+    // A comparison has not searched the catalogue.
     let effect = if diagnosis.scores.is_empty() {
         "an effect that the model lacks"
     } else {
@@ -75,7 +75,7 @@ pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> Strin
     }
 }
 
-/// A time of which two digits are known: in seconds below two hours.
+/// A time with two significant digits: in seconds below two hours.
 pub(super) fn about(seconds: f64) -> String {
     if seconds.abs() < 7200.0 {
         format!("{} s", significant(seconds, 2))

@@ -1,4 +1,4 @@
-//! The verdict of a comparison and of a diagnosis, and the errors that it rests on.
+//! The verdict of a comparison and of a diagnosis, and the errors that it is based on.
 
 use super::{
     effects::{of_acceptance, of_effects},

@@ -12,7 +12,7 @@ use crate::{
     watch::{Watch, tracked},
 };
 
-/// Rows on which the simulation settles when it is built again.
+/// Number of rows for settling when the simulation is built again.
 const RUN_UP: usize = 1024;
 
 impl<'a> Core<'a> {
@@ -30,7 +30,7 @@ impl<'a> Core<'a> {
         self.build();
     }
 
-    /// A checkpoint after which the tracker finds the parameters again: they have jumped.
+    /// A checkpoint after which the tracker estimates the parameters again, because they have changed abruptly.
     pub(super) fn let_go(&mut self) {
         self.settle_checkpoint();
         if let Some(tracker) = &mut self.now.tracker {

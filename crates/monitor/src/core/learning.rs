@@ -101,7 +101,7 @@ impl Core<'_> {
         }
     }
 
-    /// Puts the next try off to so many rows; where no more fit in, room is made.
+    /// Postpones the next fit to this number of rows; if they do not fit into memory, older rows are dropped.
     fn later(
         &mut self,
         next: usize,
@@ -162,7 +162,7 @@ pub(super) fn at_rest(sample: &Sample) -> f64 {
     sample.inputs.first().copied().unwrap_or(0.0)
 }
 
-/// Means of pairs of rows; a pair without any reading of an output has none of it.
+/// Means of pairs of rows; a pair without any reading of an output has no mean of it.
 fn halve(kept: &mut VecDeque<Kept>, outputs: usize) {
     let pairs = kept.len() / 2;
     let of_output = |output: usize| {

@@ -36,7 +36,7 @@ const OTHER_NUMBERS: &str = "its numbers do not belong to this model";
 /// Phase of the monitor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Phase {
-    /// Rows are gathered; at `next` a fit is tried. The one before has found that `span` seconds are needed.
+    /// Rows are collected; at `next` a fit is tried. The preceding fit has determined the required time `span` in seconds.
     Learning { next: usize, span: Option<f64> },
     /// Monitoring with the learned model.
     Watching,
@@ -44,7 +44,7 @@ pub(crate) enum Phase {
     Alarmed(Following),
 }
 
-/// An alarm that is followed.
+/// An alarm in progress.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Following {
     /// The score that exceeded its threshold, and the output with the largest deviation.
@@ -54,9 +54,9 @@ pub(crate) struct Following {
     since: f64,
     /// Number of rows since the alarm.
     rows: usize,
-    /// Looked at so many times.
+    /// Number of evaluations.
     looks: usize,
-    /// An effect of the catalogue explained it, the last time.
+    /// Whether an effect of the catalogue explained the rows in the last evaluation.
     explained: bool,
     /// Number of rows since which all scores have been small.
     quiet: usize,
@@ -104,7 +104,7 @@ pub(crate) struct Core<'a> {
     settings: Settings,
     units: Units,
     pub(crate) axis: TimeAxis,
-    /// The present state, but for the tracker, which is as of the last checkpoint.
+    /// The present state, except for the tracker, which is that of the last checkpoint.
     now: Checkpoint,
     running: Option<Running<'a>>,
     checkpoint: Checkpoint,

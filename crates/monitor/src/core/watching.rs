@@ -18,7 +18,7 @@ const LOOKS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 12.0];
 const LET_GO: usize = 3;
 /// Least number of rows from the alarm to the first evaluation; each later one needs twice as many.
 const FEWEST: usize = 8;
-/// The model fits again where every score has stayed below this share of the threshold ...
+/// The model fits again if every score has stayed below this share of the threshold ...
 const QUIET: f64 = 0.75;
 /// ... for this number of slowest time constants, the longest window of the scores.
 const QUIET_FOR: f64 = 6.0;
@@ -37,7 +37,7 @@ impl Core<'_> {
             });
         };
         if let Phase::Alarmed(following) = &mut self.now.phase {
-            // The rows in which it began are no record with what follows.
+            // The rows of the beginning do not form a record with later rows.
             following.looks = LOOKS.len();
             following.quiet = 0;
         }
@@ -104,7 +104,7 @@ impl Core<'_> {
                     fed.scatter.extend(self.scatter(output, e, time));
                 }
             }
-            // A score of the smaller noise contains no information about the larger.
+            // Scores computed with the smaller noise are not valid for the larger noise.
             let passed = passed && fed.scatter.is_empty();
             (fed.alarm, fed.notice) = self.judge(passed, time);
         }
@@ -169,7 +169,7 @@ impl Core<'_> {
         }
     }
 
-    /// A row after an alarm.
+    /// Processes a row after an alarm.
     fn follow(
         &mut self,
         following: Following,

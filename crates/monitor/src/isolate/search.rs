@@ -27,7 +27,7 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The better of an effect with all its parameters and with one of them held, where that makes a simpler effect of it.
+    /// The better of an effect with all its parameters and with one of them fixed, if this gives a simpler effect.
     pub(super) fn suspect(&self, placed: Placed) -> Option<Suspect> {
         let whole = self.suspect_with(placed, None);
         if placed.effect.id != EVEN.0 {
@@ -124,7 +124,7 @@ impl Search<'_> {
         Some(())
     }
 
-    /// The effect as it began `length` rows ago, fitted; its own parameters start at `near` or at the catalogue's starts.
+    /// The effect with an onset `length` rows ago, fitted; its parameters start at `near` or at the catalogue's starts.
     fn fitted(
         &self,
         (placed, held): (Placed, Option<&str>),

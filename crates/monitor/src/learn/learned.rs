@@ -18,13 +18,13 @@ pub struct Model {
     pub plant: Plant,
     /// Known constants of the plant.
     pub known: Known,
-    /// The effects that are on.
+    /// The effects in the model.
     pub effects: Vec<Placed>,
-    /// Terms of the user's own that are on.
+    /// Terms of the user's own in the model.
     pub terms: Vec<Term>,
     /// First guesses by name: `alpha`, `overflow.rim`.
     pub start: BTreeMap<String, f64>,
-    /// Names in `start` that are not fitted, but watched.
+    /// Names in `start` that are not fitted, but monitored.
     pub fixed: Vec<String>,
     /// Priors of parameters, by the same names.
     pub priors: BTreeMap<String, PriorValue>,
@@ -79,7 +79,7 @@ pub(crate) struct Learned {
     pub time_constant: f64,
     /// The usual step of the time \[s\].
     pub interval: f64,
-    /// States where it works as a rule.
+    /// Typical operating states.
     pub operating: Vec<f64>,
     /// For a plant: scales of its effects, and steps of the simulation per interval.
     pub scales: Option<Scales>,
@@ -125,8 +125,8 @@ impl Learned {
         readings.max().unwrap_or(0)
     }
 
-    /// The relative standard error of the noise's slow part ([`relative_error`]) at the output where it is largest, which may be the only
-    /// one that sees a change.
+    /// The relative standard error of the noise's slow part ([`relative_error`]) at the output where it is largest, because this output may
+    /// be the only one that shows a change.
     pub(crate) fn relative_error(&self) -> Option<f64> {
         let of_output = |output: &OutputNoise| {
             let model = output.model()?;

@@ -29,7 +29,7 @@ pub enum Progress {
         /// Threshold of the score.
         threshold: f64,
     },
-    /// The model does not fit: the same.
+    /// The model does not fit: score and threshold.
     Alarmed {
         /// The largest score, by magnitude.
         score: f64,
@@ -45,9 +45,9 @@ pub struct Gathered {
     pub rows: usize,
     /// Time from the first to the last row \[s\].
     pub span: f64,
-    /// Rows that are needed.
+    /// Required number of rows.
     pub rows_needed: usize,
-    /// Slowest time constants that are needed.
+    /// Required number of slowest time constants.
     pub time_constants: f64,
     /// Required time span \[s\] according to the latest fit; `None` before the first.
     pub span_needed: Option<f64>,

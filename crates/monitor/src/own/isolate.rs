@@ -1,5 +1,5 @@
-//! Isolation at the ports of a user's own model: which effect of the catalogue, or which candidate of the user's own, began, and when,
-//! explains the latest rows.
+//! Isolation at the ports of a user's own model: the effect of the catalogue, or the user's own candidate, and its onset, that explains the
+//! latest rows.
 //!
 //! An effect that begins at row `j` is fitted to the rows from `j` on, in the metric of the learned noise: every parameter of the model as
 //! it was learned, the states at `j` as the learned model has them, only the effect's own parameters free, and the initial values of the
@@ -27,7 +27,7 @@ use super::{CandidateModel, OwnModel};
 use crate::isolate::{FEWEST, FINE, Left, ROUGH};
 use crate::{Each, isolate::Kept, learn::Learned, learn::record};
 
-/// Effects that begin while a plant runs. What is a model's shape, a wrong law or a lag, does not.
+/// Effects that can begin while a plant runs. The model's shape, a wrong law or a lag are not among them.
 const BEGIN: [&str; 11] = [
     "dead_zone",
     "saturation",
@@ -219,7 +219,7 @@ impl Search<'_, '_> {
     fn vector(&self, setup: &ModelSetup, states: &[f64]) -> Vec<f64> {
         let mut x = setup.start().to_vec();
         let first = setup.parameter_count();
-        // An effect puts its states where the order of the chains has them.
+        // An effect inserts its states in the order of the chains.
         for (i, state) in setup.model().spec().states.iter().enumerate() {
             if let Some(learned) = self.learned_state(state) {
                 x[first + i] = states[learned];
@@ -297,7 +297,7 @@ impl Search<'_, '_> {
         starts.retain(|(cost, _)| cost.is_finite());
         starts.truncate(STARTS);
         let starts: Vec<Start> = starts.into_iter().map(|(_, x)| Start::from(x)).collect();
-        // The catalogue's starts are shares of what the rows visit; those of the user's own may lie far from what has begun.
+        // The catalogue's starts are shares of the range of the rows; those of the user's own candidates may be far from the actual size.
         let stopping = match candidate.effect {
             Some(_) => ROUGH,
             None => FINE,

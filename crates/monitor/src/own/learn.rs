@@ -1,4 +1,4 @@
-//! The learning phase of a user's own model: fitted to the first rows by `greybox`, with the noise that it leaves at each output.
+//! The learning phase of a user's own model: a fit to the first rows by `greybox`, and the noise model of each output.
 //!
 //! Lost readings are left out of the likelihood, and need nothing in their place. The slowest time constant is that of the fitted model,
 //! linearised at its mean state under the mean inputs: from the eigenvalues of `dx(t + h)/dx(t)`, which the simulation gives exactly.

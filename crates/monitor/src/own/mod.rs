@@ -29,7 +29,7 @@ use crate::{
     watched::{Believed, Raised},
 };
 
-/// A user's own model, and what is known of it.
+/// A user's own model, and its known properties.
 #[derive(Debug, Clone)]
 pub struct OwnModel<'a> {
     /// The model.
@@ -94,7 +94,7 @@ impl<'a> OwnModel<'a> {
     }
 }
 
-/// Puts what was isolated into an alarm, where it explains the rows.
+/// Adds the result of the isolation to an alarm, if it explains the rows.
 fn put_in(alarm: &mut Alarm, suspects: &[isolate::Suspect]) {
     let explains = |best: &&isolate::Suspect| {
         best.plausible && best.evidence > 0.0 && !best.left.is_more_than_noise()

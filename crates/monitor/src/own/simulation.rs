@@ -13,14 +13,14 @@ struct Lanes<'a, const N: usize> {
     simulations: Vec<Simulation<'a, Dual<N>>>,
     /// Outputs of each simulation.
     observed: Vec<Vec<Dual<N>>>,
-    /// Model's time since it began, and how many of it a second has.
+    /// Model's time since its start, and its units in one second.
     time: f64,
     per_second: f64,
     /// Whether the simulation diverged.
     failed: bool,
 }
 
-/// The model with these watched parameters, from these states on, which depend on no parameter.
+/// The model with these monitored parameters, from these states, which do not depend on parameters.
 pub(super) fn running<'a>(
     own: &OwnModel<'a>,
     theta: &[f64],

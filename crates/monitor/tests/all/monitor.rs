@@ -1,4 +1,4 @@
-//! The monitor from outside: a tank with noise, rows one at a time.
+//! The monitor through its interface: a tank with noise, one row at a time.
 
 mod clock;
 mod lost;
@@ -104,7 +104,7 @@ fn a_leak_is_seen_named_and_dated() {
     assert!(first.score > first.threshold);
     assert!(last.evidence.unwrap() > first.evidence.unwrap());
     assert!(last.sentence.contains(" since t = ") && last.sentence.contains(" against "));
-    // The group is what cannot be distinguished: a member is within six of the best.
+    // The group contains the effects that cannot be distinguished: a member is within six of the best.
     if last.effects.len() > 1 {
         assert_eq!(last.verdict, Verdict::Undecided);
         let next = last.next.as_ref().unwrap();

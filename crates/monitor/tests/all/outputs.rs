@@ -326,7 +326,7 @@ fn a_restored_monitor_of_two_outputs_goes_on_where_it_was() {
         let words = |steps: &[Step]| format!("{steps:?}");
         assert_eq!(words(&all(&mut restored, &rows[at..])), words(&steps[at..]));
     }
-    // Another choice of outputs is another model.
+    // Another choice of outputs makes another model.
     let mut monitor = new(model());
     all(&mut monitor, &rows[..50]);
     let mut other = model();

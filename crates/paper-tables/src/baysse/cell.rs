@@ -4,10 +4,10 @@ use serde::Serialize;
 
 use crate::Printed;
 
-/// The runs that the bands are for.
+/// Number of runs for which the bands are valid.
 pub(super) const BAND_RUNS: f64 = 100.0;
 
-/// A statistic of many runs beside what is printed, and the band it has to be in.
+/// A statistic of many runs with its printed value and its permitted band.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cell {
     /// Number of the table in the paper, 1 or 2.
@@ -28,7 +28,7 @@ pub struct Cell {
     pub mean: f64,
     /// Standard deviation between sets of this number of runs, by the jackknife.
     pub sd: f64,
-    /// The band in which it has to be, for a reproduction; an end that is `null` is open. It is for 100 runs, and wider for fewer.
+    /// The permitted band of a reproduction; an end that is `null` is open. It is valid for 100 runs, and wider for fewer.
     pub band: Option<[f64; 2]>,
     /// Whether the figure is inside; `None` without a band.
     pub inside: Option<bool>,

@@ -56,7 +56,7 @@ pub struct Study {
 }
 
 impl Study {
-    /// Cells whose printed figure can be compared with a band, and by how much of the band's width it lies outside.
+    /// Cells with a printed figure and a band, and the distance of the figure from the band as a share of its width.
     pub fn printed(&self) -> impl Iterator<Item = (&Cell, f64)> {
         let cells = self.tables.iter();
         cells.filter_map(|cell| Some((cell, cell.paper_outside?)))

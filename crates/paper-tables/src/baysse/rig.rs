@@ -28,9 +28,9 @@ pub struct Rig {
     pub level: f64,
     /// Outflow coefficient, cm^2.5/s. Not printed.
     pub alpha: f64,
-    /// Inflow for one volt above the dead zone, cm^3/(V s). Not printed.
+    /// Inflow per volt above the dead zone, cm^3/(V s). Not printed.
     pub pump_gain: f64,
-    /// Command below which nothing flows, V. Not printed, and nothing in the paper speaks of it.
+    /// Command below which there is no flow, V. Not printed, and not mentioned in the paper.
     pub dead_zone: f64,
     /// Kp, V/cm. Printed.
     pub kp: f64,

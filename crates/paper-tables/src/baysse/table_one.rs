@@ -1,4 +1,4 @@
-//! Table I: the linear loop, `K/(1 + tau p)` under `Kp + Ki/p`, with white noise that circulates.
+//! Table I: the linear loop, `K/(1 + tau p)` under `Kp + Ki/p`, with white noise that is fed back.
 
 use ct_lti::Hold;
 use ct_signals::excitation;

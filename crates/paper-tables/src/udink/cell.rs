@@ -5,7 +5,7 @@ use statrs::statistics::{Data, OrderStatistics};
 
 use crate::Printed;
 
-/// Share of cells inside from which on tables are called consistent: nine of ten are expected, less what chance takes.
+/// Least share of cells inside for consistent tables: nine of ten are expected, minus a margin for chance.
 const CONSISTENT: f64 = 0.85;
 
 /// One figure of a table compared with many runs.
@@ -121,8 +121,7 @@ impl Comparison {
         }
     }
 
-    /// Whether as many lie inside as can be expected of figures of the same process, 85 % of them, and no run failed, as none of the
-    /// paper's did.
+    /// Whether the expected number of figures is inside, at least 85 %, and no run failed, as none of the paper's did.
     #[must_use]
     pub fn consistent(&self) -> bool {
         self.failed == 0 && self.inside as f64 >= CONSISTENT * self.of as f64

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::printed::{CELLS, TABLES};
 use super::{Cell, Tables};
 
-/// Pairs of tables, and what is known of their noises; first the one that surely shares it.
+/// Pairs of tables, and the relation of their noises; first the pair that surely has the same noise.
 const PAIRS: [([usize; 2], &str); 3] = [
     (
         [2, 3],

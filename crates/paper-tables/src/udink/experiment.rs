@@ -1,5 +1,4 @@
-//! The experiment of tables 1 to 4: a tank of first order, `tau dy/dt + y = K u`, with white noise on its output; what the paper prints of
-//! it, and what is assumed.
+//! The experiment of tables 1 to 4: a tank of first order, `tau dy/dt + y = K u`, with white output noise; printed values and assumptions.
 
 use ct_signals::noise;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -8,7 +7,7 @@ use serde::Serialize;
 /// End of a run, s.
 pub const END: f64 = 1000.0;
 
-/// The experiment. The values that the paper does not print were found by a search against its tables.
+/// The experiment. Values that the paper does not print were found by a search that fits its tables.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Settings {
     /// K of the tank; the output is in units of the input. Printed.
@@ -131,7 +130,7 @@ impl Settings {
         }
     }
 
-    /// Standard normal numbers for a run: a stream of the generator of its own.
+    /// Standard normal numbers for a run, from a separate stream of the generator.
     pub(super) fn noise(&self, seed: u64, run: usize) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(run as u64);

@@ -1,4 +1,4 @@
-//! Tables 1 to 4 of A. J. Udink ten Cate, WP-85-54, IIASA, 1985, with many noises, and what goes with them: figure 1, differences between
+//! Tables 1 to 4 of A. J. Udink ten Cate, WP-85-54, IIASA, 1985, with many noises, and related results: figure 1, differences between
 //! tables, other settings, constant gains, larger `P(0)`, and three gains on an experiment of second order.
 //!
 //! The experiment is in [`Settings`], one run of it in [`run`]; what the paper prints is in [`printed`].
@@ -111,7 +111,7 @@ pub struct Figure {
     pub criterion: Vec<f64>,
 }
 
-/// Runs the tables with `runs` noises, 20 or more, drawn from `seed`, and what goes with them.
+/// Runs the tables with `runs` noises, 20 or more, drawn from `seed`, and the related computations.
 ///
 /// The same seed gives the same numbers, whatever the number of threads.
 ///

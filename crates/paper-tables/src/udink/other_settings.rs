@@ -15,7 +15,7 @@ use crate::{Error, Progress, Stage};
 /// Runs of each setting, at most.
 const MOST_RUNS: usize = 100;
 
-/// Other settings: name, and what is changed.
+/// Other settings: name, and change.
 type Other = (&'static str, fn(&mut Settings));
 
 const OTHERS: [Other; 20] = [
@@ -63,7 +63,7 @@ pub struct Changed {
     pub of: usize,
     /// Runs that failed.
     pub failed: usize,
-    /// Whether the comparison notices the change: the tables are not [consistent](super::Comparison::consistent) with the paper's.
+    /// Whether the comparison detects the change: the tables are not [consistent](super::Comparison::consistent) with the paper's.
     pub noticed: bool,
 }
 

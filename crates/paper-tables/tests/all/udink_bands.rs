@@ -13,7 +13,7 @@ fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
     assert_eq!(study.euler.failed + study.exact.failed, 0);
     assert_eq!(study.verdict(), Verdict::Consistent);
 
-    // Tables 2 and 3 have one noise, and what the paper prints of both differs by other than the settings do.
+    // Tables 2 and 3 have the same noise, and the paper's differences between them are not explained by the settings.
     let [shared, ..] = &study.contrasts[..] else {
         panic!("no contrasts")
     };
@@ -24,7 +24,7 @@ fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
     }
     assert_eq!((shared.inside, shared.cells.len()), (10, 14));
     assert_eq!(study.power.iter().filter(|it| !it.noticed).count(), 7);
-    // Settings that are far off are noticed; some that are near are not, which the tables say.
+    // Settings that are far off are detected; some near ones are not, which the tables report.
     let noticed = |name: &str| {
         let mut found = study.power.iter().filter(|it| it.setting.contains(name));
         found.next().unwrap().noticed

@@ -5,7 +5,7 @@ use plants::{Command, Plant};
 
 use crate::support::{Case, DRIVES, Drive, base, input};
 
-/// Numbers that a derivative is taken by, at most.
+/// Largest number of parameters with derivatives.
 const LANES: usize = 16;
 
 fn spec(plant: Plant) -> ModelSpec {

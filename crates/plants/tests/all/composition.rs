@@ -1,4 +1,4 @@
-//! Effects compose: any that may act together, added in any order, are one chain; what may not is refused.
+//! Effects compose: a permitted set of effects, added in any order, is one chain; other sets are rejected.
 
 use crate::support::{DRIVES, base, effect, input, label, placements, random_sets};
 use plants::{Error, Placed, Plant, Simulator, Structure};

@@ -6,7 +6,7 @@ use crate::support::{
 };
 use plants::{Placed, Plant};
 
-/// The largest disagreement, as a share of the largest derivative by that variable, over samples and variables.
+/// The largest difference, as a share of the largest derivative with respect to that variable, over samples and variables.
 ///
 /// The output has corners (the hysteresis turns, the reading saturates between two samples), and a difference across a
 /// corner is no derivative: of two step lengths the better counts at each sample, and both are short. Where neither will do, a

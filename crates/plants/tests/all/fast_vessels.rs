@@ -1,4 +1,4 @@
-//! Vessels that are over within a sampling interval: against the equations, absent effects, and derivatives.
+//! Vessels with time constants far below a sampling interval: compared with the equations, absent effects, and derivatives.
 
 use crate::support::{Case, DRIVES, difference, fast, input, label, placements, reference};
 use plants::{Outlet, Plant};

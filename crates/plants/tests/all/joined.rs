@@ -3,7 +3,7 @@
 use crate::support::{Case, DRIVES, base, difference, effect, input, mirrored, reference};
 use plants::{Command, Dual, Known, Placed, Plant, Scalar, Scales, Simulator, Structure};
 
-/// The DTS200 as its manual has it, levels in cm and flow coefficients pure numbers: areas of 154 cm^2, pipes of 0.5 cm^2.
+/// The DTS200 according to its manual, levels in cm and flow coefficients pure numbers: areas of 154 cm^2, pipes of 0.5 cm^2.
 fn rig(measured: usize, second: bool) -> Structure {
     let mut scales = Scales::from_ranges((0.0, 10.0), (5.0, 50.0), 1.0, 1000.0);
     scales.input_2 = second.then_some((0.0, 10.0));
@@ -121,8 +121,8 @@ fn tanks_that_are_exchanged_exchange_their_levels() {
     }
 }
 
-/// Classical Runge-Kutta in steps so short that no root matters, on the equations as the manual writes them, with no
-/// regularisation at all.
+/// Classical Runge-Kutta method with so short steps that the corners of roots do not matter, on the manual's equations without
+/// regularisation.
 fn sharp(levels: [f64; 3], samples: usize, every: usize, h: f64, parts: usize) -> Vec<[f64; 3]> {
     let orifice = 0.5 * (2.0 * 981.0_f64).sqrt();
     let root = |d: f64| d.signum() * d.abs().sqrt();
@@ -240,7 +240,7 @@ fn derivatives_are_finite_and_right_where_levels_cross_and_rest() {
     }
 }
 
-/// Valves and an outlet that are over within a sample: the levels still follow, and nothing is lost.
+/// Valves and an outlet with time constants far below a sample: the levels still follow, and the balance of mass holds.
 #[test]
 fn valves_that_are_over_within_a_step_settle() {
     for ratio in [3.0, 30.0, 300.0, 3e4] {
@@ -281,7 +281,7 @@ fn valves_that_are_over_within_a_step_settle() {
 
 #[test]
 fn either_pump_may_have_what_a_pump_can_have() {
-    // Pump 1 waits and pump 2 is cut short: their pieces end at different instants of a sample.
+    // Pump 1 has a dead time and pump 2 is interrupted: their intervals end at different instants of a sample.
     let base = base(Plant::ThreeTank);
     let sets = [
         [("transport_delay", 0), ("pump_saturation", 1)],

@@ -45,7 +45,7 @@ fn a_lag_vanishes_smoothly() {
             for id in ["pump_lag", "sensor_lag", "transport_delay"] {
                 for t in [1e-9, 1e-6, 1e-4] {
                     let (values, derivatives) = gap(plant, id, t * h, 0.0, &input);
-                    // The derivative by the lag, times the lag, is the change; the derivative itself moves in proportion.
+                    // The derivative with respect to the lag, times the lag, is the change; the derivative itself changes in proportion.
                     assert!(
                         values < 0.05 * t && derivatives < 60.0 * t,
                         "{} {id} {t}: {values:e} {derivatives:e}",
@@ -180,8 +180,8 @@ fn the_derivative_by_a_delay_passes_whole_samples_without_a_jump() {
                         difference(&at(k - 1e-9, substeps), &on)
                             .max(difference(&at(k + 1e-9, substeps), &on))
                     };
-                    // Runge-Kutta cuts the steps elsewhere on either side, which changes its error: by (h/tau)^4/24 of
-                    // the jumping rate, or by (h/tau)^2 for a lag below the sample.
+                    // The Runge-Kutta method cuts the steps elsewhere on either side, which changes its error: by (h/tau)^4/24 of the rate
+                    // with steps, or by (h/tau)^2 for a lag below the sample.
                     let (most, fall) = match (plant.outlet(), lag) {
                         (plants::Outlet::Linear, None) => (1e-8, 1.0),
                         (plants::Outlet::Linear, _) => (1e-6, 0.1),

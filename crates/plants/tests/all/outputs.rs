@@ -76,8 +76,8 @@ fn every_output_reads_the_level_of_its_vessel() {
     }
 }
 
-/// Largest disagreement of the derivatives of an output with central differences, as a share of the largest by that variable. Of
-/// two lengths of the difference the better counts: one may lie across a corner of the output.
+/// Largest difference between the derivatives of an output and central differences, as a share of the largest with respect to that
+/// variable. Of two lengths of the difference the better one is used: one may cross a corner of the output.
 fn disagreement(case: &Case, input: &[(Command, f64)], output: usize) -> f64 {
     let variables = case.variables();
     let duals: Vec<Dual<16>> = variables
@@ -226,7 +226,7 @@ fn a_lag_follows_the_level_that_its_sensor_reads() {
         for (k, (readings, _)) in read.iter().enumerate() {
             worst = worst.max((readings[0] - behind).abs());
             for i in k * parts..((k + 1) * parts).min(levels.len() - 1) {
-                // The level runs straight over so short a step.
+                // The level is nearly linear over such a short step.
                 let slope = (levels[i + 1] - levels[i]) / step;
                 let settled = |level: f64| level - slope * lag;
                 let left = (behind - settled(levels[i])) * (-step / lag).exp();

@@ -1,4 +1,4 @@
-//! The simulator against the written equations, integrated by other means, and against closed forms.
+//! The simulator compared with an independent integration of the equations, and with analytic solutions.
 
 use crate::support::{
     Case, DRIVES, Drive, base, begins_with_a_root, difference, effect, input, label, placements,
@@ -52,9 +52,8 @@ fn every_effect_agrees_with_its_equation() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-// Five times the bound of a single effect: effects add up to a shorter time constant (0.06 h, and a vessel that narrows
-// to half its surface shortens it again), and the hysteresis multiplies the level's error by the slope with which it
-// drops, five.
+// Five times the bound of a single effect: effects together give a shorter time constant (0.06 h, and a vessel that narrows to half its
+// surface shortens it again), and the hysteresis multiplies the level's error by its slope, five.
 #[test]
 fn pairs_and_triples_agree_with_their_equations() {
     let mut failures = Vec::new();
@@ -202,7 +201,7 @@ fn the_order_is_four_with_contacts_at_a_rim_inside_the_steps() {
                 let input = input(drive, 60, case.h, 11);
                 let reference = reference::run(&case, &input);
                 if !set.is_empty() {
-                    // The rim must be met, and left between samples.
+                    // The rim must be reached, and left between samples.
                     let without = base.run(&input, 1);
                     assert!(difference(&case.run(&input, 1), &without) > 0.01);
                 }

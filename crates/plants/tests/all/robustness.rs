@@ -14,7 +14,7 @@ fn between(lower: f64, upper: f64, share: f64) -> f64 {
     }
 }
 
-/// Runs a case and checks every level at every sample; how far a derivative went.
+/// Runs a case and checks every level at every sample; returns the largest derivative.
 fn run(case: &Case, input: &[(Command, f64)], substeps: usize) -> Result<f64, TestCaseError> {
     let variables: Vec<Dual<16>> = case
         .variables()
@@ -169,7 +169,7 @@ fn a_level_a_little_above_a_hole_settles() {
             for stretch in [10.0, 30.0, 130.0, 300.0] {
                 let input = steady(60, stretch * case.h);
                 let largest = run(&case, &input, 1).unwrap();
-                // Dormand and Prince's step shrinks to nothing at a root; many short ones are as good.
+                // The step of the Dormand-Prince method shrinks to zero at a root; many short steps are as good.
                 let fine = case.run_dual(&input, (8.0 * stretch) as usize);
                 let coarse = case.run_dual(&input, 1);
                 let values = |run: &[Dual<16>]| run.iter().map(|y| y.re).collect::<Vec<_>>();
@@ -259,10 +259,10 @@ proptest! {
     ) {
         let plant = Plant::ALL[plant];
         let mut set = random_sets(plant, size, 1, seed).remove(0);
-        // The hysteresis turns small differences into large ones by nature.
+        // The hysteresis amplifies small differences into large ones.
         set.retain(|p| p.effect.id != "sensor_hysteresis");
         let mut case = base(plant);
-        // Sampling from one to three hundred times as coarse, at a steady input: what decays must not grow.
+        // Sampling from one to three hundred times as coarse, with a constant input: a decaying response must not grow.
         let h = case.h * 10.0_f64.powf(stretch);
         let input = steady(300, h);
         // Functions of time are made for the record's duration, and grow further after it.
@@ -310,7 +310,7 @@ fn coarse_sampling_follows_the_equation() {
             case.h *= 60.0;
             case.structure.scales.duration = 60.0 * case.h;
             let mut case = case.with_interior(&[placed]);
-            // Intervals of one to two time constants; lags and dead times as they were.
+            // Intervals of one to two time constants; lags and dead times do not change.
             for (value, info) in case.theta.iter_mut().zip(case.structure.parameters()) {
                 if info.unit == plants::Unit::TIME
                     && ["delay", "time_constant"].contains(&info.name)

@@ -1,5 +1,5 @@
-//! A term of the user's own: absent it is the base model bit for bit, its derivatives are those of its output, and a straight
-//! one is what an effect of the catalogue or a parameter of the plant would be.
+//! A term of the user's own: at its absent value the model is the base model bit for bit, its derivatives agree with differences, and a
+//! linear term is equivalent to an effect of the catalogue or a parameter of the plant.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -150,7 +150,7 @@ fn a_straight_term_is_what_it_replaces() {
             ordinates: ordinates.to_vec(),
             ..bent(&base, place, 0, variable, Fitted::Scale)
         };
-        // A line in the command through zero is a larger gain, where the gain multiplies nothing else.
+        // A linear function of the command through zero is a larger gain, if the gain multiplies nothing else.
         let line = straight(Place::Actuator, Variable::Input, &[0.0, 10.0], &[0.0, 1.0]);
         let mut gain = base.clone();
         gain.theta[0] *= 1.1;

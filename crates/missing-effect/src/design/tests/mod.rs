@@ -56,7 +56,7 @@ fn between(a: &str, b: &str) -> [Candidacy; 2] {
     })
 }
 
-/// A leak and a nonlinearity of the pump on the records, weighted by the noise model as it is.
+/// A leak and a nonlinearity of the pump on the records, with the given noise model as weighting.
 fn leak_or_curve(problem: &Problem) -> Fitted<'_> {
     let two = between("const_leak", "pump_nonlinearity");
     let mut fitted = fitted(problem, two, &Options::default()).unwrap();

@@ -29,7 +29,7 @@ const CHANCE: f64 = 2e-6;
 pub(super) struct Expected {
     /// Mean square.
     square: f64,
-    /// Samples for one that is independent.
+    /// Samples per independent sample.
     spacing: f64,
     /// `E |X_k|^2/n` from zero to half the sampling rate.
     pub lines: Vec<f64>,
@@ -67,7 +67,7 @@ impl Expected {
         }
     }
 
-    /// Whether so large a mean square is more than so many samples of the noise would show.
+    /// Whether this mean square is significantly larger than that of the same number of noise samples.
     pub fn exceeded(&self, mean_square: f64, samples: usize) -> bool {
         let ratio = mean_square / self.square.max(f64::MIN_POSITIVE);
         ratio > FACTOR && beyond_chance(ratio, samples as f64 / self.spacing)
@@ -92,7 +92,7 @@ fn autocovariance(noise: &ArModel, n: usize) -> Vec<f64> {
         .collect();
     let plan = RealFftPlanner::<f64>::new().plan_fft_inverse(grid);
     let mut r = plan.make_output_vec();
-    // The lengths are the plan's, and a spectrum that is real throughout is that of a real signal.
+    // The lengths are those of the plan, and a real spectrum belongs to a real signal.
     if plan.process(&mut spectrum, &mut r).is_err() {
         r.fill(0.0);
     }
@@ -100,7 +100,7 @@ fn autocovariance(noise: &ArModel, n: usize) -> Vec<f64> {
     r
 }
 
-/// Whether a mean square over its expectation is too large for chance.
+/// Whether the ratio of a mean square to its expectation is significant.
 pub(super) fn beyond_chance(ratio: f64, independent: f64) -> bool {
     let freedom = independent.max(1.0);
     ChiSquared::new(freedom).is_ok_and(|chi| chi.sf(freedom * ratio) < CHANCE)
@@ -110,7 +110,7 @@ pub(super) fn beyond_chance(ratio: f64, independent: f64) -> bool {
 pub(super) fn transform(x: &[f64]) -> Vec<Complex<f64>> {
     let plan = RealFftPlanner::<f64>::new().plan_fft_forward(x.len());
     let mut output = plan.make_output_vec();
-    // The lengths are the plan's.
+    // The lengths are those of the plan.
     if plan.process(&mut x.to_vec(), &mut output).is_err() {
         output.clear();
     }

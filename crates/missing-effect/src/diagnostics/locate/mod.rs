@@ -12,7 +12,7 @@ use plants::Domain;
 use self::expected::{Expected, FACTOR_OF_A_BAND, beyond_chance, transform};
 use crate::{Bin, Failures};
 
-/// Windows and bins of one kind.
+/// Number of windows, and of bins of one kind.
 const BINS: usize = 12;
 /// Bins with fewer samples are not tested.
 const FEWEST: usize = 8;
@@ -24,11 +24,11 @@ pub struct Series<'a> {
     pub name: &'a str,
     /// Sampling instants, rising \[s\].
     pub time: &'a [f64],
-    /// The input that the residual is shown against \[`input_unit`\]; empty where the model has none.
+    /// The input for the plots and bins of the residual \[`input_unit`\]; empty if the model has none.
     pub input: &'a [f64],
     /// Output of the model \[`output_unit`\].
     pub model: &'a [f64],
-    /// Measured minus model, NaN where nothing was measured \[`output_unit`\].
+    /// Measured minus model, NaN without a measurement \[`output_unit`\].
     pub residual: &'a [f64],
 }
 
@@ -69,7 +69,7 @@ fn bin(from: f64, to: f64, values: impl Iterator<Item = f64>, expected: &Expecte
     }
 }
 
-/// Bins of equal width of the residual by another signal.
+/// Bins of equal width of the residual as a function of another signal.
 fn by(signal: &[f64], residual: &[f64], expected: &Expected) -> Vec<Bin> {
     let (low, high) = signal
         .iter()
@@ -122,8 +122,8 @@ fn by_direction(rate: &[f64], residual: &[f64], expected: &Expected) -> Vec<Bin>
     ]
 }
 
-/// Octave bands of the residual's periodogram, the root mean square in each; the longest record sets the bands, and
-/// each counts by its samples.
+/// Octave bands of the residual's periodogram, the root mean square in each; the longest record determines the bands, and each record is
+/// weighted by its samples.
 fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
     /// One spectral line of one record: its frequency, its share of the mean square, and that of the noise.
     struct Line(f64, f64, f64);

@@ -58,7 +58,7 @@ fn a_failure_at_high_level_is_found_where_it_is() {
         .collect();
     let failures = located(&ArModel::white(0.05), &[(&time, &model, &residual)]);
     for bin in &failures.by_level {
-        // The failing range begins at 14; a bin of 0.83 reaches across it.
+        // The failing range begins at 14; a bin of 0.83 extends over this value.
         assert_eq!(bin.fails, bin.to > 14.0 + 0.05, "{bin:?}");
     }
     assert!(

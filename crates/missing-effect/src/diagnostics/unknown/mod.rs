@@ -1,4 +1,4 @@
-//! The shape of the unknown: what is missing where the catalogue does not explain it.
+//! The unexplained error: the missing term, if the catalogue does not explain it.
 //!
 //! 1. The missing term as a path in time with its band, at each place of the chain (`smooth.rs`); the likelihood picks the
 //!    place.
@@ -34,7 +34,7 @@ const NAMED: f64 = 0.8;
 /// ... by this number of standard errors.
 const CLEARLY: f64 = 1.64;
 
-/// The name of a place, as files have it.
+/// The name of a place in files.
 fn place_name(structure: &Structure, spot: Spot) -> String {
     let plant = structure.plant;
     match spot.place {
@@ -50,8 +50,8 @@ fn place_name(structure: &Structure, spot: Spot) -> String {
 /// Step that is left out if the time limit has passed.
 pub(crate) const PART: &str = "the shape of the unexplained error";
 
-/// The missing term beside a fitted node; `None` where nothing moves, and where the time limit of its setup passes: what was looked at by
-/// then contains no information about the other places and variables.
+/// The missing term for a fitted model; `None` if no path is significant, or if the time limit passes, because partial results contain no
+/// information about the other places and variables.
 pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
     let structure = &node.setup.structure;
     let mut spots = vec![Spot {
@@ -92,8 +92,8 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
         .iter()
         .flat_map(|path| path.residual.iter().copied())
         .collect();
-    // A function of the level does not move as a random walk does, so the likelihood of one is weak evidence of the place
-    // against a curve that predicts unseen data: every place is tried.
+    // A function of the level is not a random walk, so the likelihood of a random walk is weaker evidence for a place than a curve that
+    // predicts unseen data: every place is tried.
     let candidates: Vec<(&Smoothed, Variable)> = smoothed
         .iter()
         .flat_map(|s| Variable::at(s.spot.place).iter().map(move |v| (s, *v)))
@@ -230,7 +230,7 @@ fn windows(begin: f64, time: &[f64], value: &[f64], error: &[f64]) -> Vec<Window
         while i < time.len() && clear(i) && (value[i] > 0.0) == (value[from] > 0.0) {
             i += 1;
         }
-        // A single instant is one in twenty by chance.
+        // A single instant is significant by chance in one of twenty cases.
         if i > from + 1 {
             let sum: f64 = value[from..i].iter().sum();
             let mean = sum / (i - from) as f64;

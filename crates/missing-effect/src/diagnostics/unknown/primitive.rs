@@ -82,7 +82,7 @@ pub(super) fn nearest(
     let mut best: Option<(f64, f64, &Family, f64)> = None;
     for family in &FAMILIES {
         let in_time = variable == Variable::Time;
-        // A root or a parabola in time, and an oscillation in anything else, is no physics of a tank.
+        // A root or a parabola in time, or an oscillation in another variable, is no physics of a tank.
         if match family.name {
             "swing" => !in_time,
             "square root" | "parabola" => in_time,
@@ -131,7 +131,7 @@ pub(super) fn nearest(
     })
 }
 
-/// The effects that leave such a shape, of those that the domain offers.
+/// The effects with this shape, among those of the domain.
 fn leaves(domain: Domain, (place, variable): (Place, Variable), shape: &str) -> Vec<&'static str> {
     let known: &[&'static str] = match (place, variable, shape) {
         (Place::Vessel, Variable::Time, "step") => &["valve_step"],

@@ -29,12 +29,11 @@ use crate::{
 const PARTS: usize = 10;
 /// Directions of the ordinates with less than this share of the information are explained by the plant's parameters.
 const DETERMINED: f64 = 1e-4;
-/// Before the fit an ordinate is as large as its neighbour to within the smoothed term's root mean square, and zero to within
-/// so many times that ...
+/// Prior of an ordinate: equal to its neighbour within the smoothed term's root mean square, and zero within this multiple of it ...
 const SIZES: f64 = 3.0;
 /// ... and a parameter of the plant is known to within this share of its value.
 const LOOSE: f64 = 0.5;
-/// Steps of the fit, and the fall of its cost that is too small for another.
+/// Largest number of steps of the fit, and least fall of its cost for another step.
 const ROUNDS: usize = 30;
 const ENOUGH: f64 = 1e-6;
 
@@ -49,13 +48,13 @@ pub(super) struct Shape {
     /// The inverse of the ordinates' covariance; singular in directions that the plant's parameters explain.
     pub information: DMatrix<f64>,
     pub covariance: DMatrix<f64>,
-    /// Share of the missing term that it predicts on unseen data, with its standard error.
+    /// Share of the missing term that the polyline predicts on unseen data, with its standard error.
     pub share: f64,
     pub share_error: f64,
 }
 
-/// The polyline in a variable at the place of a smoothed forcing; `None` where the variable hardly moves or the fit fails.
-/// `possible`: what the most likely forcing leaves of the residual.
+/// The polyline in a variable at the place of a smoothed forcing; `None` if the variable hardly changes or the fit fails. `possible`: the
+/// residual with the most likely forcing.
 pub(super) fn shape(
     node: &Node,
     smoothed: &Smoothed,
@@ -106,7 +105,7 @@ pub(super) fn shape(
         .iter()
         .filter(|&&i| i < setup.parameter_count())
         .count();
-    // The ordinates' columns, and those of everything else.
+    // The ordinates' columns, and the other columns.
     let (mut at, mut others) = (Vec::new(), Vec::new());
     for (column, &position) in setup.free().iter().enumerate() {
         if (own..own + k).contains(&position) {
@@ -162,7 +161,7 @@ pub(super) fn shape(
     }))
 }
 
-/// A matrix that rounding alone would leave singular.
+/// A matrix that is singular up to rounding.
 fn regularised(mut normal: DMatrix<f64>) -> DMatrix<f64> {
     for i in 0..normal.nrows() {
         normal[(i, i)] *= 1.0 + 1e-9;
@@ -191,13 +190,13 @@ pub(super) struct Fit {
     pub x: Vec<f64>,
     j: DMatrix<f64>,
     residual: DVector<f64>,
-    /// Mean and weights of what is known of the free entries before: an ordinate is near zero and nearer to its neighbours,
-    /// a parameter of the plant near the believed model's fit, and near its side measurement where there is one.
+    /// Mean and weights of the priors of the free entries: an ordinate is near zero and nearer to its neighbours, a parameter of the plant
+    /// near the believed model's fit, and near its side measurement if there is one.
     prior: (DVector<f64>, DMatrix<f64>),
 }
 
-/// Least squares with a prior, by Levenberg and Marquardt's steps. Without a prior the plant's parameters and the ordinates
-/// would run off together, since the ones imitate the others. `None` too where the time limit passes.
+/// Least squares with a prior, by the Levenberg-Marquardt method. Without a prior the plant's parameters and the ordinates would diverge
+/// together, because they are collinear. `None` also if the time limit passes.
 pub(super) fn fit(
     setup: &Setup,
     start: Vec<f64>,
@@ -238,7 +237,7 @@ pub(super) fn fit(
                 known[(column, column)] += inverse(LOOSE * mean[column].abs());
             }
         }
-        // Two Gaussian readings of an entry are one, at their weighted mean.
+        // Two Gaussian measurements of an entry are equivalent to one at their weighted mean.
         for (column, prior) in priors(setup) {
             let (loose, weight) = (known[(column, column)], inverse(prior.std_error));
             mean[column] = (loose * mean[column] + weight * prior.value) / (loose + weight);

@@ -27,10 +27,10 @@ use crate::{
     fit::node::{Node, in_time},
 };
 
-/// Instants of a path: at most so many, and so many samples for each at least.
+/// Largest number of instants of a path, and least number of samples for each.
 const INSTANTS: usize = 96;
 const SAMPLES_PER_INSTANT: usize = 4;
-/// Times that the model is linearised about the path.
+/// Number of linearisations of the model about the path.
 const ROUNDS: usize = 3;
 /// Number of decades of lambda in either direction of the likelihood search.
 const DECADES: i32 = 8;
@@ -83,7 +83,7 @@ pub(super) fn carrier(spot: Spot, time: &[f64], value: &[f64]) -> Term {
     }
 }
 
-/// A record's normal equations in the steps of the path and the initial states.
+/// A record's normal equations for the steps of the path and the initial states.
 struct Block {
     normal: DMatrix<f64>,
     right: DVector<f64>,
@@ -94,7 +94,7 @@ struct Block {
 }
 
 impl Block {
-    /// The steps of the path, whose variance is limited: all but the first.
+    /// The steps of the path with a prior variance: all but the first.
     fn steps(&self) -> std::ops::Range<usize> {
         1..self.time.len()
     }
@@ -129,7 +129,7 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
         with.substeps = setup.substeps;
         let mut x = node.fit.x[..count].to_vec();
         x.extend(std::iter::repeat_n(0.0, m));
-        // The path is looked for on the measured command, which needs no controller.
+        // The path is estimated on the measured command, which needs no controller.
         x.extend(&node.fit.x[setup.plant_states_of(r)]);
         runs.push((with, x, time));
     }
@@ -206,7 +206,7 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
     Ok(best)
 }
 
-/// The normal equations about `x`, in steps of the path and in states as they are (not as changes).
+/// The normal equations about `x`, for steps of the path and for values (not changes) of the states.
 fn block(
     setup: &greybox::Setup,
     x: &[f64],
@@ -239,7 +239,7 @@ fn block(
     })
 }
 
-/// Minus twice the restricted log-likelihood at a lambda, its constants left out, and the factors of the normal equations.
+/// Minus twice the restricted log-likelihood at a lambda, up to constants, and the factors of the normal equations.
 fn at(blocks: &[Block], lambda: f64) -> Option<Solution> {
     let (mut determinant, mut squares, mut freedom) = (0.0, 0.0, 0.0);
     let mut factors = Vec::with_capacity(blocks.len());
@@ -275,7 +275,7 @@ fn at(blocks: &[Block], lambda: f64) -> Option<Solution> {
     })
 }
 
-/// The lambda of the largest likelihood: over the decades, then by golden section.
+/// The lambda of the largest likelihood: first over the decades, then by golden section.
 fn most_likely(blocks: &[Block]) -> Option<(f64, Solution)> {
     let scale: f64 = blocks
         .iter()

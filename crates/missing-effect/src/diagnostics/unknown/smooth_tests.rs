@@ -38,7 +38,7 @@ fn record(forcing: &[f64], rng: &mut ChaCha8Rng) -> Record {
     run(carrier(VESSEL, &instants, forcing), u, rng)
 }
 
-/// A record of a linear tank with a term, all of whose ordinates are as they stand.
+/// A record of a linear tank with a term that has fixed ordinates.
 fn run(term: Term, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
     let time: Vec<f64> = (0..N).map(|k| H * k as f64).collect();
     let e = noise::white(N, NOISE, rng);
@@ -50,7 +50,7 @@ fn run(term: Term, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
         references: Vec::new(),
         calendar: None,
     };
-    // Any output will do to have a structure; what is simulated on it does not depend on it.
+    // Any output suffices for a structure; the simulation does not depend on it.
     record.outputs[0].values = (0..N).map(|k| 10.0 + (k % 7) as f64).collect();
     let records = [record.clone()];
     let setup = setup(&records);
@@ -182,7 +182,7 @@ fn it_is_the_kalman_smoother() {
     let smoothed = smooth(&node, VESSEL).unwrap().unwrap();
     let residual = node.setup.residuals(&node.fit.x).unwrap().remove(0);
     let q = smoothed.variance / smoothed.lambda;
-    // A larger first covariance would be lost in the filter's rounding, a smaller one be seen.
+    // A larger first covariance would be lost by rounding in the filter, a smaller one would affect the result.
     let reference = kalman(&residual, q, smoothed.variance, 1e3);
     let path = &smoothed.paths[0];
     assert_eq!(reference.len(), path.value.len());

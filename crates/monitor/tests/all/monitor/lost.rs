@@ -5,7 +5,7 @@ use monitor::{Alarm, Monitor, Notice, Progress, Row, Settings, State, Step};
 use super::{Tank, first_and_last, model};
 use crate::support::{alarms, all, new, notices};
 
-/// The rows without the readings in which the command steps, and so many after each.
+/// The rows without the readings at steps of the command, and a number after each.
 fn without_steps(rows: &[Row], behind: usize) -> Vec<Row> {
     let mut lost = rows.to_vec();
     for k in 1..rows.len() {
@@ -103,7 +103,7 @@ fn a_state_with_lost_readings_goes_on_where_it_was() {
         let text = serde_json::to_string(&before.state()).unwrap();
         let state: State = serde_json::from_str(&text).unwrap();
         let mut restored = Monitor::restore(model(), Settings::default(), state).unwrap();
-        // A NaN in what is said is unlike itself: in words.
+        // A NaN differs from itself, so the comparison uses text.
         let words = |steps: &[Step]| format!("{steps:?}");
         assert_eq!(words(&all(&mut restored, &rows[at..])), words(&steps[at..]));
     }

@@ -89,7 +89,7 @@ mod tests {
             "{wide:?}"
         );
         assert!(sure.hold, "{sure:?}");
-        // nor are the wide ones for the constant gain, and this very plant
+        // nor are the wide ones for the constant gain, with this plant
         let plant = Bounds::new([1.0; 2], [1.0; 2]).unwrap();
         let wide = Limits::Wide.bounds().unwrap().unwrap();
         assert!(!check_filter_bounds(&wide, &plant, 0.0).unwrap().hold());

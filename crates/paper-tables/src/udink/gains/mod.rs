@@ -137,7 +137,7 @@ pub struct Gains {
     pub counterexample: Vec<Counterexample>,
 }
 
-/// Runs all variants on the same records; `seed`: what the noises are drawn from.
+/// Runs all variants on the same records; `seed`: seed of the noises.
 ///
 /// # Errors
 /// None in practice: all settings are fixed and sound.

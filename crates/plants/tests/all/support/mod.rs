@@ -10,7 +10,7 @@ use plants::{
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A plant at a set of believable numbers.
+/// A plant with realistic parameters.
 #[derive(Clone)]
 pub struct Case {
     pub structure: Structure,
@@ -84,7 +84,7 @@ pub fn base(plant: Plant) -> Case {
     }
 }
 
-/// The plant with a measured disturbance into a vessel: a quarter of what the pump brings, but for sign.
+/// The plant with a measured disturbance into a vessel: a quarter of the pump's flow, with either sign.
 pub fn disturbed(plant: Plant, vessel: usize, sign: f64) -> Case {
     let mut case = base(plant);
     let mut scales = case.structure.scales.clone();
@@ -125,8 +125,8 @@ pub fn placements(plant: Plant) -> Vec<Placed> {
 /// Effects whose output is a staircase of some parameter: its slope at a point says nothing, so they carry that of a chord.
 pub const STEPPED: [&str; 2] = ["stiction_backlash", "coarse_quantisation"];
 
-/// An effect that begins with a root at a level: a Runge-Kutta step across it is of order one and a half, and a difference
-/// across it is no derivative.
+/// An effect that begins with a root at a level: a Runge-Kutta step across the level is of order one and a half, and a difference across it
+/// is no derivative.
 pub fn begins_with_a_root(effects: &[Placed]) -> bool {
     effects.iter().any(|p| p.effect.id == "leak_at_height")
 }
@@ -372,7 +372,7 @@ pub fn difference(a: &[f64], b: &[f64]) -> f64 {
         / scale
 }
 
-/// Random sets of `size` effects that may be on together.
+/// Random permitted sets of `size` effects.
 pub fn random_sets(plant: Plant, size: usize, count: usize, seed: u64) -> Vec<Vec<Placed>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let all = placements(plant);

@@ -67,7 +67,7 @@ impl Signal<'_> {
         all
     }
 
-    /// The piece that arrives in the middle of a stretch.
+    /// The interval of the command that arrives in the middle of a step.
     fn piece(&self, pump: usize, middle: f64) -> Option<usize> {
         let t = middle - self.equations.pumps[pump].delay;
         let after = self.pieces[pump].partition_point(|&(begin, _, _)| begin <= t);
@@ -201,7 +201,7 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
 
 fn smooth(stretch: Stretch, x: [f64; 7], from: f64, to: f64) -> [f64; 7] {
     if to - from < 1e-9 {
-        // Two corners that rounding has parted: one Euler step is exact here.
+        // Two corners separated only by rounding: one Euler step is exact here.
         let (rates, _) = stretch.rates(&x, from, [false; 3]);
         return std::array::from_fn(|i| x[i] + rates[i] * (to - from));
     }
@@ -241,7 +241,7 @@ fn bisected(e: &Equations, stretch: &Stretch, mut x: [f64; 7], from: f64, to: f6
         }
         spilling
     };
-    // Whether the modes have been left by a state.
+    // Whether a state has left the present modes.
     let left = |x: [f64; 7], t: f64, spilling: [bool; 3]| {
         let net = stretch.rates(&x, t, spilling).1;
         (0..e.n).any(|i| {

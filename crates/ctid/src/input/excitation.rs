@@ -1,11 +1,10 @@
 //! Checks of the information in the records, without a fit.
 //!
-//! Three findings, each made so that a record that a fit can use raises none of them:
+//! There are three warnings. A record that a fit can use causes none of them:
 //!
 //! - a record whose command never moves, beside one whose command does;
 //! - a command that makes a single step in all fitted records together;
-//! - an output that does not answer: its range is that of its own noise, and neither a lag of the prewhitened command nor the command
-//!   after a first-order lag of any length is correlated with it.
+//! - an output that does not respond: its range is that of noise, and the output is not correlated with the command after any lag.
 
 use std::fmt;
 

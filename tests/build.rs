@@ -1,6 +1,6 @@
 //! Says what this machine has beside the checkout, so that a test that needs it is ignored where it is not there, and not passed unchecked:
-//! `cfg(measured_records)` and `cfg(blind_records)` for the records in `../shared`, `cfg(chromium)` for the browser, `cfg(rumoca)` where python3 has
-//! the Modelica compiler of that name (`pip install rumoca`).
+//! `cfg(measured_records)` and `cfg(blind_records)` for the records in `../shared`, `cfg(chromium)` for the browser, `cfg(rumoca)` where
+//! python3 has the Modelica compiler of that name (`pip install rumoca`).
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -38,7 +38,7 @@ fn main() {
             }
             println!("cargo::rustc-cfg={name}");
         } else {
-            // A file that is not there: the script runs again at the next build, when there may be more.
+            // A missing file: the script runs again at the next build, when the file may exist.
             println!("cargo::rerun-if-changed={name} is missing");
         }
     }

@@ -79,7 +79,7 @@ struct Case {
     y: Vec<f64>,
 }
 
-/// What both are told: the bandwidth of the plant, roughly.
+/// Both estimators get this bandwidth, roughly that of the plant.
 const BANDWIDTH: f64 = 1.0;
 
 impl Case {
@@ -97,7 +97,7 @@ impl Case {
         Self { plant, u, y }
     }
 
-    /// From lags of the given bandwidth and the gain between the spreads of u and y.
+    /// Start from lags of the given bandwidth and the ratio of the standard deviations of y and u.
     fn ours(&self) -> Vec<f64> {
         let orders = Orders { n: 2, m: 1 };
         let record =
@@ -144,7 +144,7 @@ impl Case {
         self.instruments(rivc::Noise::Autoregressive)
     }
 
-    /// A start that both are given whole: the truth, off by a quarter.
+    /// A start for both programs: the true plant with parameters off by a quarter.
     fn near(&self) -> Vec<f64> {
         let factors = [1.25, 0.75, 1.25, 0.75];
         let theta = self.plant.theta().iter().zip(factors);

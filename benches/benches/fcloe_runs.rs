@@ -89,7 +89,7 @@ impl FirstTable {
     }
 }
 
-/// A recursion beside its data.
+/// A recursion with its data.
 struct Online {
     name: &'static str,
     start: RecursiveFcloe,

@@ -1,5 +1,5 @@
-//! Time of one fit of two tanks in series, 1000 samples, from one start: the bounded minimiser of `greybox` next to the
-//! crate `levenberg-marquardt` on the same rows; and what an evaluation consists of.
+//! Time of one fit of two tanks in series, 1000 samples, from one start: the bounded minimiser of `greybox` next to the crate
+//! `levenberg-marquardt` on the same rows; and the time of the parts of an evaluation.
 //!
 //! The ratio is printed first, from alternating runs, so that a busy machine slows both.
 #![allow(missing_docs)]
@@ -24,7 +24,7 @@ fn known() -> Known {
     }
 }
 
-/// Held steps, and a reading with a wobble that no model of the tanks follows.
+/// Held steps, and a reading with a small oscillation that no model of the tanks explains.
 fn record() -> Option<Record> {
     let u: Vec<f64> = (0..SAMPLES)
         .map(|k| 2.0 + ((k / 25) * 7 % 11) as f64 * 0.6)

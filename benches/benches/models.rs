@@ -1,4 +1,5 @@
-//! Time per sample of models as text: the plants next to their kernels, and models that are stiff, swing, meet a limit, stick or have delays.
+//! Time per sample of models as text: the plants next to their kernels, and models that are stiff, swing, meet a limit, stick or have
+//! delays.
 #![allow(missing_docs)]
 
 use std::hint::black_box;
@@ -9,7 +10,7 @@ use plants::{Command, Known, Plant, Scales, Simulator, SimulatorNumber, Structur
 
 const SAMPLES: usize = 1000;
 
-/// A plant at believable numbers: parameters, first levels, areas, interval \[s\].
+/// A plant with realistic numbers: parameters, first levels, areas, interval \[s\].
 struct Rig {
     plant: Plant,
     theta: &'static [f64],
@@ -145,7 +146,8 @@ fn plants_both_ways(criterion: &mut Criterion) {
     }
 }
 
-/// Time constants of 1 ms and 1000 s; a swing of twenty samples a period; a limit that is met twice in each; an arm that friction holds; delays of both kinds.
+/// Time constants of 1 ms and 1000 s; an oscillation of twenty samples a period; a limit that is met twice in each; an arm that friction
+/// holds; delays of both kinds.
 const OTHERS: [(&str, f64, &str); 5] = [
     (
         "stiff",

@@ -1,7 +1,7 @@
 //! Time per row of the monitor, next to the simulation of the same plant with the same derivatives in the same run.
 //!
-//! The plant is a single tank in white noise; the monitor has learned and watches. What it adds to the simulation is the
-//! whitening, the tracker, the scores, the ring of rows, and a checkpoint every 2048 rows.
+//! The plant is a single tank with white noise; the monitor has learned and watches. What it adds to the simulation is the whitening, the
+//! tracker, the scores, the ring of rows, and a checkpoint every 2048 rows.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::hint::black_box;

@@ -8,7 +8,7 @@ mod rls_cases;
 
 use std::process::Command;
 
-/// One who updates, ready to run over the samples; made before the counting begins.
+/// A prepared run over the samples; it is built before the counting begins.
 type Run = Box<dyn FnMut() -> f64>;
 
 mod counted {

@@ -37,7 +37,7 @@ fn structure(plant: Plant, effects: &[&str]) -> Structure {
         })
 }
 
-/// One run over the record: the sum of the readings, so that nothing is left out.
+/// One run over the record: the sum of the readings, so that the compiler removes nothing.
 fn run<T: SimulatorNumber>(structure: &Structure, theta: &[T], levels: &[T]) -> Option<T> {
     let mut simulator = Simulator::new(structure, theta, levels, command(0)).ok()?;
     let mut sum = T::constant(0.0);
@@ -91,7 +91,7 @@ fn error(readings: &[f64], reference: &[f64]) -> f64 {
     differences.fold(0.0, f64::max)
 }
 
-/// What each of them is worth: the largest error in the reading, against the adaptive solver at 1e-12.
+/// Accuracy of each simulator: the largest error in the reading, compared with the adaptive solver at 1e-12.
 fn accuracy() {
     let tanks = structure(Plant::CascadedTanks, &[]);
     let (reference, _) = peer(1e-12);

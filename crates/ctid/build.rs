@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if calls_can_fail() {
         println!("cargo:rustc-cfg=strace");
     } else {
-        // A file that is not there: the script runs again at the next build, when strace may be there.
+        // A file that is not there: the script runs again at the next build, when strace may be present.
         println!("cargo:rerun-if-changed=strace is missing");
     }
     Ok(())

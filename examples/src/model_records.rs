@@ -15,7 +15,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use self::recipes::{Column, RECIPES, Recipe};
 use crate::tour_records::Result;
 
-/// Where the models are.
+/// Folder of the models.
 #[must_use]
 pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("models")
@@ -24,7 +24,7 @@ pub fn folder() -> PathBuf {
 /// A record of a model.
 #[derive(Debug)]
 pub struct ModelRecord {
-    /// Of the model: its files are `name.mo`, `name.toml` and `name.csv`.
+    /// Name of the model: its files are `name.mo`, `name.toml` and `name.csv`.
     pub name: &'static str,
     /// The record.
     pub csv: String,
@@ -85,7 +85,7 @@ impl DrivenModel {
             .collect())
     }
 
-    /// The same in the units of the file's columns.
+    /// The record in the units of the file's columns.
     fn columns(&self, rows: usize, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<f64>>> {
         let mut inputs = (self.recipe.drive)(rows, rng)?;
         for (samples, column) in inputs.iter_mut().zip(self.recipe.inputs) {
@@ -98,7 +98,7 @@ impl DrivenModel {
     }
 }
 
-/// All models with what drives them.
+/// All models with their inputs.
 ///
 /// # Errors
 /// Where a text cannot be read or has other names than the settings here.

@@ -7,7 +7,7 @@ use plotters::prelude::*;
 
 /// One curve.
 pub struct Curve {
-    /// What it is, for the legend.
+    /// Legend of the curve.
     pub name: &'static str,
     /// Time \[s\] and value.
     pub points: Vec<(f64, f64)>,
@@ -15,9 +15,9 @@ pub struct Curve {
 
 /// Curves that share an axis.
 pub struct Panel {
-    /// What the axis shows, with its unit.
+    /// Label of the axis, with its unit.
     pub title: String,
-    /// At most as many as there are colours.
+    /// Curves, at most as many as there are colours.
     pub curves: Vec<Curve>,
 }
 

@@ -10,7 +10,7 @@ use ct_signals::{excitation, noise};
 use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
-/// What can go wrong: nothing, unless the settings below are changed.
+/// An error can occur only if the settings below are changed.
 pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 const SEED: u64 = 5;

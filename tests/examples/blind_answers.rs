@@ -61,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             if let (false, Some(before), Some(after), Some(floor)) =
                 (found.effects.is_empty(), before, after, floor)
             {
-                // What the true structure leaves is the floor; errors over it add to it as squares.
+                // The residual of the true structure is the floor; additional errors add to it as squares.
                 let excess = |rmse: f64| (rmse * rmse - floor * floor).max(0.0).sqrt();
                 let fall = 1.0 - excess(after.rmse) / excess(before.rmse);
                 falls.push(fall);

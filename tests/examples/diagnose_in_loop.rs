@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 type Hidden = Option<(&'static str, f64)>;
 
-/// One record's answer.
+/// Result of one record.
 struct Answer {
     claimed: bool,
     truth_in_group: bool,

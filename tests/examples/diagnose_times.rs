@@ -1,5 +1,5 @@
-//! What a comparison and a diagnosis cost: seconds of wall and of processor time on two threads; and what the diagnosis found, so
-//! that a change of the search shows.
+//! Computing time of a comparison and a diagnosis: wall time and processor time in seconds on two threads; and the result of the diagnosis,
+//! so that changes of the search are visible.
 //!
 //! Records of 4000 samples from a closed loop with one hidden effect or two; and records that take long: three tanks, two tanks in
 //! open loop with an effect whose threshold lies near the operating level, stamps that jitter.
@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 /// Measures what a diagnosis costs.
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// Only cells whose name holds this, as `three-tank`, `open` or `jitter`.
+    /// Only cells whose name contains this, as `three-tank`, `open` or `jitter`.
     #[arg(default_value = "")]
     filter: String,
     /// Largest number of effects; 1, then 6, where it is not given.
@@ -30,7 +30,7 @@ struct Arguments {
     json: Option<PathBuf>,
 }
 
-/// What is hidden: the effect, the vessel, its parameters.
+/// The hidden effect, its vessel, its parameters.
 type Hidden = Vec<(&'static str, usize, Vec<f64>)>;
 
 /// A problem and its name.
@@ -152,7 +152,7 @@ fn in_loop() -> Vec<Cell> {
     cells
 }
 
-/// Records in open loop that take long.
+/// Open-loop records with a long computing time.
 fn slow() -> Vec<Cell> {
     let mut cells = Vec::new();
     let leak: (&str, usize, &[f64]) = ("const_leak", 1, &[3.0]);
@@ -193,7 +193,7 @@ fn slow() -> Vec<Cell> {
     let jittered: [(Rig, Hidden); 4] = [
         (linear.clone(), vec![]),
         (
-            // Beside a dead zone the level stands as high from a larger offset.
+            // Together with a dead zone, a larger offset gives the same level.
             Rig {
                 theta: vec![6.4, 100.0, 6.0],
                 ..linear

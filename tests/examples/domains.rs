@@ -1,13 +1,13 @@
-//! Records of nine models in which effects are hidden, from `../shared/domains` beside the checkout: what `ctid` says of each, and the answer
-//! where it lies beside.
+//! Records of nine models in which effects are hidden, from `../shared/domains` beside the checkout: what `ctid` says of each, and the
+//! answer where it lies beside.
 //!
 //! ```sh
 //! cargo build --release && cargo run --release -p ctid-tests --example domains [-- [--seeds N] CASE...]
 //! ```
 //! `--seeds 5` fits the believed models alone, from starts of five seeds each, and says how far their errors are from the answers'.
 //!
-//! Prints for each case the error of the believed model at each output as `compare` has it, against that of the answer, which was fitted in
-//! white noise or in the noise's own weighting, and the verdict of `diagnose`; then how many are right.
+//! Prints for each case the error of the believed model at each output as `compare` has it, against that of the answer, which was fitted
+//! with white noise or in the noise's own weighting, and the verdict of `diagnose`; then how many are right.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ use serde_json::Value;
 /// Diagnoses records with hidden effects.
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// These cases alone.
+    /// Names of the cases to run.
     cases: Vec<String>,
     /// Fits the believed models alone, from starts of so many seeds each.
     #[arg(long, value_name = "N")]
@@ -165,8 +165,8 @@ fn records(folder: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Single effects and pairs: the truth, or what cannot be told from it, is in the groups; nothing hidden: adequate; from outside the
-/// candidates: unexplained or partial.
+/// Single effects and pairs: the truth, or what cannot be distinguished from it, is in the groups; nothing hidden: adequate; from outside
+/// the candidates: unexplained or partial.
 fn is_right(kind: &str, answer: &Value, found: &Value) -> bool {
     let verdict = found["verdict"].as_str().unwrap();
     let claims = ["effect", "undecided", "partial"].contains(&verdict);

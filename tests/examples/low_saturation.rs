@@ -1,5 +1,6 @@
-//! Two tanks in series whose pump saturates at a fifth of the recorded range of the command: what a diagnosis says, how far the
-//! level that is not measured goes in its models, and what it costs. Of every other record nothing is known but its columns. `cargo run --release -p ctid-tests --example low_saturation`.
+//! Two tanks in series whose pump saturates at a fifth of the recorded range of the command: what a diagnosis says, how far the level that
+//! is not measured goes in its models, and what it costs. Of every other record nothing is known but its columns. `cargo run --release -p
+//! ctid-tests --example low_saturation`.
 
 use std::{collections::BTreeMap, error::Error, fs, path::PathBuf};
 
@@ -18,7 +19,7 @@ struct Arguments {
     /// Rows of a record, one a second.
     #[arg(default_value_t = 3700)]
     rows: usize,
-    /// Records, each from a seed of its own.
+    /// Number of records, each with a separate seed.
     #[arg(long, default_value_t = 2)]
     records: u64,
     /// Writes every record's outcome.

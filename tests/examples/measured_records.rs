@@ -1,5 +1,5 @@
-//! What a diagnosis says of the measured records in `../shared` beside the checkout, and how that compares with what is known of
-//! them: `cargo run --release -p ctid-tests --example measured_records`; an argument chooses the records whose name holds it.
+//! Diagnoses of the measured records in `../shared` next to the checkout, compared with the known facts: `cargo run --release -p ctid-tests
+//! --example measured_records`; an argument selects the records whose name contains it.
 
 use std::{error::Error, fs, path::PathBuf};
 
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 /// Diagnoses measured records of which it is known what a simple model lacks.
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// Only records whose name holds this, as `valve_loops/S_` or `tclab`.
+    /// Only records whose name contains this, as `valve_loops/S_` or `tclab`.
     #[arg(default_value = "")]
     filter: String,
     /// Writes every record's outcome.

@@ -1,4 +1,5 @@
-//! How often intervals of 95 % hold the truth, on models of `examples/models` with two outputs in coloured noise, 30 % of the readings missing:
+//! How often intervals of 95 % contain the true value, on models of `examples/models` with two outputs in coloured noise, 30 % of the
+//! readings missing:
 //!
 //! ```sh
 //! cargo run --release -p ctid-tests --example model_coverage [-- --records 400 --models dc-motor,coupled-heaters]
@@ -10,7 +11,7 @@ use ctid_examples::model_records::driven_models;
 use ctid_tests::coverage::{count, of_record};
 use rayon::prelude::*;
 
-/// Coverage of the intervals that `ctid compare` says.
+/// Coverage of the intervals of `ctid compare`.
 #[derive(Debug, Parser)]
 struct Arguments {
     /// Records of each model.

@@ -1,11 +1,10 @@
-//! How surely the monitor sees an effect that begins, and how seldom it alarms where none does.
+//! Detection rate and false alarm rate of the monitor.
 //!
-//! `cargo run --release -p ctid-tests --example monitor_study -- [LOOPS] [--ratio R] [--quiet-rows N]`: 30 loops drawn at
-//! random in which an effect of five kinds begins half-way, 1500 rows before and 1500 after, and 30 in which
-//! none does, 20 000 rows each. Plants, controllers and set points are drawn, the noise is white in every other loop and
-//! correlated in the others; the size is such that the believed model, refitted to the whole record without noise, misses it by `R` times the
-//! noise. `--lost S` takes the share S of the readings away, at random or, with `--at-steps`, in bursts where the set point steps;
-//! `--open` opens the loops in which nothing begins.
+//! `cargo run --release -p ctid-tests --example monitor_study -- [LOOPS] [--ratio R] [--quiet-rows N]`: 30 loops drawn at random in which
+//! an effect of five kinds begins half-way, 1500 rows before and 1500 after, and 30 in which none does, 20 000 rows each. Plants,
+//! controllers and set points are drawn, the noise is white in every other loop and correlated in the others; the size is such that the
+//! believed model, refitted to the whole record without noise, misses it by `R` times the noise. `--lost S` takes the share S of the
+//! readings away, at random or, with `--at-steps`, in bursts where the set point steps; `--open` opens the loops in which nothing begins.
 
 use clap::Parser;
 use ctid_tests::Drive;
@@ -42,7 +41,7 @@ struct Arguments {
     /// Share of the readings that are lost
     #[arg(long)]
     lost: Option<f64>,
-    /// They are lost in bursts that begin at steps
+    /// Missing readings occur in bursts that begin at steps
     #[arg(long, requires = "lost")]
     at_steps: bool,
     /// The loops in which nothing begins are open
@@ -110,7 +109,7 @@ fn main() {
         let delay = of_it.first().map(|alarm| (alarm.time - begun) / tau);
         let since_visible = of_it.first().map(|alarm| (alarm.time - visible) / tau);
         let holds = |alarm: &&&Alarm| alarm.effects.iter().any(|e| e == placed.effect.id);
-        // The looks after the first alarm, up to the last one, before it is learned anew.
+        // Evaluations after the first alarm, up to the last one before learning restarts.
         let last = of_it
             .iter()
             .position(|alarm| alarm.event == monitor::Stage::Final)

@@ -4,8 +4,8 @@
 //! cargo run --release -p ctid-tests --example thresholds -- --records 24
 //! ```
 //! Records are drawn as `library_study` draws them: single effects of the catalogue, candidates of a user's own, nothing, and what neither
-//! holds, in equal parts; the structural error is 1 or 3 times the noise, which is white or coloured. A record takes part where its diagnosis
-//! with the default thresholds ends within a quarter of the time limit, so that the limit decides nothing.
+//! holds, in equal parts; the structural error is 1 or 3 times the noise, which is white or coloured. A record takes part where its
+//! diagnosis with the default thresholds ends within a quarter of the time limit, so that the limit decides nothing.
 //!
 //! A column has three values: with half the threshold, with its default and with twice of it. Whole numbers are rounded, and at least 1.
 //! A record that comes from outside is not counted where an effect that was named describes it as well.
@@ -33,10 +33,10 @@ struct Arguments {
     /// Seed of everything.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Only these thresholds.
+    /// Names of the thresholds to test.
     #[arg(long, value_delimiter = ',')]
     only: Vec<String>,
-    /// Of these models, whose diagnoses are short.
+    /// Models whose diagnoses are short.
     #[arg(long, value_delimiter = ',', default_values = ["heated-block", "mass-spring", "dc-motor", "battery"])]
     models: Vec<String>,
     /// Time limit of a diagnosis \[s\].
@@ -44,18 +44,18 @@ struct Arguments {
     limit: f64,
 }
 
-/// Kinds of records, and the columns that count them.
+/// Kinds of records, and their columns.
 const KINDS: [(&str, usize); 4] = [("single", 0), ("own", 0), ("clean", 1), ("outside", 2)];
 const COLUMNS: [&str; 3] = ["named", "clean not blamed", "outside not named"];
 
 /// Records that take part have diagnoses that end within this share of the time limit.
 const WITHIN: f64 = 0.25;
 
-/// What is done to a threshold, beside its default.
+/// Factors of a threshold, in addition to its default.
 const FACTORS: [f64; 2] = [0.5, 2.0];
 
-/// Runs tasks on all processors. Each has a pool of one thread: a diagnosis that waits in a common pool takes up another record, and its time
-/// passes.
+/// Runs tasks on all processors. Each has a pool of one thread: a diagnosis that waits in a common pool takes up another record, and its
+/// time passes.
 fn in_parallel<T: Send>(tasks: usize, run: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let work = || {
@@ -87,7 +87,7 @@ struct Study {
 }
 
 impl Study {
-    /// What is said of a record; `None` where it cannot be made or does not count.
+    /// Result of a record; `None` if the record cannot be generated or is not counted.
     fn outcome(&self, job: &Job, thresholds: Thresholds) -> Option<Outcome> {
         let options = Options {
             time_limit: Some(Duration::from_secs_f64(self.limit)),
@@ -99,7 +99,7 @@ impl Study {
 
     /// Records of a kind whose diagnoses are short, with what is said of them by default.
     fn chosen(&self, mut of_kind: Vec<Job>, wanted: usize) -> Vec<(Job, Outcome)> {
-        // One of each structural error and noise after the other.
+        // One of each combination of structural error and noise in turn.
         let mut seen: BTreeMap<(bool, bool), usize> = BTreeMap::new();
         of_kind.sort_by_cached_key(|job| {
             let count = seen.entry((job.ratio > 1.0, job.coloured)).or_default();
@@ -139,7 +139,7 @@ fn scaled(all: &Map<String, Value>, name: &str, factor: f64) -> Thresholds {
     serde_json::from_value(Value::Object(all)).unwrap()
 }
 
-/// How many records of a column were right, of those that count.
+/// Number of correct records of a column, and number of counted ones.
 fn right(jobs: &[Job], outcomes: &[Option<Outcome>], column: usize) -> String {
     let in_column = |job: &Job| KINDS.contains(&(job.kind, column));
     let pairs = jobs.iter().zip(outcomes).filter(|(job, _)| in_column(job));

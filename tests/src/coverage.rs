@@ -1,4 +1,4 @@
-//! How often the intervals of a fitted model of `examples/models` hold the truth: two outputs in coloured noise, a share of the readings missing.
+//! Coverage of the intervals of fitted models of `examples/models`: two outputs in coloured noise, with a share of the readings missing.
 
 use std::collections::BTreeMap;
 
@@ -14,10 +14,10 @@ const CORRELATION: f64 = 0.8;
 /// Share of the readings that are missing.
 const MISSING: f64 = 0.3;
 
-/// Of one fitted number, in how many of so many records its interval of 95 % held the truth.
+/// For one fitted number, in how many records its interval of 95 % contained the true value.
 #[derive(Debug, Clone)]
 pub struct Coverage {
-    /// Its name.
+    /// Name of the number.
     pub name: String,
     /// Records whose interval held the truth.
     pub held: usize,
@@ -80,8 +80,8 @@ fn record(driven: &DrivenModel, seed: u64) -> Record {
     }
 }
 
-/// Whether the intervals of 95 % of a record hold the truth, for every fitted number that has one: as `ctid compare` fits and says them. Fits
-/// begin at the values of the model's text.
+/// Whether the intervals of 95 % of a record contain the true value, for every fitted number that has one: as `ctid compare` fits and says
+/// them. Fits begin at the values of the model's text.
 #[must_use]
 pub fn of_record(driven: &DrivenModel, seed: u64) -> Vec<(String, bool)> {
     let mut believed = driven.spec.clone();
@@ -114,7 +114,7 @@ pub fn of_record(driven: &DrivenModel, seed: u64) -> Vec<(String, bool)> {
         .collect()
 }
 
-/// Of all records of these seeds.
+/// Counts over all records with these seeds.
 #[must_use]
 pub fn count(records: &[Vec<(String, bool)>]) -> Vec<Coverage> {
     let mut all: Vec<Coverage> = Vec::new();

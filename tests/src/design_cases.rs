@@ -9,7 +9,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
 use crate::{Drive, Rig, draw};
 
-/// What the plant hides, and how the first record comes about: a command that hardly moves, or a loop.
+/// The hidden effect of the plant, and the input of the first record: a nearly constant command, or a loop.
 pub type Row = (&'static str, Drive, &'static str, usize, &'static [f64]);
 
 /// Plants, loops and effects, the truth now one of a family, now another. Sizes are such that a record with a narrow command can
@@ -49,7 +49,7 @@ pub const ROWS: [Row; 24] = [
 
 /// Seeds of a row that are looked at.
 pub const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
-/// What the experiment may do, as parts of the middle command, or in a loop of the level that the tank is held at.
+/// Limits of the experiment, as multiples of the middle command or, in a loop, of the set point.
 const RANGE: (f64, f64) = (0.5, 1.5);
 
 /// The rig of a row: its command stays near the middle.
@@ -70,11 +70,11 @@ pub fn rig(row: &Row) -> Rig {
     }
 }
 
-/// A record that leaves it open, and who else it may be.
+/// A record that does not decide between the true effect and another one.
 pub struct Undecided {
     /// The rig.
     pub rig: Rig,
-    /// Its record, and what is known of it.
+    /// The record as a problem with its known constants.
     pub problem: Problem,
     /// The truth.
     pub truth: &'static str,
@@ -93,8 +93,8 @@ fn diagnosed(problem: &Problem) -> Option<Diagnosis> {
     diagnose(problem, &Options::default(), &|_| {}).ok()
 }
 
-/// A rig that nobody chose: any effect of the catalogue, any plant that it may act in, in open loop or in a loop, under white or
-/// coloured noise, with a structural error of one to eight times the noise. `None` where that shows nowhere.
+/// A rig drawn at random: any effect of the catalogue, any plant that it may act in, in open loop or in a loop, under white or coloured
+/// noise, with a structural error of one to eight times the noise. `None` if the effect is not visible in any draw.
 #[must_use]
 pub fn drawn(seed: u64) -> Option<Rig> {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
@@ -113,7 +113,7 @@ pub fn drawn(seed: u64) -> Option<Rig> {
     )
 }
 
-/// A rig's record, where its diagnosis is one group of several that holds the truth.
+/// A rig's record, where its diagnosis is one group of several that contains the true value.
 #[must_use]
 pub fn undecided(rig: Rig, seed: u64) -> Option<Undecided> {
     let truth = rig.missing().first()?.0;
@@ -152,7 +152,7 @@ pub fn proposed(case: &Undecided) -> Result<(String, Design), Vec<String>> {
     };
     let mut twins = Vec::new();
     for other in &case.others {
-        // Which is called the first makes no difference to a design.
+        // The order of the two effects does not matter for a design.
         let named = [case.truth, other.as_str()].map(EffectInfo::find);
         let [Some(a), Some(b)] = named else { continue };
         let between = [a, b].map(|effect| Candidacy {
@@ -169,7 +169,7 @@ pub fn proposed(case: &Undecided) -> Result<(String, Design), Vec<String>> {
     Err(twins)
 }
 
-/// What both records say.
+/// Result with both records.
 pub struct Answer {
     /// The truth is named or in the one group, the other is not, and nothing else was added.
     pub pair_decided: bool,
@@ -182,7 +182,7 @@ pub struct Answer {
 /// Applies the experiment to the rig, and diagnoses both records together.
 #[must_use]
 pub fn answered(case: &Undecided, other: &str, plan: &Design, seed: u64) -> Option<Answer> {
-    // The design says how many times it has to be applied.
+    // The number of repetitions from the design.
     let times = plan.times_as_long.unwrap_or(1);
     let values = plan.experiment.values.repeat(times);
     let mut next = case.rig.play(values, &mut ChaCha8Rng::seed_from_u64(seed));

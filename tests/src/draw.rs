@@ -21,7 +21,7 @@ pub const PLANTS: [Plant; 4] = [
     Plant::CascadedTanksLinear,
 ];
 
-/// Those of two tanks, whose levels may both be measured.
+/// Plants with two tanks, whose levels may both be measured.
 pub const TWO_TANKS: [Plant; 2] = [Plant::CascadedTanks, Plant::CascadedTanksLinear];
 
 /// Which levels are measured.
@@ -60,7 +60,7 @@ impl Levels {
 const MIDDLE: f64 = 5.0;
 /// The ratio is met within this part.
 const MET: f64 = 0.03;
-/// Rigs that are drawn before an effect is said to show nowhere.
+/// Number of drawn rigs before an effect counts as undetectable.
 const DRAWS: usize = 12;
 /// Starts with which the minimum is checked at the end.
 const MORE: usize = 6;
@@ -134,7 +134,7 @@ pub fn rig(plant: Plant, drive: Drive, colour: f64, samples: usize, rng: &mut Ch
 /// size goes from absent to the end of its plausible range until the ratio is met. One with which the level leaves 0.1 to 3 times the
 /// level at rest is too large. Where the ratio is not met, another rig is drawn; `None` where none of twelve would do.
 ///
-/// Coarse quantisation is a converter behind the noise of the last output, as real ones are: its structural error is that of rounding, the
+/// Coarse quantisation is a converter after the noise of the last output, as real ones are: its structural error is that of rounding, the
 /// step over the square root of 12. Where several levels are measured the error is the root mean square over all of them.
 #[must_use]
 pub fn with_effect(
@@ -234,7 +234,7 @@ fn pair(plant: Plant, rng: &mut ChaCha8Rng) -> (&'static EffectInfo, &'static Ef
 /// A rig whose converter rounds the noisy reading.
 fn rounded(rig: Rig, ratio: f64, seed: u64) -> Option<Rig> {
     let converter = 12.0_f64.sqrt() * ratio * rig.noise;
-    // Half of what the level moves is the largest step that the catalogue knows.
+    // The largest quantisation step of the catalogue is half of the level's range.
     let (low, high) = without_noise(&rig, seed).outputs[rig.outputs() - 1].range();
     (converter <= 0.5 * (high - low)).then_some(Rig { converter, ..rig })
 }
@@ -247,7 +247,7 @@ fn built(rig: Rig, placed: Placed, ratio: f64, seed: u64, rng: &mut ChaCha8Rng) 
     // The minimum from which the next size's is sought; at the end others are looked for.
     let mut near: Option<Vec<f64>> = None;
     for _ in 0..2 {
-        // A rig that leaves its levels has too much of the effect.
+        // A rig with levels out of range has too large an effect.
         let mut at = |size: f64| {
             let with = path.at(&rig, size);
             let fit = misfit(&with, seed, near.as_deref(), 0);
@@ -324,7 +324,7 @@ fn misfit(rig: &Rig, seed: u64, near: Option<&[f64]>, more: usize) -> Option<Fit
     }
     let mut setup =
         Setup::from_records(rig.plant, rig.known(), &[], &records, BTreeMap::new()).ok()?;
-    // Outputs count as beside noise, though there is none.
+    // Outputs are weighted by their noise, although there is none.
     setup.known_scales = Some(vec![rig.noise; rig.outputs()]);
     let mut starts = random_starts(&setup, more, seed);
     starts.push(near.map_or_else(

@@ -4,14 +4,14 @@ use std::io::{Read, Result, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// What came back until the connection was closed or the time had passed.
+/// Received bytes until the connection was closed or the time had passed.
 #[derive(Debug)]
 pub struct Answer {
-    /// `None` where nothing came that is an answer.
+    /// `None` without a valid answer.
     pub status: Option<u16>,
     /// Its head.
     pub head: String,
-    /// Its body.
+    /// Body of the answer.
     pub body: String,
 }
 
@@ -22,7 +22,7 @@ pub struct Answer {
 pub fn exchange(address: impl ToSocketAddrs, bytes: &[u8], patience: Duration) -> Result<Answer> {
     let mut stream = TcpStream::connect(address)?;
     stream.set_read_timeout(Some(patience))?;
-    // A server that has refused already does not take the rest.
+    // A server that has already rejected the request does not read the rest.
     let _ = stream.write_all(bytes);
     let mut answer = Vec::new();
     let mut part = [0; 1 << 16];

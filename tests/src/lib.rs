@@ -1,4 +1,4 @@
-//! What the tests share: simulated rigs, servers and programs that are run, measured records, bounds of statistics.
+//! Shared parts of the tests: simulated rigs, servers and programs that are run, measured records, statistical bounds.
 
 pub mod coverage;
 pub mod design_cases;

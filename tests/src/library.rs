@@ -1,4 +1,4 @@
-//! Records of the model library with something hidden, and what is said of them.
+//! Records of the model library with a hidden effect, and their diagnoses.
 
 mod drive;
 mod jobs;
@@ -22,7 +22,7 @@ use self::drive::{Drive, range, side_measurements};
 pub use self::jobs::jobs;
 pub use self::outcome::outcome;
 
-/// Of one record, its inputs and its outputs, each a series.
+/// Inputs and outputs of one record, each a series.
 type Series = (Vec<Vec<f64>>, Vec<Vec<f64>>);
 
 /// Correlation of coloured noise from row to row.
@@ -32,14 +32,14 @@ const FINE: Stopping = Stopping {
     cost: 1e-10,
 };
 
-/// What is hidden.
+/// The hidden effect.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Hidden {
     /// Nothing.
     Nothing,
     /// Effects and candidates of the user's own, by their identifiers.
     Effects(Vec<String>),
-    /// What neither holds, by the position of its kind.
+    /// A disturbance outside the catalogue and the candidates, by the position of its kind.
     Outside(usize),
 }
 
@@ -50,7 +50,7 @@ pub struct Job {
     pub model: usize,
     /// `single`, `own`, `pair`, `clean` or `outside`.
     pub kind: &'static str,
-    /// What is hidden in it.
+    /// The hidden effect of the record.
     pub hidden: Hidden,
     /// Structural error over the noise.
     pub ratio: f64,
@@ -82,18 +82,18 @@ impl Job {
     }
 }
 
-/// What was said of a record.
+/// Diagnosis of a record.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// What is hidden is in the groups, all of it.
+    /// Whether all hidden effects are in the groups.
     pub in_group: bool,
-    /// All of it was named first.
+    /// Whether all hidden effects were named first.
     pub first: bool,
     /// Size of the largest group.
     pub group: usize,
     /// The verdict.
     pub verdict: Verdict,
-    /// What is hidden is in the groups, or what was named fits as well under the noise that made the record.
+    /// Whether the hidden effects are in the groups, or the named ones fit as well with the true noise model.
     pub right: bool,
     /// Processor time of the program during the diagnosis, where the system says it \[s\].
     pub seconds: f64,
@@ -148,7 +148,7 @@ fn drawn(candidate: &Candidate, visited: &Visited, rng: &mut ChaCha8Rng) -> Vec<
     values
 }
 
-/// What fits are judged by: the noise that made the record.
+/// Comparison of fits with the true noise model.
 struct Judge<'a> {
     problem: &'a Problem,
     sigma: Vec<f64>,

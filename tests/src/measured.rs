@@ -13,7 +13,7 @@ const DAY: f64 = 86_400.0;
 /// Held-out error that the cascaded tanks have to reach \[V\]: a neural state space model's.
 const TANKS_HELD_OUT: f64 = 0.33;
 
-/// Where a record comes from.
+/// Source of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Source {
     /// Control loops of a plant, labelled as sticking.
@@ -29,7 +29,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// All of them.
+    /// All sources.
     pub const ALL: [Self; 5] = [
         Self::StickingValve,
         Self::FreeValve,
@@ -51,21 +51,21 @@ impl Source {
     }
 }
 
-/// How an answer compares with what is known.
+/// Comparison of a result with the known facts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
-    /// What is missing is in a named group; of a valve that does not stick: stiction is in none.
+    /// The missing effect is in a named group; for a valve without stiction: no stiction is named.
     Right,
     /// A part of it, or what a person would accept as near to it.
     Partly,
-    /// Nothing is named.
+    /// No effect is named.
     Silent,
-    /// Something else is named.
+    /// Another effect is named.
     Wrong,
 }
 
 impl Mark {
-    /// As it is printed.
+    /// Printed name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -77,12 +77,12 @@ impl Mark {
     }
 }
 
-/// A measured record with the model that is believed of it.
+/// A measured record with its believed model.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// Folder, file and, of several outputs, which.
     pub name: String,
-    /// Where it comes from.
+    /// Source of the record.
     pub source: Source,
     /// The believed model and the records.
     pub problem: Problem,
@@ -111,7 +111,7 @@ pub fn claims_feedback(found: &Diagnosis) -> bool {
 }
 
 impl Case {
-    /// How an answer compares with what is known of the record.
+    /// Compares a result with the known facts about the record.
     ///
     /// - A drain above a level is partly right where feedback is claimed too: no weather answers to a groundwater head.
     /// - Of a heater a lag of the pump is as right as one of the sensor (one heater's power is not measured); a dead time or a side
@@ -160,7 +160,7 @@ pub fn folder() -> Option<PathBuf> {
     folder.join("real").exists().then_some(folder)
 }
 
-/// Every measured record whose name holds `filter`, or why it was refused.
+/// Every measured record whose name contains `filter`, or why it was rejected.
 #[must_use]
 pub fn cases(filter: &str) -> Vec<(String, Result<Case, String>)> {
     let Some(shared) = folder() else {

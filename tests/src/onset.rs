@@ -37,7 +37,7 @@ pub struct Lost {
 pub struct Onset {
     /// The loop before.
     pub rig: Rig,
-    /// What begins; `None`: nothing does.
+    /// The effect that begins; `None`: no effect.
     pub effect: Option<(Placed, Vec<f64>)>,
     /// The row at which it begins.
     pub row: usize,
@@ -115,7 +115,7 @@ impl Onset {
         None
     }
 
-    /// What the believed model, refitted to the record without noise, cannot follow.
+    /// Root mean square residual of the believed model, refitted to the record without noise.
     fn misfit(&self) -> Option<f64> {
         let records = [self.run(false, 1)?];
         let level = *self.rig.levels.last()?;
@@ -196,7 +196,7 @@ impl Onset {
             if k == self.row
                 && let Some((placed, values)) = &self.effect
             {
-                // The effects sort themselves into the chain, but there is one alone.
+                // The effects are sorted into the chain, but there is only one.
                 let theta = [rig.theta.as_slice(), values].concat();
                 let levels = simulator.levels()[..rig.plant.vessels()].to_vec();
                 let with = structure.with(*placed).ok()?;
@@ -226,7 +226,7 @@ impl Onset {
         })
     }
 
-    /// All alarms that a monitor raises on this loop with its noise, which it takes for the plant without the effect.
+    /// All alarms of a monitor on this loop with noise; the monitor's model lacks the effect.
     #[must_use]
     pub fn watched(&self, settings: Settings, seed: u64) -> Option<Vec<Alarm>> {
         let record = self.run(true, seed)?;
@@ -252,7 +252,7 @@ impl Onset {
         Some(alarms)
     }
 
-    /// In which rows of its record the reading is lost.
+    /// Rows of its record with missing readings.
     fn lost_rows(&self, record: &Record, seed: u64) -> Vec<bool> {
         let mut rows = vec![false; record.len()];
         let Some(lost) = self.lost else { return rows };

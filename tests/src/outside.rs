@@ -3,8 +3,8 @@
 /// At a time \[s\], what the pump is given beside the command \[V\], and what the sensor reads beside the level \[cm\].
 pub type Outside = fn(f64) -> (f64, f64);
 
-/// What no effect of the catalogue describes: a jump of the sensor that stays or passes, a slow course of
-/// it, and a flow that nobody recorded; and how a sentence names it.
+/// Disturbances that no effect of the catalogue describes: a level shift of the sensor, permanent or temporary, a slow change of it, and an
+/// unmeasured flow; and their names in a sentence.
 pub const OUTSIDE: [(&str, Outside); 6] = [
     ("wanders", |t| (0.0, 0.5 * (0.00209 * t).sin())),
     ("sudden, from 1002", |t| {
@@ -45,8 +45,8 @@ pub const OUTSIDE: [(&str, Outside); 6] = [
     }),
 ];
 
-/// What an effect that follows the clock describes: a sensor that slides; and a swing of its reading, slow or quick, for a flow that
-/// swings leaves the same.
+/// What an effect that follows the clock describes: a sensor that slides; and an oscillation of its reading, slow or quick, for a flow that
+/// oscillates leaves the same.
 pub const BY_CLOCK: [(&str, Outside); 3] = [
     ("periodic_disturbance", |t| (0.0, 0.1 * (0.314 * t).sin())),
     ("periodic_disturbance", |t| (0.0, 0.5 * (0.0628 * t).sin())),

@@ -1,4 +1,4 @@
-//! The program from outside: where it lies beside an example, and what it writes.
+//! The program as a process: its path next to an example, and its results.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -20,7 +20,7 @@ pub fn program() -> Option<PathBuf> {
     None
 }
 
-/// What a command writes with `--json`, and how long it takes \[s\].
+/// Result of a command with `--json`, and its duration \[s\].
 ///
 /// # Errors
 /// Its message where it refuses, and why its file cannot be read.

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 /// Samples in which a rig comes to rest.
 const SETTLING: usize = 1500;
 
-/// How the command comes about.
+/// Generation of the command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Drive {
     /// Random steps of the command.
@@ -24,9 +24,9 @@ pub enum Drive {
 pub struct Rig {
     /// The plant.
     pub plant: Plant,
-    /// What is built into it, with its parameters, in any order.
+    /// Hidden effects with their parameters, in any order.
     pub hidden: Vec<(&'static str, usize, Vec<f64>)>,
-    /// What is built into it that no effect of the catalogue describes.
+    /// Hidden terms that no effect of the catalogue describes.
     pub terms: Vec<Term>,
     /// The plant's own parameters.
     pub theta: Vec<f64>,
@@ -42,7 +42,7 @@ pub struct Rig {
     pub colour: f64,
     /// Standard deviation of a random walk beside the noise at the end of the record \[cm\]; zero: there is none.
     pub walk: f64,
-    /// The step of the converter behind the sensor, which rounds the reading with its noise \[cm\]; zero: it does not round.
+    /// The step of the converter after the sensor, which rounds the reading with its noise \[cm\]; zero: it does not round.
     pub converter: f64,
     /// How the command comes about.
     pub drive: Drive,
@@ -56,8 +56,7 @@ pub struct Rig {
     pub interval: f64,
     /// Samples are taken up to this part of the interval before or after their time, and stamped when they are taken.
     pub jitter: f64,
-    /// What no model tells of: at a time \[s\], what the pump is given beside the command \[V\], and what the sensor
-    /// reads beside the level \[cm\].
+    /// Unmodelled disturbances: at a time \[s\], the addition to the command \[V\], and the addition to the reading \[cm\].
     pub outside: fn(f64) -> (f64, f64),
 }
 
@@ -109,7 +108,7 @@ impl Rig {
         }
     }
 
-    /// What is known of it.
+    /// Known constants.
     #[must_use]
     pub fn known(&self) -> Known {
         let area = match self.plant {
@@ -126,7 +125,7 @@ impl Rig {
         }
     }
 
-    /// How many levels are measured.
+    /// Number of measured levels.
     #[must_use]
     pub fn outputs(&self) -> usize {
         self.measured.len().max(1)
@@ -186,7 +185,7 @@ impl Rig {
     #[allow(clippy::expect_used)]
     pub fn play(&self, wanted: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
         let first = *wanted.first().expect("a value");
-        // What follows the clock begins with the record.
+        // Functions of time begin with the record.
         let settling = Self {
             hidden: self
                 .hidden
@@ -216,7 +215,7 @@ impl Rig {
         self.from(&levels, command, controller, wanted, (&time, &e))
     }
 
-    /// All that is hidden as effects of the catalogue: the converter's rounding too.
+    /// All hidden effects of the catalogue, including the converter's rounding.
     #[must_use]
     pub fn missing(&self) -> Vec<(&'static str, usize, Vec<f64>)> {
         let mut all = self.hidden.clone();
@@ -256,7 +255,7 @@ impl Rig {
         all
     }
 
-    /// When samples are taken \[s\].
+    /// Times of the samples \[s\].
     fn stamps(&self, n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
         let jitter = self.jitter;
         let mut stamp = |k: usize| {
@@ -283,7 +282,7 @@ impl Rig {
             *operating = *level;
         }
         scales.input_range = 10.0;
-        // Beside another level the scale of a reading is no matter of choice: what bends it bends over the range that is visited.
+        // With another measured level, the scale of a reading is not arbitrary: a nonlinearity refers to the visited range.
         if self.outputs() > 1 {
             let middle = 0.5 * (self.command.0 + self.command.1);
             let power = match self.plant.outlet() {

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 const INTERVAL: f64 = 4.0;
 const COMMAND: (f64, f64) = (0.5, 5.5);
 
-/// What is known of them.
+/// Known constants of the tanks.
 #[must_use]
 pub fn known() -> Known {
     Known {

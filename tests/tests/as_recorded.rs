@@ -89,7 +89,7 @@ fn the_same_record_in_other_forms_has_the_same_verdict() {
     same(&found, &whole, "ten rows missing");
     let gaps = found.gaps.unwrap().gaps;
     assert_eq!((gaps.rows, gaps.places), (10, 1));
-    // It is one record all the same.
+    // The result has one record nevertheless.
     assert_eq!(found.records.len(), 1);
     let last = found.steps.last().unwrap();
     assert_eq!(last.simulated[0].len(), found.records[0].time.len());
@@ -176,7 +176,7 @@ fn clogging(change: f64, seed: u64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// As a historian exports it: semicolons, decimal commas, ISO stamps, and 18 rows missing in 7 places.
+/// In the format of a historian: semicolons, decimal commas, ISO stamps, and 18 rows missing in 7 places.
 fn exported(rows: &[(f64, f64)]) -> String {
     let gaps = [
         (100, 3),
@@ -235,7 +235,7 @@ fn a_clogging_valve_is_found_in_a_historians_export() {
     let change = &parameters(&found)[2];
     assert!((change.1 + 0.35).abs() < 4.0 * change.2, "{change:?}");
 
-    // And a vessel that does not clog is adequate.
+    // The model of a vessel without clogging is adequate.
     let found = diagnosed(&[("sound.csv", exported(&clogging(0.0, 2)))], model);
     assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.effects);
 }

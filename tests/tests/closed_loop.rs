@@ -32,7 +32,7 @@ fn known(found: &Diagnosis) -> &ControlLoop {
     found.control_loop.as_ref().unwrap()
 }
 
-/// Without feedback nothing is said of a loop, whatever the noise; with it, the answer says so.
+/// Without feedback no loop is reported, for any noise; with feedback it is reported.
 #[test]
 fn feedback_is_found_where_it_is_and_only_there() {
     for seed in 0..24 {
@@ -66,8 +66,8 @@ fn feedback_is_found_where_it_is_and_only_there() {
     }
 }
 
-/// With the controller the loop is simulated; on the measured command a fit by simulation error, as it is shown of a model
-/// that lacks something, has wider standard errors.
+/// With the controller the loop is simulated; on the measured command a fit by simulation error, as for an incomplete model, has wider
+/// standard errors.
 #[test]
 fn a_known_controller_is_simulated_and_an_unknown_one_widens_the_intervals() {
     let (mut wider, mut count) = (0.0, 0.0);
@@ -138,7 +138,7 @@ fn an_effect_is_found_in_the_simulated_loop() {
     }
 }
 
-/// What keeps a loop from being simulated is said, with the mend, and the measured command is used.
+/// Reasons that prevent the simulation of a loop are reported with the correction, and the measured command is used.
 #[test]
 fn a_loop_that_cannot_be_simulated_is_not() {
     let good = {
@@ -177,7 +177,7 @@ fn a_loop_that_cannot_be_simulated_is_not() {
     );
 }
 
-/// The price of a coloured noise is said, and that of white noise is not.
+/// The loss of detectability in coloured noise is reported, and not for white noise.
 #[test]
 fn the_loss_of_power_in_coloured_noise_is_said() {
     for (colour, price) in [(0.0, false), (0.95, true)] {

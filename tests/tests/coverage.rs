@@ -1,5 +1,5 @@
-//! Intervals of 95 % of a user's own model hold the truth in 95 % of records: two outputs in coloured noise, 30 % of the readings missing.
-//! `cargo run --release -p ctid-tests --example model_coverage` takes 400 records of two models.
+//! Intervals of 95 % of a user's own model contain the true value in 95 % of records: two outputs in coloured noise, 30 % of the readings
+//! missing. `cargo run --release -p ctid-tests --example model_coverage` takes 400 records of two models.
 #![allow(clippy::unwrap_used)]
 
 use ctid_examples::model_records::driven_models;

@@ -1,5 +1,5 @@
-//! What the pages in the repository say holds: docs/adding-an-effect.md shows the effect of the catalogue that it walks through,
-//! the gallery is whole, the model file of the README is the bundled one, and links lead somewhere.
+//! Checks of the documents: docs/adding-an-effect.md shows the catalogue's effect that it explains, the gallery is complete, the model file
+//! of the README is the bundled one, and links are valid.
 
 use std::path::Path;
 
@@ -115,7 +115,7 @@ fn links_lead_to_files() {
     }
 }
 
-/// What a link to a heading ends in.
+/// Anchor of a heading.
 fn anchor(line: &str) -> Option<String> {
     let heading = line.strip_prefix('#')?.trim_start_matches('#').trim();
     let kept = |c: &char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_');

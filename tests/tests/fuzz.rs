@@ -7,14 +7,14 @@ use ctid_tests::fuzz::{Kind, as_program, run};
 
 /// Cases of each kind.
 const CASES: u64 = 200;
-/// The smallest and the largest share of cases with a result; others would say that the inputs are all good or all bad.
+/// The smallest and the largest share of cases with a result; a share outside would mean that nearly all inputs are valid or invalid.
 const RESULTS: std::ops::Range<f64> = 0.05..0.95;
 
 fn main() -> ExitCode {
     if let Some(code) = as_program() {
         return code;
     }
-    // As the usual harness understands them: a list, or a part of a name.
+    // Arguments as in the standard test harness: a list, or a part of a name.
     let words: Vec<String> = env::args().skip(1).collect();
     let wanted = |kind: &Kind| {
         let mut names = words

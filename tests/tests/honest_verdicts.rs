@@ -1,4 +1,4 @@
-//! What a verdict may claim: adequate is a model that leaves noise, and nothing else.
+//! Limits of verdicts: only a model whose residual is noise is adequate.
 #![allow(clippy::unwrap_used)]
 
 use ct_signals::noise;
@@ -18,8 +18,8 @@ fn diagnosed(rig: &Rig, seed: u64, options: &Options) -> Diagnosis {
     diagnose(&problem(rig, seed), options, &|_| {}).unwrap()
 }
 
-/// A comparison takes a failure for no noise, and shows the simulation that comes nearest to the data, not one that a
-/// noise which wanders lets drift off.
+/// A comparison takes a failure for no noise, and shows the simulation that comes nearest to the data, not one that a noise which drifts
+/// lets drift off.
 #[test]
 fn a_comparison_shows_what_a_model_lacks() {
     for (effect, size) in [
@@ -68,7 +68,7 @@ fn what_is_outside_the_catalogue_is_not_called_noise() {
             "{says}: {:?}",
             compared.effects
         );
-        // An effect may imitate the larger part of a disturbance; it is never the whole answer.
+        // An effect may resemble the larger part of a disturbance; it is never accepted as the whole explanation.
         assert!(
             matches!(found.verdict, Verdict::Unexplained | Verdict::Partial),
             "{:?}",
@@ -86,7 +86,7 @@ fn what_is_outside_the_catalogue_is_not_called_noise() {
                 "{says}: {:?}",
                 found.sentences
             );
-            // What cannot be predicted is little more than the instrument's noise.
+            // The part that cannot be predicted is slightly more than the instrument's noise.
             assert!(
                 found.noise_floor < 2.5 * rig.noise,
                 "{says}: {}",
@@ -177,7 +177,7 @@ fn an_effect_that_explains_a_small_part_is_a_remark() {
     }
 }
 
-/// A large effect is named beside a small disturbance, and in a noise that wanders more slowly than the process.
+/// A large effect is named beside a small disturbance, and in a noise that drifts more slowly than the process.
 #[test]
 fn an_effect_that_explains_nearly_all_is_named() {
     let hidden = vec![("pump_saturation", 0, vec![5.0])];
@@ -362,7 +362,7 @@ fn a_converter_is_named_from_its_readings() {
     }
 }
 
-/// Beside coloured noise a random walk describes the noise, and would take a drift with it.
+/// With coloured noise a random walk describes the noise, and would absorb a drift.
 #[test]
 fn a_drift_is_named_in_coloured_noise() {
     for seed in 1..=3 {

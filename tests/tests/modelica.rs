@@ -11,11 +11,11 @@ use ct_model::{Model, ModelSpec, Simulation};
 use plants::Plant;
 use serde_json::{Value, json};
 
-/// Rows of a simulation, and those at which inputs jump.
+/// Rows of a simulation, and those at which inputs have steps.
 const ROWS: usize = 61;
 const JUMPS: [usize; 2] = [20, 40];
 
-/// Every function, operator and way of declaring that the language has.
+/// Every function, operator and form of declaration of the language.
 const EVERYTHING: &str = r#"
 model Everything "all that may be written"
   constant Real pi = 3.14159;
@@ -53,7 +53,7 @@ fn mended(name: &str) -> Vec<(String, String)> {
             parameter.value = own.starts[0];
         }
         let text = mended.to_string();
-        // It is the same model when it is read again.
+        // The same model results when it is read again.
         assert_eq!(ModelSpec::parse(&text).unwrap().to_string(), text);
         (candidate.id.clone(), text)
     });
@@ -172,7 +172,7 @@ fn simulated(spec: &ModelSpec, case: &Case) -> Vec<(String, Vec<f64>)> {
     series
 }
 
-/// What the other program makes of texts: of each so many rows, a step apart.
+/// Results of the other program for texts: this number of rows of each, one step apart.
 fn by_rumoca(cases: &[(String, f64, usize)]) -> Vec<Value> {
     let cases: Vec<Value> = cases
         .iter()
@@ -212,7 +212,7 @@ fn another_compiler_reads_all_texts_as_they_stand_and_as_they_are_written() {
     for ((name, text), found) in texts.iter().zip(by_rumoca(&asked)) {
         assert_eq!(found.get("refused"), None, "{name}:\n{text}");
     }
-    // What it simulates with corners of its own is read all the same.
+    // Texts that it simulates with its own corners are read nevertheless.
     let late = "model Late parameter Real d = 2.5; input Real u; output Real y = x; Real x(start=0); equation der(x) = delay(u, d) - delay(x, 0.5); end Late;";
     let written = ModelSpec::parse(late).unwrap().to_string();
     assert_eq!(by_rumoca(&[(written, 1.0, 0)])[0].get("refused"), None);
@@ -226,7 +226,7 @@ fn another_compiler_reads_all_texts_as_they_stand_and_as_they_are_written() {
     for ((effect, text), found) in mended.iter().zip(by_rumoca(&asked)) {
         assert_eq!(found.get("refused"), None, "{effect}:\n{text}");
     }
-    // It does refuse.
+    // The program rejects an error.
     let wrong = EVERYTHING.replace("^q*0.01", "^qq*0.01");
     assert!(by_rumoca(&[(wrong, 1.0, 0)])[0]["refused"].is_string());
 }

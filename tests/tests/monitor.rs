@@ -6,8 +6,8 @@ use ctid_tests::onset::{Lost, Onset};
 use monitor::Settings;
 use rayon::prelude::*;
 
-/// An effect that begins half-way, of each kind, as large as the noise, in white and coloured noise in turn: seen within
-/// three time constants of when it shows as much as the noise, and in the group that is named.
+/// An effect that begins half-way, of each kind, as large as the noise, in white and coloured noise in turn: detected within three time
+/// constants of reaching the size of the noise, and in the named group.
 #[test]
 fn what_begins_is_seen_and_named() {
     let found: Vec<(bool, bool)> = (30..35)

@@ -78,7 +78,7 @@ fn the_cascaded_tanks_give_up_their_effects() {
     );
 }
 
-/// One heater of the board: the sensor lags behind it.
+/// One heater of the board: the sensor lags after it.
 #[test]
 #[cfg_attr(
     not(measured_records),
@@ -100,8 +100,8 @@ fn the_sensor_of_a_heater_lags() {
     }
 }
 
-/// The flow stands still while the command falls by two percent. A pump that saturates and an outlet that changes as the set point steps leave
-/// no less, and do not carry over to the next record of the loop.
+/// The flow is constant while the command falls by two percent. A pump that saturates and an outlet that changes as the set point steps
+/// leave no less, and do not carry over to the next record of the loop.
 #[test]
 #[cfg_attr(
     not(measured_records),

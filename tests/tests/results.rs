@@ -115,8 +115,8 @@ fn outputs(result: &Value) -> Vec<&str> {
     names.filter_map(Value::as_str).collect()
 }
 
-/// What is in objects is explained in a part of their own or, where there is none, in their row; no row explains what is not there, unless it
-/// says with what alone it is.
+/// What is in objects is explained in a part of their own or, where there is none, in their row; no row explains what is not there, unless
+/// it says with what alone it is.
 fn explained_of(page: &str, name: &str, value: &Value, outputs: &[&str]) {
     let part = part_of(page, name).unwrap();
     let entries = value.as_object().unwrap();

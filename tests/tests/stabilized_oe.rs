@@ -216,7 +216,7 @@ fn drift(record: &Record, time: f64, memory: f64) -> f64 {
 }
 
 /// Measured tanks with an overflow and outflows by the square root, beside two lags that were fitted to them, under the same input and the
-/// sensor's noise: the gain of the first wanders, that of the second stays.
+/// sensor's noise: the gain of the first drifts, that of the second stays.
 #[test]
 #[cfg_attr(
     not(measured_records),

@@ -18,8 +18,8 @@ fn run(rig: &Rig, seed: u64) -> Diagnosis {
     diagnose(&rig.problem(record), &Options::default(), &|_| {}).unwrap()
 }
 
-/// Two tanks whose model is exactly right: some starts end in a local minimum, where the residual holds structure and
-/// would be blamed on an effect. The tool compares many starts, finds the best minimum more than once, and blames nothing.
+/// Two tanks whose model is exactly right: some starts end in a local minimum, where the residual has a structure that resembles an effect.
+/// The program compares many starts, finds the best minimum more than once, and names no effect.
 #[test]
 fn a_local_minimum_of_a_right_model_is_not_blamed_on_an_effect() {
     let mut trapped = 0;

@@ -1,4 +1,4 @@
-//! One recursive least squares update with forgetting, by this project and by others, on the same data.
+//! One recursive least-squares update with forgetting, by this project and by other libraries, on the same data.
 
 use std::hint::black_box;
 
@@ -29,7 +29,7 @@ fn weights() -> Weights {
     Weights::from_forgetting_factor(LAMBDA, 1.0).expect("valid")
 }
 
-/// This crate, the number of parameters known when it is built.
+/// This crate, with the number of parameters known at compile time.
 pub struct Factored<const P: usize, I: Integrator = ExactHold>(ContinuousRls<P, I>);
 
 fn estimator<const P: usize, I: Integrator>(weights: Weights) -> ContinuousRls<P, I> {
@@ -68,7 +68,7 @@ impl<const P: usize, I: Integrator> Factored<P, I> {
     }
 }
 
-/// This crate, the number of parameters known at run time.
+/// This crate, with the number of parameters known at run time.
 pub struct Dynamic(DynamicRls);
 
 impl Dynamic {
@@ -91,8 +91,8 @@ impl Dynamic {
     }
 }
 
-/// What one writes with nalgebra's operators; it loses definiteness after some 30/(1 - lambda) updates, so it is started again
-/// for each run over the samples.
+/// The update written with nalgebra's operators; it loses positive definiteness after about 30/(1 - lambda) updates, so it is restarted for
+/// each run over the samples.
 pub struct Operators<const P: usize> {
     theta: SVector<f64, P>,
     p: SMatrix<f64, P, P>,

@@ -1,4 +1,4 @@
-//! A box that estimates are kept to, step by step: by projection, which is hard, or by penalties, which are soft.
+//! A box of bounds on the estimates, enforced at every step: by projection (hard), or by penalties (soft).
 
 use ct_rls::{ContinuousRls, Integrator, RecursiveEstimator};
 use nalgebra::SVector;
@@ -6,18 +6,19 @@ use nalgebra::SVector;
 use crate::projection::check_box;
 use crate::{Error, Relation, Row, project_box};
 
-/// How estimates are kept to their bounds.
+/// How the estimates are kept within their bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Keep {
-    /// Moved to the nearest point of the box, in the metric of what is known: [`project_box`].
+    /// Projection to the nearest point of the box in the metric of `P`: [`project_box`].
     Projection,
-    /// Each entry that is outside is set to its bound, and the others stay. Simple, as simulations in the literature have it; but the
-    /// Lyapunov function may grow, and correlated parameters are left where they do not belong.
+    /// Clipping: each entry outside its bounds is set to the bound, and the others do not change. Literature on simulations uses this rule.
+    /// The Lyapunov function may grow, and correlated parameters are not corrected.
     Clamp,
-    /// Pulled back where outside: a row's penalty for each bound that is violated, relaxed exactly over the step.
+    /// A penalty for each violated bound, relaxed exactly over the step.
     Penalty {
-        /// As of a [`Row`]: well above the mean squared error of the output; 1e3 of it does, 1 of it is useless.
+        /// Weight of the penalty, as of a [`Row`]: choose it well above the mean squared error of the output. For example 1e3 times this
+        /// error works, and 1 times does not.
         weight: f64,
     },
 }
@@ -31,7 +32,7 @@ pub struct Bounds<const P: usize> {
 }
 
 impl<const P: usize> Bounds<P> {
-    /// A box that is kept to by projection.
+    /// A box that is enforced by projection.
     ///
     /// # Errors
     /// [`Error::Bounds`] where a lower bound is above its upper one, or either is NaN.
@@ -54,7 +55,7 @@ impl<const P: usize> Bounds<P> {
         }
     }
 
-    /// The same box, kept to in this way.
+    /// The same box with the given way of enforcing it.
     ///
     /// # Errors
     /// [`Error::Weight`] for a penalty's.
@@ -77,12 +78,12 @@ impl<const P: usize> Bounds<P> {
         &self.upper
     }
 
-    /// How the box is kept to.
+    /// How the box is enforced.
     pub fn keep(&self) -> Keep {
         self.keep
     }
 
-    /// Whether `theta` lies in the box.
+    /// Whether `theta` is inside the box.
     pub fn contains(&self, theta: &SVector<f64, P>) -> bool {
         let mut bounds = self.lower.iter().zip(&self.upper);
         theta
@@ -90,7 +91,7 @@ impl<const P: usize> Bounds<P> {
             .all(|x| bounds.next().is_some_and(|(l, u)| (l..=u).contains(&x)))
     }
 
-    /// Brings the estimates back after a step of `dt` seconds; returns whether they moved.
+    /// Enforces the box after a step of `dt` seconds; returns whether the estimates changed.
     ///
     /// # Errors
     /// As of [`project_box`].

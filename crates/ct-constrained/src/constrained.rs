@@ -66,7 +66,7 @@ pub struct ConstrainedRls<const P: usize, const R: usize> {
     free_gamma: bool,
 }
 
-/// `b` of the last step, kept while `eta` and `h` stay as they are.
+/// `b` of the last step; valid while `eta` and `h` do not change.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     eta: f64,
@@ -90,7 +90,7 @@ impl Window {
 }
 
 impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
-    /// Puts rows on an estimator: least squares, `gamma = c` for the data and `Gamma = W` for the equality rows.
+    /// Adds rows to an estimator: least squares, `gamma = c` for the data and `Gamma = W` for the equality rows.
     ///
     /// # Errors
     /// [`Error::GammaNotWeight`], [`Error::RowGammaNotWeight`].
@@ -144,7 +144,7 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
         }
     }
 
-    /// By how much each row is violated; unit of its `chi`.
+    /// Violation of each row; unit of its `chi`.
     pub fn violations(&self) -> [f64; R] {
         self.rows.map(|row| row.violation(self.rls.theta()))
     }
@@ -181,7 +181,7 @@ impl<const P: usize, const R: usize> ConstrainedRls<P, R> {
         let innovation = self.rls.update_with(sample, dt, weights);
         let length = match innovation.outcome {
             Outcome::Updated | Outcome::Capped => self.window.length(weights.eta(), dt),
-            // nothing was forgotten; the rows hold all the same
+            // without forgetting; the rows are enforced nevertheless
             Outcome::Silent => dt,
             _ => return innovation,
         };
@@ -225,8 +225,8 @@ impl<const P: usize, const R: usize> RecursiveEstimator for ConstrainedRls<P, R>
     type Covariance = SMatrix<f64, P, P>;
     type Error = Error;
 
-    /// The data, then the rows. A sample that is refused changes nothing, by the rows neither; while the sensor is gone, a silent
-    /// one (`phi = 0`, `y = 0`) lets the rows act alone.
+    /// Uses the data, then the rows. A rejected sample changes nothing, and its rows are not used either; without a sensor signal, a zero
+    /// sample (`phi = 0`, `y = 0`) applies the rows alone.
     fn update(&mut self, sample: &Sample<P>, dt: f64) -> Innovation {
         let weights = self.rls.weights();
         self.step(sample, dt, &weights)

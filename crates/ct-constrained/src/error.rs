@@ -1,15 +1,15 @@
-//! What can be wrong with a constraint: each message carries the numbers that disagree and the mend.
+//! Errors of constraints: each message contains the numbers that disagree and the correction.
 
-/// Everything this crate can refuse.
+/// All errors of this crate.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// From the estimator inside.
+    /// An error of the recursive least-squares estimator inside.
     #[error(transparent)]
     Rls(#[from] ct_rls::Error),
-    /// The weights of the data are no least squares, so that constraints would bias the estimates.
+    /// The weights of the data are not those of least squares, so constraints would bias the estimates.
     #[error(
-        "gamma is {gamma} with c = {c}, but with constraints the criterion is minimised only for gamma = c; take gamma = {c}, or with_free_gamma, which minimises nothing"
+        "gamma is {gamma} with c = {c}, but with constraints the criterion is minimised only for gamma = c; take gamma = {c}, or with_free_gamma, which minimises no criterion"
     )]
     GammaNotWeight {
         /// Gain of the Riccati equation.
@@ -19,15 +19,15 @@ pub enum Error {
     },
     /// A row's gamma is not its weight, so that the criterion would not be minimised.
     #[error(
-        "gamma of the row is {gamma} with the weight {weight}, but the criterion is minimised only for gamma = {weight}; take that, or with_free_gamma, which minimises nothing"
+        "gamma of the row is {gamma} with the weight {weight}, but the criterion is minimised only for gamma = {weight}; take that, or with_free_gamma, which minimises no criterion"
     )]
     RowGammaNotWeight {
         /// The row's entry of Gamma.
         gamma: f64,
-        /// Its weight.
+        /// Weight of the row.
         weight: f64,
     },
-    /// A row's gamma with which the Lyapunov function could grow.
+    /// A value of gamma with which the Lyapunov function could grow.
     #[error(
         "gamma of the row is {gamma} with the weight {weight}, but must be at least 0 and below twice the weight, {}, or the Lyapunov function can grow", 2.0 * weight
     )]
@@ -39,7 +39,7 @@ pub enum Error {
     },
     /// An inequality row with a gamma.
     #[error(
-        "gamma of an inequality row is {gamma}, but must be 0: with another the Lyapunov function can grow, and dQ/dt jumps at every crossing"
+        "gamma of an inequality row is {gamma}, but must be 0: with another the Lyapunov function can grow, and dQ/dt is discontinuous at every crossing"
     )]
     PenaltyGamma {
         /// The value that was given.
@@ -60,7 +60,7 @@ pub enum Error {
     TooLarge {
         /// `the length of f` or `chi`.
         what: &'static str,
-        /// Its size.
+        /// Value of the coefficient.
         value: f64,
         /// The largest that is taken.
         limit: f64,
@@ -81,7 +81,7 @@ pub enum Error {
         /// The value that was given.
         value: f64,
     },
-    /// There is no such row.
+    /// The row does not exist.
     #[error("row {index} does not exist: there are {rows} rows, counted from 0")]
     NoSuchRow {
         /// The index that was given.
@@ -94,21 +94,21 @@ pub enum Error {
         "parameter {index} is bounded below by {lower} and above by {upper}; the lower bound must not be above the upper one"
     )]
     Bounds {
-        /// Which parameter, from 0.
+        /// Index of the parameter, from 0.
         index: usize,
-        /// Its lower bound.
+        /// Lower bound.
         lower: f64,
-        /// Its upper bound.
+        /// Upper bound.
         upper: f64,
     },
     /// The projection found no point that obeys all rows.
     #[error(
-        "no estimate obeys all rows: row {row} is violated by {violation} where the others are obeyed; drop a row that contradicts the others, or one of two that are nearly parallel"
+        "no estimate satisfies all rows: row {row} is violated by {violation} where the others are satisfied; drop a row that contradicts the others, or one of two that are nearly parallel"
     )]
     NoCommonPoint {
         /// The row, from 0; of a box, the parameter.
         row: usize,
-        /// By how much, the unit of its chi.
+        /// Violation, in the unit of chi.
         violation: f64,
     },
 }

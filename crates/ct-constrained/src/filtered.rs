@@ -22,12 +22,12 @@ use crate::{Error, Row};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Filter {
-    /// `1/(1 + T s)`: what is slower than `T` counts.
+    /// Low-pass filter `1/(1 + T s)`: signals slower than `T` pass.
     LowPass {
         /// `T`, s; above 0.
         time: f64,
     },
-    /// `1/s`: the balance since the start. Of signals with a mean it grows for ever, and counts for more and more.
+    /// `1/s`: the integral since the start. For signals with a mean the integral grows without bound, and so does the weight of the row.
     Integral,
 }
 

@@ -39,20 +39,20 @@ use crate::{Error, Relation, Row};
 /// A row is obeyed within this share of the size of its terms.
 const OBEYED: f64 = 1e-12;
 
-/// A row whose part outside the active ones is below this share says nothing new.
+/// A row is linearly dependent on the active rows if its part outside them is below this share.
 const DEPENDENT: f64 = 1e-13;
 
-/// Rounding of a way, as a share of its length.
+/// Rounding error of a step, as a share of its length.
 const WAY: f64 = 16.0 * f64::EPSILON;
 
-/// Steps for each row and parameter before it is said that there is no end; a few in all are usual.
+/// Steps for each row and parameter before the search is stopped; a few in all are usual.
 const STEPS: usize = 20;
 
-/// Moves the estimates to the nearest point that obeys all `rows`; weights play no part. Returns whether anything moved.
+/// Moves the estimates to the nearest point that satisfies all `rows`; weights have no influence. Returns whether the estimates changed.
 ///
 /// # Errors
-/// [`Error::NoCommonPoint`] where the rows contradict each other, [`Error::NotFinite`] where `f' theta` leaves the floating-point range, and
-/// [`Error::Rls`] where `P` is not positive definite, which [`ExactHold`](ct_rls::ExactHold) excludes; nothing is changed then.
+/// [`Error::NoCommonPoint`] where the rows contradict each other, [`Error::NotFinite`] where `f' theta` leaves the floating-point range,
+/// and [`Error::Rls`] where `P` is not positive definite, which [`ExactHold`](ct_rls::ExactHold) excludes; nothing is changed then.
 pub fn project<const P: usize, const R: usize, I: Integrator>(
     rls: &mut ContinuousRls<P, I>,
     rows: &[Row<P>; R],
@@ -78,8 +78,8 @@ pub fn project<const P: usize, const R: usize, I: Integrator>(
 /// Where `P` is so nearly singular that rounding hides which point is nearest, each entry goes to its nearer bound.
 ///
 /// # Errors
-/// [`Error::Bounds`], [`Error::NotFinite`] where a violation leaves the floating-point range, and [`Error::Rls`] where `P` is not positive definite, which [`ExactHold`](ct_rls::ExactHold) excludes;
-/// nothing is changed then.
+/// [`Error::Bounds`], [`Error::NotFinite`] where a violation leaves the floating-point range, and [`Error::Rls`] where `P` is not positive
+/// definite, which [`ExactHold`](ct_rls::ExactHold) excludes; nothing is changed then.
 pub fn project_box<const P: usize, I: Integrator>(
     rls: &mut ContinuousRls<P, I>,
     lower: &SVector<f64, P>,
@@ -162,12 +162,12 @@ impl<const P: usize> Interval<P> {
     }
 }
 
-/// A row that is active or becomes so, with the sign of the bound that holds.
+/// A row that is active or becomes active, with the sign of its active bound.
 #[derive(Clone, Copy)]
 struct Active {
     row: usize,
     sign: f64,
-    /// 1 over `sum |f_i| sqrt(P_ii)`: with it no direction is longer than 1, whatever the units.
+    /// 1 over `sum |f_i| sqrt(P_ii)`: with this scaling no direction is longer than 1 in any units.
     unit: f64,
     lambda: f64,
 }
@@ -222,7 +222,7 @@ fn nearest<const P: usize, const N: usize, I: Integrator>(
             break;
         }
         let Some(violated) = search.next() else {
-            // for what rounding left
+            // corrects the rounding error
             search.move_onto_active();
             rls.set_theta(search.theta)?;
             return Ok(search.theta != start);

@@ -1,14 +1,14 @@
-//! One linear statement about the parameters, `f' theta = chi` or `f' theta <= chi`, and its weight.
+//! One linear constraint on the parameters, `f' theta = chi` or `f' theta <= chi`, and its weight.
 
 use ct_rls::{ContinuousRls, Integrator, MAX_REGRESSOR, RecursiveEstimator};
 use nalgebra::SVector;
 
 use crate::Error;
 
-/// A tenth of what the estimator takes for an output error.
+/// A tenth of the largest output error that the estimator accepts.
 const MAX_CHI: f64 = 1e99;
 
-/// What a row says.
+/// Equality or inequality.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Relation {
@@ -20,7 +20,7 @@ pub enum Relation {
     AtLeast,
 }
 
-/// One linear statement about `P` parameters. `f` and `chi` may vary in time: give the row again.
+/// One linear constraint on `P` parameters. `f` and `chi` may vary in time: then pass the row again at each sample.
 ///
 /// How large a weight? A row is soft. Over a second it pulls as `w`, the data as `c`, so an equality row wants `w` well above
 /// `c |phi|^2/|f|^2`. A penalty, which leaves `P` as it is, wants `w` much above the mean squared error of the output: at 1 it
@@ -85,9 +85,9 @@ impl<const P: usize> Row<P> {
     /// The same equality with another entry `gamma` of `Gamma` (3.9b of the paper), how fast the row makes `Q` shrink; a new row has
     /// `gamma = w`. Unit of the weight; at least 0, below `2 w`, and 0 where `w` is: then `V` falls, (3.8).
     ///
-    /// With a `gamma` other than `w` nothing is minimised, least of all (3.5), and the row needs
-    /// [`ConstrainedRls::with_free_gamma`](crate::ConstrainedRls::with_free_gamma). Below `w` it goes on to pull where `Q` would have
-    /// shrunk already, as a row whose `chi` varies may want; above `w` it counts for more than it pulls.
+    /// With a `gamma` other than `w` no criterion is minimised, not even (3.5), and the row needs
+    /// [`ConstrainedRls::with_free_gamma`](crate::ConstrainedRls::with_free_gamma). Below `w` the row keeps its influence for longer than
+    /// its information, which is useful for a varying `chi`; above `w` its information exceeds its influence.
     ///
     /// # Errors
     /// [`Error::Gamma`] out of this range; [`Error::PenaltyGamma`] for an inequality and a `gamma` other than 0.
@@ -102,7 +102,7 @@ impl<const P: usize> Row<P> {
         Ok(Self { gamma, ..self })
     }
 
-    /// `f' theta = chi` with a weight: see [`Row::new`].
+    /// Equality `f' theta = chi` with a weight: see [`Row::new`].
     ///
     /// # Errors
     /// As of [`Row::new`].
@@ -110,7 +110,7 @@ impl<const P: usize> Row<P> {
         Self::new(Relation::Equal, f, chi, weight)
     }
 
-    /// `f' theta <= chi`, a penalty with a weight where it is violated: see [`Row::new`].
+    /// Inequality `f' theta <= chi`, a penalty with a weight: see [`Row::new`].
     ///
     /// # Errors
     /// As of [`Row::new`].
@@ -118,7 +118,7 @@ impl<const P: usize> Row<P> {
         Self::new(Relation::AtMost, f, chi, weight)
     }
 
-    /// `f' theta >= chi`, a penalty with a weight where it is violated: see [`Row::new`].
+    /// Inequality `f' theta >= chi`, a penalty with a weight: see [`Row::new`].
     ///
     /// # Errors
     /// As of [`Row::new`].
@@ -141,7 +141,7 @@ impl<const P: usize> Row<P> {
         self.weight
     }
 
-    /// Its entry of `Gamma`: the weight of an equality, unless [`with_gamma`](Self::with_gamma) says otherwise; 0 of a penalty.
+    /// Entry of the row in `Gamma`: the weight for an equality, unless [`with_gamma`](Self::with_gamma) was used; 0 for a penalty.
     pub fn gamma(&self) -> f64 {
         self.gamma
     }
@@ -151,7 +151,7 @@ impl<const P: usize> Row<P> {
         self.gamma == Self::least_squares_gamma(self.relation, self.weight)
     }
 
-    /// What the row says.
+    /// Whether the row is an equality or an inequality.
     pub fn relation(&self) -> Relation {
         self.relation
     }
@@ -166,7 +166,7 @@ impl<const P: usize> Row<P> {
         }
     }
 
-    /// Where the row is violated, pulls the estimates towards it for `dt` seconds with its weight, exactly, and leaves `P` as it is.
+    /// If the row is violated, pulls the estimates towards it for `dt` seconds with its weight, exactly. `P` does not change.
     pub fn penalize<I: Integrator>(&self, rls: &mut ContinuousRls<P, I>, dt: f64) {
         if self.violation(rls.theta()) != 0.0 {
             rls.relax(&self.f, self.chi, self.weight * dt);

@@ -1,5 +1,4 @@
-//! What can be wrong with a system, a setting or a sample: each message names what it is about, the numbers that
-//! disagree and the mend, in one line.
+//! Errors of systems, settings and samples: each message names the object, the numbers that disagree and the correction, in one line.
 
 /// Everything this crate can refuse.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -8,22 +7,22 @@ pub enum Error {
     /// NaN or an infinity where a number is needed.
     #[error("{what}: entry {index} is {value}; give finite numbers")]
     NotFinite {
-        /// What was given.
+        /// The object that was given.
         what: &'static str,
-        /// Which entry of it, from 0.
+        /// Index of the entry, from 0.
         index: usize,
-        /// Its value.
+        /// Value of the entry.
         value: f64,
     },
     /// A polynomial without a coefficient other than zero, where one is needed.
     #[error("{what} is zero; give at least one coefficient that is not")]
     ZeroPolynomial {
-        /// What was given.
+        /// The polynomial or list in question.
         what: &'static str,
     },
-    /// A transfer function that differentiates.
+    /// A transfer function with more zeros than poles.
     #[error(
-        "the numerator has degree {numerator}, above the denominator's {denominator}: no hold can sample that; add poles"
+        "the numerator has degree {numerator}, above the denominator's {denominator}: such a transfer function cannot be sampled; add poles"
     )]
     Improper {
         /// Degree of the numerator.
@@ -33,7 +32,7 @@ pub enum Error {
     },
     /// A loop whose direct terms cancel the output's own coefficient.
     #[error(
-        "the loop has no solution at infinite frequency: 1 + d1*d2 is {determinant}, with direct terms {forward} and {backward}; take the direct term out of one of the two"
+        "the loop has no solution at infinite frequency: 1 + d1*d2 is {determinant}, with direct terms {forward} and {backward}; remove the direct term of one of the two systems"
     )]
     AlgebraicLoop {
         /// Direct term of the forward path.
@@ -46,7 +45,7 @@ pub enum Error {
     /// A length that does not fit the rest.
     #[error("{what} has {found} entries, but {expected} are needed")]
     Length {
-        /// What was given.
+        /// The quantity in question.
         what: &'static str,
         /// Entries that are needed.
         expected: usize,
@@ -64,10 +63,10 @@ pub enum Error {
     NotPositive {
         /// The setting.
         what: &'static str,
-        /// Its value.
+        /// Value of the entry.
         value: f64,
     },
-    /// A filter that does not forget.
+    /// A filter that is not asymptotically stable.
     #[error(
         "{what} has a root with real part {real_part}, but all of them have to be below 0; give another polynomial"
     )]
@@ -97,12 +96,12 @@ pub enum Error {
         /// Imaginary part \[1/time\].
         im: f64,
     },
-    /// Numbers too large for what was asked of them.
-    #[error("{what} leaves the range of f64 (largest finite number 1.8e308); {mend}")]
+    /// Numbers that overflow.
+    #[error("{what} overflows f64 (largest finite number 1.8e308); {mend}")]
     Overflow {
-        /// What was being computed.
+        /// The quantity in question.
         what: &'static str,
-        /// What to do.
+        /// The correction, in words.
         mend: &'static str,
     },
     /// The roots were not found.

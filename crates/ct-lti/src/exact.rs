@@ -235,7 +235,7 @@ fn negative_remainder(mut a: Vec<BigInt>, b: &[BigInt]) -> Vec<BigInt> {
     primitive(a.iter().map(|a| -a).collect())
 }
 
-/// The same over the greatest common divisor of its entries.
+/// The polynomial divided by the greatest common divisor of its coefficients.
 fn primitive(c: Vec<BigInt>) -> Vec<BigInt> {
     let mut divisor = BigUint::ZERO;
     for c in &c {
@@ -269,7 +269,7 @@ fn gcd(mut a: BigUint, mut b: BigUint) -> BigUint {
 mod tests {
     use super::*;
 
-    /// Half a unit of the last digit and a little more is rounded up, where the little is beyond the 64 leading bits too.
+    /// Half a unit of the last digit plus a small amount is rounded up, also if the small amount is beyond the 64 leading bits.
     #[test]
     fn what_is_dropped_counts_where_a_half_is_rounded() {
         let rounded = |c: u128| {

@@ -1,9 +1,9 @@
-//! What a signal does between two samples.
+//! Hold: the course of a signal between two samples.
 
-/// What a signal does between two samples. Sampling is exact for a signal that does just that.
+/// Hold: the course of a signal between two samples. Sampling is exact for a signal with this course.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Hold {
-    /// `u[k]` stands from `t[k]` to `t[k+1]`: what a D/A converter puts out.
+    /// `u[k]` is held from `t[k]` to `t[k+1]`: the output of a D/A converter.
     #[default]
     Zero,
     /// A straight line from `u[k]` to `u[k+1]`: the better guess for a signal that was measured.
@@ -13,9 +13,10 @@ pub enum Hold {
 /// The past of a filter or a simulation before its first sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Start {
-    /// All states are 0. Right where the process was at rest at 0; otherwise a jump at the first sample.
+    /// All states are 0. Correct if the process was at rest at time 0; otherwise the filtered signal starts with a step at the first
+    /// sample.
     #[default]
     Zero,
-    /// The first sample has stood forever. Right where the process was at rest at its operating point.
+    /// The first sample was held for all earlier times. Correct if the process was at rest at its operating point.
     Rest,
 }

@@ -201,7 +201,7 @@ mod tests {
         assert!(decided > 3990, "{decided}");
     }
 
-    /// Roots on the axis, whole numbers for coefficients: rounding says either, whatever the unit, and must not be believed.
+    /// Roots on the imaginary axis with integer coefficients: the rounded result depends on the unit of time, and must not be trusted.
     #[test]
     fn the_border_is_no_in_any_unit() {
         for k in 1..1500_u32 {

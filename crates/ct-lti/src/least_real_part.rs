@@ -10,8 +10,7 @@ use crate::positive_real::scale;
 use crate::{Error, Polynomial, TransferFunction};
 
 impl TransferFunction {
-    /// `(w, Re G(jw))` where the real part is smallest, w in \[rad/time\], infinite where that is its limit. For a
-    /// stable G.
+    /// `(w, Re G(jw))` at the minimum of the real part, w in \[rad/time\], infinite if the minimum is the limit. For a stable G.
     ///
     /// # Errors
     /// [`Error::Overflow`] and [`Error::NoConvergence`], as [`Polynomial::roots`].

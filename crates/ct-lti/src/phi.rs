@@ -29,7 +29,7 @@ use crate::matrix::{multiply, norm};
 /// Terms of the series of phi2: the first one left out is 0.5^15/17! = 1e-19 of the first.
 const TERMS: u32 = 14;
 
-/// Computes the functions of one matrix for any step, in memory of its own.
+/// Computes the functions of one matrix for any step, with preallocated memory.
 #[derive(Debug, Clone)]
 pub(crate) struct PhiFunctions {
     n: usize,
@@ -45,7 +45,7 @@ pub(crate) struct PhiFunctions {
 }
 
 impl PhiFunctions {
-    /// For A of n rows.
+    /// For a matrix A with n rows.
     pub(crate) fn new(n: usize, a: &[f64]) -> Self {
         let mut a = a.to_vec();
         let scale = balance(n, &mut a);
@@ -151,7 +151,7 @@ const OUT_OF_RANGE: Error = Error::Overflow {
 /// Scales rows and columns by powers of 2 until they are of one size, and gives the scales.
 fn balance(n: usize, a: &mut [f64]) -> Vec<f64> {
     let mut scale = vec![0_i32; n];
-    // Each sweep that changes something halves a norm; far fewer are needed than allowed.
+    // Each sweep that changes an entry halves a norm; far fewer sweeps are needed than this limit.
     for _ in 0..50 {
         let mut changed = false;
         for k in 0..n {

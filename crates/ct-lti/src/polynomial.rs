@@ -96,7 +96,7 @@ impl Polynomial {
         product.checked("a polynomial from its roots")
     }
 
-    /// The same, or an error where a coefficient is not finite.
+    /// The polynomial, or an error if a coefficient is not finite.
     pub(crate) fn checked(self, what: &'static str) -> Result<Self, Error> {
         match finite(what, &self.coefficients) {
             Ok(()) => Ok(self),
@@ -127,7 +127,7 @@ impl Polynomial {
         self.coefficients.last().copied().unwrap_or(0.0)
     }
 
-    /// Whether it is 0.
+    /// Whether the polynomial is 0.
     pub fn is_zero(&self) -> bool {
         self.coefficients.is_empty()
     }
@@ -218,7 +218,7 @@ impl Polynomial {
 }
 
 impl From<f64> for Polynomial {
-    /// A constant. One that is not finite is refused by whatever is made of it.
+    /// A constant. A value that is not finite causes an error when a system is built from it.
     fn from(constant: f64) -> Self {
         Self::trimmed(vec![constant])
     }

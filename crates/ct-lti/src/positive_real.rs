@@ -26,7 +26,7 @@ use crate::error::finite;
 use crate::exact::Exact;
 use crate::{Error, Polynomial, TransferFunction};
 
-/// What [`TransferFunction::exceeds`] found.
+/// Result of [`TransferFunction::exceeds`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Positivity {
@@ -40,7 +40,7 @@ pub enum Positivity {
         /// A frequency where it fails, in most cases the worst one by the relative size of N \[rad/time\]. Where
         /// `Re G` touches d from above, the frequency of touching, rounded. Infinite where it fails nowhere else.
         frequency: f64,
-        /// `Re G(jw) - d` there, at most 0 \[unit of G\].
+        /// `Re G(jw) - d` at that frequency, at most 0 \[unit of G\].
         excess: f64,
     },
     /// The denominator has a root on the imaginary axis or to its right.
@@ -48,13 +48,12 @@ pub enum Positivity {
 }
 
 impl Positivity {
-    /// Whether the condition holds at every finite frequency: [`Positivity::Strict`] or
-    /// [`Positivity::StrictBelowInfinity`].
+    /// Whether the condition is satisfied at every finite frequency: [`Positivity::Strict`] or [`Positivity::StrictBelowInfinity`].
     pub fn holds(self) -> bool {
         matches!(self, Self::Strict | Self::StrictBelowInfinity)
     }
 
-    /// Whether the condition holds with something to spare at infinity too: [`Positivity::Strict`].
+    /// Whether the condition holds with a positive margin at infinite frequency too: [`Positivity::Strict`].
     pub fn is_strict(self) -> bool {
         self == Self::Strict
     }
@@ -89,7 +88,7 @@ impl TransferFunction {
         if positive_by_signs(p1, p2, d, order) {
             return Ok(Positivity::Strict);
         }
-        // The unit of time that makes the roots of P2 about 1 keeps the integers short.
+        // With time scaled so that the roots of P2 are about 1, the integers are short.
         let scale = scale(p2);
         let n = real_part(&Exact::new(p1.coefficients(), scale), p2, d, scale);
         if n.is_positive_from_zero() {
@@ -131,7 +130,7 @@ fn real_part(p1: &Exact, p2: &Polynomial, d: f64, scale: i64) -> Exact {
 
 /// Whether every coefficient of N, up to the order, is above 0 beyond the rounding of `f64`.
 fn positive_by_signs(p1: &Polynomial, p2: &Polynomial, d: f64, order: usize) -> bool {
-    // No product of three of these loses digits at the ends of the range.
+    // With coefficients in this range, a product of three of them neither overflows nor underflows.
     let moderate = |c: &f64| *c == 0.0 || (1e-90..1e90).contains(&c.abs());
     let mut all = p1
         .coefficients()
@@ -154,7 +153,7 @@ fn positive_by_signs(p1: &Polynomial, p2: &Polynomial, d: f64, order: usize) -> 
     })
 }
 
-/// The point of `[0, inf)` where a polynomial that is not positive there is lowest, measured by its terms.
+/// For a polynomial that is not positive on `[0, inf)`: the point with its lowest value relative to its terms.
 fn witness(n: &[f64]) -> f64 {
     let relative = |x: f64| {
         // Reversed above 1, so that nothing overflows.
@@ -194,7 +193,7 @@ fn witness(n: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// What is far from the border is decided without long integers; what is not is left to them.
+    /// Cases far from the boundary are decided in floating point; only the others use long integers.
     #[test]
     fn signs_decide_what_is_clear() {
         let poly = |c: &[f64]| Polynomial::new(c).unwrap();

@@ -1,20 +1,20 @@
 //! The state variable filter of an output of which readings may be missing, for regressions that have no model to put in their place.
 //!
-//! Method: between its readings the output is taken to run on lines, as [`Hold::First`](crate::Hold::First) has it between samples in any case: where
-//! readings are missing the line is longer, and the filter's step with it, exactly. Rows without a reading are none.
+//! Method: between its readings the output is taken to run on lines, as [`Hold::First`](crate::Hold::First) has it between samples in any
+//! case: where readings are missing the line is longer, and the filter's step with it, exactly. Rows without a reading are none.
 //!
-//! A line over a time that is long beside the filter's is not what the plant did: behind a gap of more than `1/lambda`, `lambda = (e_0/e_n)^(1/n)`,
-//! rows are left out until the filter has forgotten it, down to 1 % by the response of `1/(p + lambda)^n`: for n = 1 to 4 after 4.6, 6.6, 8.4
-//! and 10 times `1/lambda`.
+//! A line over a time that is long beside the filter's is not what the plant did: after a gap of more than `1/lambda`, `lambda =
+//! (e_0/e_n)^(1/n)`, rows are left out until the filter has forgotten it, down to 1 % by the response of `1/(p + lambda)^n`: for n = 1 to 4
+//! after 4.6, 6.6, 8.4 and 10 times `1/lambda`.
 //!
 //! Cost: that of [`StateVariableFilter`]; where no reading is missing its values are the same, bit for bit.
 //!
-//! Reference: H. Garnier, L. Wang (eds.), Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 1 and 4, for filters
-//! over steps that differ.
+//! Reference: H. Garnier, L. Wang (eds.), Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 1 and 4, for
+//! filters over steps that differ.
 
 use crate::{Error, StateVariableFilter};
 
-/// What is left of a gap where it counts as forgotten.
+/// A gap is forgotten when its influence on the filter's states has decayed to this share.
 const FORGOTTEN: f64 = 0.01;
 
 /// Filters readings, NaN among them.
@@ -24,7 +24,7 @@ pub struct ReadingFilter {
     /// The longest line, and the filter's memory \[time\].
     longest: f64,
     memory: f64,
-    /// Since the last reading, and whether one was missing.
+    /// Time since the last reading, and whether a reading was missing.
     since: f64,
     missed: bool,
     /// Time for which rows are left out yet.
@@ -32,7 +32,7 @@ pub struct ReadingFilter {
 }
 
 impl ReadingFilter {
-    /// Of a filter of the output.
+    /// For a filter of the output.
     #[must_use]
     pub fn new(filter: StateVariableFilter) -> Self {
         let n = filter.order();
@@ -48,8 +48,8 @@ impl ReadingFilter {
         }
     }
 
-    /// Takes a reading, NaN where it is missing, `step` after the last row \[time\], and gives the filtered output and its derivatives there;
-    /// nothing where the reading is missing or the filter has not forgotten a long gap.
+    /// Takes a reading, NaN where it is missing, `step` after the last row \[time\], and gives the filtered output and its derivatives
+    /// there; nothing where the reading is missing or the filter has not forgotten a long gap.
     ///
     /// # Errors
     /// As of [`StateVariableFilter::update`].
@@ -134,7 +134,7 @@ mod tests {
         }
     }
 
-    /// Behind a gap of 6 at a bandwidth of 0.3: rows come again after 6.64/0.3 = 22.1.
+    /// After a gap of 6 at a bandwidth of 0.3, rows are used again after 6.64/0.3 = 22.1.
     #[test]
     fn rows_behind_a_long_gap_are_left_out() {
         let mut readings = ReadingFilter::new(filter(2, 0.3));

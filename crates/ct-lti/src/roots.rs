@@ -44,7 +44,7 @@ impl Polynomial {
         crate::error::finite("a polynomial", self.coefficients())?;
         if self.is_zero() {
             return Err(Error::ZeroPolynomial {
-                what: "the polynomial whose roots are asked for",
+                what: "the polynomial whose roots are wanted",
             });
         }
         let zeros = self
@@ -120,7 +120,7 @@ fn fma_difference(a: f64, b: f64, c: f64, d: f64) -> f64 {
     libm::fma(a, b, -cd) + error
 }
 
-/// `a/b`, also where the square of b leaves the range of `f64`.
+/// `a/b`, also if the square of b overflows.
 fn ratio(a: Complex64, b: Complex64) -> Complex64 {
     let size = b.re.abs().max(b.im.abs());
     (a / size) / (b / size)
@@ -148,7 +148,7 @@ impl Double {
         Self::sum(sum.high, sum.low + self.low)
     }
 
-    /// `a + b` and what rounding takes from it (Knuth).
+    /// `a + b` and its rounding error (Knuth).
     fn sum(a: f64, b: f64) -> Self {
         let high = a + b;
         let b_part = high - a;
@@ -221,12 +221,12 @@ fn aberth(c: &[f64]) -> Result<Vec<Complex64>, Error> {
             iterations: ITERATIONS,
         });
     }
-    // Then on with twice the digits. Steps may go on in the last digit of z for ever; more than these are never needed.
+    // Then continue with twice the digits. Steps may alternate in the last digit of z for ever; this number of steps is always enough.
     settle(true, 30);
     Ok(conjugate(roots))
 }
 
-/// One step of one root; whether it is worth another.
+/// One iteration of one root; returns whether another iteration is worthwhile.
 fn improve(c: &[f64], roots: &mut [Complex64], i: usize, fine: bool) -> bool {
     let z = roots[i];
     let Some(step) = newton(c, z, fine) else {
@@ -237,7 +237,7 @@ fn improve(c: &[f64], roots: &mut [Complex64], i: usize, fine: bool) -> bool {
     let repulsion: Complex64 = others.map(|other| ratio(one, z - other)).sum();
     let mut change = step / (one - step * repulsion);
     if !(change.re.is_finite() && change.im.is_finite()) {
-        // P'(z) = 0, or the denominator: leave the spot, by a step that has no symmetry.
+        // P'(z) = 0, or the denominator is 0: move away by a step without symmetry.
         change = z * Complex64::new(3e-3, 7e-3) + Complex64::new(1e-300, 0.0);
     }
     roots[i] = z - change;
@@ -263,7 +263,7 @@ fn starts(c: &[f64]) -> Vec<Complex64> {
         let count = pair[1] - pair[0];
         let radius = libm::exp((logs[pair[0]] - logs[pair[1]]) / count as f64);
         for j in 0..count {
-            // The offset keeps the starts off the real axis, where the iteration would stay.
+            // The offset keeps the starts off the real axis, because iterates on the axis stay on it.
             let angle = TAU * (j as f64 / count as f64 + k as f64 / c.len() as f64) + 0.7;
             starts.push(Complex64::from_polar(radius, angle));
         }
@@ -271,10 +271,10 @@ fn starts(c: &[f64]) -> Vec<Complex64> {
     starts
 }
 
-/// Each root beside the one that is nearest to its conjugate, itself included: real, or a pair.
+/// Pairs each root with the root nearest to its conjugate. A root that is paired with itself is real.
 fn conjugate(mut open: Vec<Complex64>) -> Vec<Complex64> {
     let mut roots = Vec::with_capacity(open.len());
-    // Those farthest from the axis first: they cannot be mistaken for real ones.
+    // Roots with the largest imaginary part first: they cannot be mistaken for real ones.
     open.sort_by(|a, b| a.im.abs().total_cmp(&b.im.abs()));
     while let Some(z) = open.pop() {
         let partner = (0..open.len())

@@ -19,14 +19,14 @@ pub(crate) const OUT_OF_RANGE: Error = Error::Overflow {
 /// Steps of different length that are remembered.
 const REMEMBERED: usize = 4;
 
-/// `x+ = Phi x + g0 u[k] + g1 u[k+1]` over one step: a system as it looks at its samples.
+/// `x+ = Phi x + g0 u[k] + g1 u[k+1]` over one step: the sampled system.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sampled {
     /// Phi, row by row, n*n entries.
     pub phi: Vec<f64>,
     /// Effect of the input at the start of the step, n entries.
     pub g0: Vec<f64>,
-    /// Effect of the input at its end, n entries; all 0 under [`Hold::Zero`].
+    /// Effect of the input at the end of the step, n entries; all 0 for [`Hold::Zero`].
     pub g1: Vec<f64>,
     /// Length of the step \[time\].
     pub step: f64,
@@ -95,7 +95,7 @@ pub(crate) struct Sampler {
     b: Vec<f64>,
     hold: Hold,
     remembered: [Sampled; REMEMBERED],
-    /// Which is overwritten next.
+    /// Index of the entry that is overwritten next.
     oldest: usize,
     /// The state being computed; between steps the one before the last step.
     next_state: Vec<f64>,
@@ -145,7 +145,7 @@ impl Sampler {
         Ok(())
     }
 
-    /// Takes the last step back, once.
+    /// Undoes the last step, once.
     pub(crate) fn undo(&mut self, x: &mut [f64]) {
         x.swap_with_slice(&mut self.next_state);
     }
@@ -177,7 +177,7 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// With all states at 0 and no sample seen.
+    /// Starts with all states at 0 and no sample.
     pub fn new(system: StateSpace, hold: Hold) -> Self {
         Self {
             sampler: Sampler::new(system.a(), system.b(), hold),

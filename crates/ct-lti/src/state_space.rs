@@ -18,7 +18,7 @@ pub struct StateSpace {
 }
 
 impl StateSpace {
-    /// From A, row by row, b, c and d. b says how many states there are.
+    /// From A, row by row, b, c and d. The length of b is the number of states.
     ///
     /// # Errors
     /// [`Error::Length`], [`Error::NotFinite`].
@@ -134,7 +134,7 @@ impl StateSpace {
         Self::connected(a, b.collect(), c.collect(), next.d * self.d)
     }
 
-    /// One input drives both, the outputs are added; states are those of self, then those of other.
+    /// Parallel connection: one input drives both systems, and the outputs are added. The states of self come first, then those of other.
     ///
     /// # Errors
     /// [`Error::Overflow`].
@@ -161,7 +161,7 @@ impl StateSpace {
         let (e, y) = (join(-k * back.d, -k), join(k, -k * self.d));
         let mut a = self.beside(back);
         for i in 0..order {
-            // What drives state i: e for those of self, y for those of back.
+            // Input of state i: e for the states of self, y for the states of back.
             let (gain, drive) = if i < n {
                 (self.b[i], &e)
             } else {
@@ -214,7 +214,7 @@ impl StateSpace {
             functions.phi12(&self.b, &mut phi1, &mut phi2);
             let y = t * dot(&self.c, &phi1) + self.d;
             let what = "a step response";
-            let mend = "the system is unstable: ask for earlier times";
+            let mend = "the system is unstable: choose earlier times";
             if y.is_finite() {
                 Ok(y)
             } else {

@@ -1,22 +1,22 @@
-//! State variable filters: a signal and its derivatives, filtered alike, without differentiating anything.
+//! State variable filters: a filtered signal and its derivatives, without numerical differentiation.
 //!
 //! Model: with a Hurwitz polynomial E of degree n, `x_f = E(0)/E(p) x`, and `p^i x_f` for i = 0 to n. For
 //! `E = (p + lambda)^n` this is the filter `lambda^n/(p + lambda)^n`.
 //!
 //! Why: a model `A(p) y = B(p) u` holds for the filtered signals as it does for the signals themselves, `A y_f = B u_f`,
-//! if both go through the same E (Baysse, Carrillo, Habbadi, (22), (23) for order one). The derivatives of y_f and u_f
-//! are at hand where those of y and u are not.
+//! if both go through the same E (Baysse, Carrillo, Habbadi, (22), (23) for order one). The derivatives of y_f and u_f are available,
+//! while those of y and u are not.
 //!
 //! Equations: states `z[i] = p^i x_f` for i < n in controllable canonical form, and the highest derivative from the
 //! filter's own equation, `p^n x_f = (E(0) (x - z[0]) - sum_{i >= 1} e[i] z[i])/e[n]`.
 //!
 //! Accuracy: sampled exactly under the hold, so exact for a signal that is held or runs on lines. For a measured,
 //! smooth one use [`Hold::First`]: the error is that of the line between samples and falls with the square of the
-//! step. **Use the same E for all signals of a regression, but for each the hold it has.** A held input taken for a line,
-//! or the other way round, shifts it by half a step.
+//! step. **Use the same E for all signals of a regression, but for each the hold it has.** A held input that is treated as linear, or the
+//! reverse, is shifted by half a step.
 //!
-//! Choice of lambda: 2 to 10 times the bandwidth of what is identified; lower forgets the fast dynamics, higher lets
-//! noise through, by `lambda^i` in the i-th derivative.
+//! Choice of lambda: 2 to 10 times the bandwidth of what is identified; a lower value suppresses the fast dynamics, a
+//! higher one passes noise, by `lambda^i` in the i-th derivative.
 //!
 //! Cost: n^2 products a sample, 20 to 30 ns for n = 2 to 6; a new step 0.6 to 3 us. Nothing is allocated after
 //! construction.
@@ -83,7 +83,7 @@ impl StateVariableFilter {
         }
         let dc = Polynomial::from(denominator.coefficient(0));
         let system = StateSpace::controllable(&TransferFunction::new(dc, denominator.clone())?)?;
-        // The gain goes to the input, so that the states are the derivatives themselves.
+        // The gain is applied to the input, so that the states are the derivatives themselves.
         let gain = denominator.coefficient(0) / denominator.leading();
         let b: Vec<f64> = system.b().iter().map(|b| b * gain).collect();
         Ok(Self {
@@ -110,7 +110,7 @@ impl StateVariableFilter {
         Self::new(&factor.pow(order), hold)
     }
 
-    /// The same, with this past before its first sample.
+    /// The same filter with the given past before its first sample.
     #[must_use]
     pub fn starting(mut self, start: Start) -> Self {
         self.start = start;

@@ -1,6 +1,6 @@
 //! Transfer functions `G = B/A` of one input and one output, proper.
 //!
-//! Nothing is cancelled: a series connection keeps a pole and a zero in the same place, as the two parts do.
+//! Common poles and zeros are not cancelled in a series connection.
 
 use alloc::vec::Vec;
 
@@ -65,7 +65,7 @@ impl TransferFunction {
         self.denominator.degree().unwrap_or(0)
     }
 
-    /// Gain at infinite frequency: what of a jump of the input reaches the output at once.
+    /// Gain at infinite frequency: the share of a step of the input that appears at the output at once.
     pub fn direct_term(&self) -> f64 {
         self.numerator.coefficient(self.order()) / self.denominator.leading()
     }

@@ -45,14 +45,14 @@ pub enum Function {
     Atan2,
     Min,
     Max,
-    /// `play(x, b)`: a play of half-width `b`; what it gives follows `x` from row to row at a distance of at most `b`.
+    /// `play(x, b)`: backlash of half-width `b`; the result follows `x` from row to row at a distance of at most `b`.
     Play,
     /// `quantise(x, d)`: the multiple of `d` that is nearest to `x`; `x` itself where `d` is zero.
     Quantise,
 }
 
 impl Function {
-    /// All functions.
+    /// List of all functions.
     pub const ALL: [Self; 15] = [
         Self::Abs,
         Self::Sign,
@@ -71,7 +71,7 @@ impl Function {
         Self::Quantise,
     ];
 
-    /// Its name in a text.
+    /// Name of the function in a model text.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -93,7 +93,7 @@ impl Function {
         }
     }
 
-    /// How many arguments it takes.
+    /// Number of arguments of the function.
     #[must_use]
     pub fn arguments(self) -> usize {
         match self {
@@ -103,7 +103,7 @@ impl Function {
     }
 }
 
-/// How two numbers compare.
+/// Comparison of two numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Comparison {
     /// `a < b`.
@@ -120,7 +120,7 @@ pub enum Comparison {
     NotEqual,
 }
 
-/// Something that is true or false.
+/// A Boolean expression.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Condition {
     /// `true` or `false`.
@@ -135,10 +135,10 @@ pub enum Condition {
     Or(Box<Condition>, Box<Condition>),
 }
 
-/// A number that is computed.
+/// A numeric expression.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Expression {
-    /// A number that stands in the text, zero or above.
+    /// A constant in the text, zero or above.
     Number(f64),
     /// The time since the record began, in the unit of its time.
     Time,
@@ -146,18 +146,18 @@ pub enum Expression {
     Variable(Variable),
     /// `-a`.
     Negative(Box<Expression>),
-    /// Two numbers joined.
+    /// Two operands with an operator.
     Binary(Operator, Box<Expression>, Box<Expression>),
     /// A function of its arguments.
     Call(Function, Vec<Expression>),
     /// `if c then a else b`.
     If(Box<Condition>, Box<Expression>, Box<Expression>),
-    /// The expression so long ago \[time\]; before the record it was as at its beginning.
+    /// The expression with a dead time \[time\]; before the record it has its initial value.
     Delay(Box<Expression>, Box<Expression>),
 }
 
 impl Expression {
-    /// Shows every variable, each as often as it stands.
+    /// Calls `each` for every occurrence of a variable.
     pub fn each_variable(&self, each: &mut impl FnMut(Variable)) {
         match self {
             Self::Number(_) | Self::Time => {}
@@ -188,7 +188,7 @@ impl Expression {
             }
     }
 
-    /// The same with other expressions in the place of variables.
+    /// The expression with other expressions substituted for its variables.
     #[must_use]
     pub fn with(&self, of: &impl Fn(Variable) -> Self) -> Self {
         let part = |a: &Self| Box::new(a.with(of));
@@ -205,7 +205,7 @@ impl Expression {
         }
     }
 
-    /// The value where variables have these values; a delay and a play give what goes into them.
+    /// The value for these values of the variables; a delay and a backlash return their input.
     #[must_use]
     pub fn value(&self, time: f64, of: &impl Fn(Variable) -> f64) -> f64 {
         match self {
@@ -228,7 +228,7 @@ impl Expression {
                 let a = argument(0);
                 match function {
                     Function::Abs => a.abs(),
-                    // Of zero it is zero, as Modelica has it.
+                    // The sign of zero is zero, as in Modelica.
                     Function::Sign if a == 0.0 => 0.0,
                     Function::Sign => a.signum(),
                     Function::Sqrt => a.sqrt(),
@@ -309,7 +309,7 @@ impl Condition {
         }
     }
 
-    /// Whether it holds where variables have these values.
+    /// Whether the condition is true for these values of the variables.
     #[must_use]
     pub fn holds(&self, time: f64, of: &impl Fn(Variable) -> f64) -> bool {
         match self {

@@ -1,4 +1,4 @@
-//! Lumped models in continuous time as text: what engineers already write their physics in, a flat subset of Modelica.
+//! Lumped models in continuous time as text, in a flat subset of Modelica, the language in which engineers already write physical models.
 //!
 //! ```
 //! use ct_model::ModelSpec;
@@ -30,20 +30,21 @@
 //! ```
 //!
 //! # The subset
-//! - One `model`: declarations of `Real` variables, then equations. No `connect`, no inheritance, no arrays, no acausal equations: every state
-//!   has one equation `der(x) = e` or `c*der(x) = e`, every other variable one assignment, in its declaration or under `equation`, in any
-//!   order. A circle of assignments is refused with its names.
+//! - One `model`: declarations of `Real` variables, then equations. No `connect`, no inheritance, no arrays, no acausal equations: every
+//!   state has one equation `der(x) = e` or `c*der(x) = e`, every other variable one assignment, in its declaration or under `equation`, in
+//!   any order. A circle of assignments is refused with its names.
 //! - `parameter` is fitted, and its value is where a fit starts; `final parameter` and `constant` are not fitted. A `final parameter` that
-//!   others define follows them. `min` and `max` bound the fit. `start` of a state is where its initial value starts; `fixed=true`: it is known.
-//! - `+ - * / ^`, comparison, `and or not`, `if then elseif else`, the functions of [`Function`], `time`, `delay(x, d)`. `noEvent` and `smooth`
-//!   are read and mean nothing more.
+//!   others define follows them. `min` and `max` bound the fit. `start` of a state is where its initial value starts; `fixed=true`: it is
+//!   known.
+//! - `+ - * / ^`, comparison, `and or not`, `if then elseif else`, the functions of [`Function`], `time`, `delay(x, d)`. `noEvent` and
+//!   `smooth` are read and mean nothing more.
 //! - Everything else is refused ([`TextError`]). An unknown name is an error, never zero.
 //!
-//! [`ModelSpec`] prints as text that reads back as the same model ([`ModelSpec::parse`]). [`unit_warnings`] says where units do not fit together,
-//! [`unknown_units`] which are none.
+//! [`ModelSpec`] prints as text that reads back as the same model ([`ModelSpec::parse`]). [`unit_warnings`] says where units do not fit
+//! together, [`unknown_units`] which are none.
 //!
-//! **Reference**: Modelica Association, Modelica - A Unified Object-Oriented Language for Systems Modeling, Language Specification 3.6, 2023:
-//! appendix A for the grammar of expressions.
+//! **Reference**: Modelica Association, Modelica - A Unified Object-Oriented Language for Systems Modeling, Language Specification 3.6,
+//! 2023: appendix A for the grammar of expressions.
 
 pub mod effects;
 mod expression;

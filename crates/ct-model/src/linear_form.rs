@@ -27,7 +27,7 @@ pub struct LinearForm {
     pub d: Vec<Vec<f64>>,
     /// Slope of each state where states and inputs are zero, `e`.
     pub state_offset: Vec<f64>,
-    /// Each output where states and inputs are zero, `f`.
+    /// Value of each output when states and inputs are zero, `f`.
     pub output_offset: Vec<f64>,
 }
 
@@ -99,9 +99,9 @@ impl Model {
 }
 
 impl Model {
-    /// The matrices of the model about a point, by exact derivatives; `state_offset` is the slope of each state there, `output_offset` each output
-    /// there, so that `d(x - x0)/dt = A (x - x0) + B (u - u0) + state_offset`. Branches are those that hold there; plays stand where they are. `None`
-    /// where the model delays something, or has no finite value or slope there.
+    /// The matrices of the model about a point, by exact derivatives; `state_offset` is the slope of each state there, `output_offset` each
+    /// output there, so that `d(x - x0)/dt = A (x - x0) + B (u - u0) + state_offset`. Branches are those that hold there; plays stand where
+    /// they are. `None` where the model delays something, or has no finite value or slope there.
     ///
     /// `parameters`, `states` and `inputs` in the order of the text, each in its unit; `time` in the model's unit.
     ///
@@ -122,7 +122,7 @@ impl Model {
         if !tape.delays.is_empty() {
             return None;
         }
-        // One direction at a time: the derivatives by the state or the input at this position.
+        // One direction at a time: the derivatives with respect to the state or the input at this position.
         let column = |moved: Option<Register>| -> (Vec<Dual<1>>, Vec<Dual<1>>) {
             let parameters: Vec<_> = parameters.iter().map(|p| Dual::constant(*p)).collect();
             let mut registers = tape.registers(&parameters);
@@ -174,7 +174,7 @@ impl LinearForm {
         entries.all(|v| v.is_finite()) && offsets.all(|v| v.is_finite())
     }
 
-    /// From one input to one output, both counted from zero; all other inputs stand still.
+    /// From one input to one output, both counted from zero; all other inputs are constant.
     ///
     /// # Panics
     /// Where there is no such input or output.

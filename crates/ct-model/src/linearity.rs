@@ -3,7 +3,7 @@
 use crate::expression::{Expression, Function, Operator, Variable};
 use crate::spec::ModelSpec;
 
-/// Whether a model is linear in states and inputs, whatever its parameters are.
+/// Whether a model is linear in states and inputs for all values of its parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Linearity {
     /// Every equation is a sum of constants times states and inputs, and a constant.
@@ -15,7 +15,7 @@ pub enum Linearity {
     },
 }
 
-/// How something depends on states, inputs and time.
+/// How an expression depends on states, inputs and time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Degree {
     /// Parameters alone.
@@ -25,7 +25,7 @@ enum Degree {
 }
 
 impl ModelSpec {
-    /// Whether the model is linear, so that it can be simulated exactly. What changes with time by itself, other than by a delay, is not.
+    /// Whether the model is linear, so that it can be simulated exactly. An explicit function of time other than a delay is not linear.
     #[must_use]
     pub fn linearity(&self) -> Linearity {
         let mut flows = vec![Degree::Constant; self.flows.len()];
@@ -34,7 +34,7 @@ impl ModelSpec {
             flows[i] = degree(&self.flows[i].value, &flows);
             if flows[i] == Degree::Other {
                 equations.push(Variable::Flow(i));
-                // What uses it is no less linear for it: only the first place is named.
+                // Expressions that use this flow still count as linear: only the first nonlinear place is reported.
                 flows[i] = Degree::Linear;
             }
         }
@@ -56,16 +56,16 @@ impl ModelSpec {
 /// Whether the states can be computed exactly from row to row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ExactSteps {
-    /// Not linear, or they change with time.
+    /// Not linear, or time-varying.
     No,
-    /// A constant matrix, and any function of the inputs: linear where these are held.
+    /// A constant matrix, and any function of the inputs: linear while the inputs are held.
     HeldInputs,
     /// Linear in the inputs too.
     AllInputs,
 }
 
 impl ModelSpec {
-    /// Whether and when that is so; how outputs depend on them does not matter.
+    /// Condition for linearity of the state equations; the outputs may be nonlinear.
     pub(crate) fn exact_steps(&self) -> ExactSteps {
         let mut flows = vec![Part::Parameters; self.flows.len()];
         for &i in &self.order {
@@ -100,13 +100,13 @@ impl ModelSpec {
     }
 }
 
-/// What a part of an equation is made of, with inputs that are held.
+/// Variables that a part of an equation depends on, with inputs held constant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Part {
     Parameters,
     /// Inputs and parameters.
     Inputs,
-    /// Linear in states, with parameters as coefficients, and any function of inputs beside.
+    /// Linear in states, with parameters as coefficients, plus any function of inputs.
     States,
     Other,
 }
@@ -146,7 +146,7 @@ fn part(expression: &Expression, flows: &[Part]) -> Part {
             match worst {
                 _ if timed => Other,
                 Parameters => branches,
-                // A branch that inputs choose changes the matrix where it holds states.
+                // If inputs choose the branch, the matrix depends on inputs where the branches contain states.
                 Inputs => of_inputs(branches.max(Inputs)),
                 States | Other => Other,
             }
@@ -175,7 +175,7 @@ fn degree(expression: &Expression, flows: &[Degree]) -> Degree {
                 _ => constant_or_other(a.max(b)),
             }
         }
-        // It remembers, whatever goes into it.
+        // The function has memory, whatever its arguments are.
         Expression::Call(Function::Play, _) => Other,
         Expression::Call(_, arguments) => {
             constant_or_other(arguments.iter().map(of).max().unwrap_or(Constant))

@@ -2,8 +2,8 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What the simulator needs of a number. Comparisons are made on [`Scalar::value`], so a branch is
-/// taken by the value alone and the derivative follows the branch.
+/// Number type of the simulator. Comparisons use [`Scalar::value`]: the value alone selects a branch, and the derivative is that of the
+/// selected branch.
 pub trait Scalar:
     Copy
     + Send
@@ -36,7 +36,7 @@ pub trait Scalar:
     fn sin_cos(self) -> (Self, Self);
     /// Whether both have the same derivatives.
     fn same_derivatives(self, other: Self) -> bool;
-    /// A number of that value which hangs on others, given its partial derivatives by them.
+    /// A number with this value that depends on others, given its partial derivatives with respect to them.
     fn with_slopes<const K: usize>(value: f64, of: [(Self, f64); K]) -> Self;
 
     /// The smaller of two by value; the first where they are equal.
@@ -102,7 +102,7 @@ impl Scalar for f64 {
 pub struct Dual<const N: usize> {
     /// The value.
     pub re: f64,
-    /// Its derivatives with respect to `N` chosen parameters.
+    /// Derivatives with respect to `N` chosen parameters.
     pub eps: [f64; N],
 }
 
@@ -176,7 +176,7 @@ impl<const N: usize> Scalar for Dual<N> {
     }
 }
 
-/// The operators are written as one pass that builds the result in place: by-value edits of a copy cost a `memcpy` each.
+/// The operators build the result in one pass: modifying a copy by value would cost a `memcpy` each.
 macro_rules! operator {
     ($trait:ident, $method:ident, |$a:ident, $b:ident| $re:expr, |$i:ident| $eps:expr) => {
         #[allow(

@@ -1,15 +1,15 @@
-//! What a model is: its variables, what defines them, and what is known of them.
+//! Specification of a model: its variables, their definitions and their attributes.
 
 use crate::expression::{Expression, Variable};
 
-/// What every variable has.
+/// Attributes of every variable.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct About {
-    /// Its name.
+    /// Name of the variable.
     pub name: String,
-    /// Its unit as it is written, `W/K`; empty where the text gives none.
+    /// Unit as written, `W/K`; empty if the text gives none.
     pub unit: String,
-    /// What it is, in a few words.
+    /// Description of the variable in a few words.
     pub description: String,
     /// Smallest value; minus infinity where the text gives none.
     pub min: f64,
@@ -17,14 +17,14 @@ pub struct About {
     pub max: f64,
 }
 
-/// How a parameter is given.
+/// Source of a parameter's value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Given {
-    /// It is fitted, and its value is where a fit starts.
+    /// The parameter is fitted, and its value is the start of a fit.
     Fitted,
-    /// It is measured (`final parameter`).
+    /// The value is measured (`final parameter`).
     Measured,
-    /// It is a constant of nature, or of the construction (`constant`).
+    /// The value is a constant of nature or of the construction (`constant`).
     Constant,
 }
 
@@ -33,11 +33,11 @@ pub enum Given {
 pub struct Parameter {
     /// Name, unit, bounds.
     pub about: About,
-    /// Its value \[`about.unit`\].
+    /// Value \[`about.unit`\].
     pub value: f64,
-    /// How the text computes the value from parameters above it; `None` where it is a number.
+    /// Formula of the value in terms of earlier parameters; `None` for a number.
     pub definition: Option<Expression>,
-    /// Whether it is fitted.
+    /// Whether the parameter is fitted.
     pub given: Given,
 }
 
@@ -53,11 +53,11 @@ pub struct Input {
 pub struct State {
     /// Name, unit, bounds.
     pub about: About,
-    /// What multiplies the derivative; `None` where it stands alone.
+    /// Coefficient of the derivative; `None` if the derivative has no coefficient.
     pub coefficient: Option<Expression>,
     /// The other side of the equation.
     pub right: Expression,
-    /// Where its initial value starts, of parameters alone; or its value at the first row as an `initial equation` gives it
+    /// Start of the initial value, in terms of parameters alone; or the value at the first row from an `initial equation`
     /// ([`ModelSpec::is_settled`]).
     pub start: Expression,
     /// The initial value is known, and not fitted.
@@ -69,9 +69,9 @@ pub struct State {
 pub struct Flow {
     /// Name, unit, bounds.
     pub about: About,
-    /// What it is equal to.
+    /// Right-hand side.
     pub value: Expression,
-    /// A parameter that others define (`final parameter b = 2*a`): it does not change with time.
+    /// A parameter that depends on other parameters (`final parameter b = 2*a`): it does not change with time.
     pub of_parameters: bool,
 }
 
@@ -82,14 +82,14 @@ pub struct Output {
     pub variable: Variable,
 }
 
-/// A model.
+/// A model. Expressions refer to variables by their position here.
 ///
 /// Every expression holds variables by their position here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
-    /// Its name.
+    /// Name of the model.
     pub name: String,
-    /// What it is, in a few words.
+    /// Description of the model in a few words.
     pub description: String,
     /// Parameters in the order of the text.
     pub parameters: Vec<Parameter>,
@@ -106,7 +106,7 @@ pub struct ModelSpec {
 }
 
 impl ModelSpec {
-    /// What is known of a variable.
+    /// Attributes of a variable.
     ///
     /// # Panics
     /// For a variable of another model.
@@ -162,7 +162,7 @@ impl ModelSpec {
         settled
     }
 
-    /// Every expression that defines something as time goes on: flows, then coefficients and right-hand sides of the states.
+    /// All expressions that are evaluated over time: flows, then coefficients and right-hand sides of the states.
     pub fn expressions(&self) -> impl Iterator<Item = &Expression> {
         let flows = self.flows.iter().map(|flow| &flow.value);
         let states = self

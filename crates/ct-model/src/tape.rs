@@ -1,4 +1,4 @@
-//! A model compiled into a list of operations on numbers, which is what simulates.
+//! A model compiled into a list of operations on numbers, which the simulation runs.
 //!
 //! Every subexpression is one operation, the same one is computed once, and what parameters alone define is computed once per simulation.
 //!
@@ -15,7 +15,7 @@ pub(crate) use self::guard::Guard;
 use self::operation::{Operation, run};
 use crate::scalar::Scalar;
 
-/// Where a number stands.
+/// Index of a value in the registers.
 pub(crate) type Register = usize;
 
 /// The operations of a model.
@@ -28,64 +28,64 @@ pub(crate) struct Tape {
     pub states: usize,
     constants: Vec<f64>,
     operations: Vec<Operation>,
-    /// So many of the first operations need parameters alone.
+    /// Number of operations at the beginning that depend on parameters alone.
     once: usize,
     branches: Vec<Branch>,
     pub guards: Vec<Guard>,
     /// The derivative of each state.
     pub derivatives: Vec<Register>,
-    /// Each output.
+    /// Register of each output.
     pub outputs: Vec<Register>,
     /// The initial value of each state as the text has it.
     pub starts: Vec<Register>,
-    /// What is delayed, and by how much.
+    /// Delayed signals and their dead times.
     pub delays: Vec<(Register, Register)>,
     pub plays: Vec<Play>,
     /// States whose initial value is that of their start at the first row.
     pub settled: Vec<usize>,
-    /// Something reads the time.
+    /// Whether an operation reads the time.
     pub reads_time: bool,
-    /// What guards read.
+    /// Registers that guards read.
     read_by_guards: Vec<Register>,
     /// Registers that are made of parameters and inputs alone.
     pub of_inputs: Vec<bool>,
-    /// What anything reads.
+    /// Registers that any operation reads.
     read_by_all: Vec<Register>,
     first_delayed: Register,
     first_constant: Register,
     first_operation: Register,
 }
 
-/// A play: `min(max(held, x - b), x + b)`, where `held` is what it gave at the last row.
+/// A backlash: `min(max(held, x - b), x + b)`, where `held` is its output at the last row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Play {
-    /// What goes in.
+    /// Register of the delay's input.
     pub from: Register,
     pub held: Register,
-    /// What it gives.
+    /// Register of the delay's output.
     pub to: Register,
 }
 
-/// What a tape computes with.
+/// Registers of a tape, with their values.
 #[derive(Debug, Clone)]
 pub(crate) struct Registers<T> {
     pub values: Vec<T>,
-    /// The answers of the guards.
+    /// Answers of the guards.
     pub answers: Vec<bool>,
     taken: Vec<bool>,
-    /// The operations, and where their results go, that the taken branches leave: those that slopes need, ...
+    /// The operations on the selected branches, with the registers of their results: those that slopes need, ...
     slopes: Vec<(Operation, Register)>,
-    /// ... of these what moves where all inputs are held, ...
+    /// ... the operations whose results change although all inputs are held, ...
     moving: Vec<(Operation, Register)>,
-    /// ... what guards need beside the slopes, what outputs need beside both, and all.
+    /// ... the operations that guards need in addition to the slopes, those that outputs need in addition to both, and all.
     guards: Vec<(Operation, Register)>,
     outputs: Vec<(Operation, Register)>,
     all: Vec<(Operation, Register)>,
-    /// Numbers that have no derivatives: parameters, numbers of the text, and what is made of them.
+    /// Values without derivatives: parameters, constants of the text, and expressions of these.
     plain: Vec<bool>,
-    /// All inputs are held, and what is made of them and of parameters stands computed.
+    /// All inputs are held, and the results that depend on inputs and parameters only are computed.
     pub held: bool,
-    /// Roots, powers and logarithms that have no value are zero: beyond a branch that a step has to end at.
+    /// Roots, powers and logarithms of invalid arguments are zero: they occur only on a branch that ends the step.
     pub extended: bool,
 }
 
@@ -130,7 +130,7 @@ impl Tape {
         registers
     }
 
-    /// Which registers are read once everything has its place.
+    /// Finds which registers are read, after all operations have their final order.
     fn note_results(&mut self) {
         let guards = self.guards.iter().map(|guard| guard.difference);
         self.read_by_guards = guards.collect();
@@ -148,7 +148,7 @@ impl Tape {
         self.of_inputs = self.made_of(|register| register != 0 && !moving.contains(&register));
     }
 
-    /// Leaves out what only branches need that are not taken.
+    /// Removes operations that only unselected branches need.
     fn choose_operations<T: Scalar>(&self, registers: &mut Registers<T>) {
         let Registers {
             taken,
@@ -179,7 +179,7 @@ impl Tape {
         }
     }
 
-    /// The operations that results need, in order; what reads a choice reads the one that is chosen.
+    /// The operations that the results depend on, in order; an operation that reads a choice reads the selected register.
     fn needed(
         &self,
         results: &[Register],
@@ -224,14 +224,14 @@ impl Tape {
         into.reverse();
     }
 
-    /// Of each delay, whether what is delayed is made of inputs, parameters and the time alone.
+    /// For each delay, whether its signal depends on inputs, parameters and time alone.
     pub fn known_ahead(&self) -> Vec<bool> {
         let by_states = self.state(0)..self.first_constant;
         let known = self.made_of(|register| !by_states.contains(&register));
         self.delays.iter().map(|&(what, _)| known[what]).collect()
     }
 
-    /// Which registers are made of these alone, whatever branches are taken.
+    /// Registers that depend on these variables alone, for every choice of branches.
     fn made_of(&self, these: impl Fn(Register) -> bool) -> Vec<bool> {
         let mut made: Vec<bool> = (0..self.first_operation + self.operations.len())
             .map(these)
@@ -244,27 +244,27 @@ impl Tape {
         made
     }
 
-    /// Where inputs stand.
+    /// Register of an input.
     pub fn input(&self, i: usize) -> Register {
         1 + self.parameters + i
     }
 
-    /// Where states stand.
+    /// Register of a state.
     pub fn state(&self, i: usize) -> Register {
         1 + self.parameters + self.inputs + i
     }
 
-    /// Where delayed values stand.
+    /// Register of a delayed value.
     pub fn delayed(&self, i: usize) -> Register {
         self.first_delayed + i
     }
 
-    /// Computes everything from the time, inputs, states and delayed values, with the answers of the guards that the registers hold.
+    /// Computes all registers from the time, inputs, states and delayed values, with the stored answers of the guards.
     pub fn evaluate<T: Scalar>(&self, registers: &mut Registers<T>) {
         run(&registers.all, &mut registers.values, registers.extended);
     }
 
-    /// The same for the slopes of the states alone.
+    /// Evaluates the slopes of the states alone.
     pub fn evaluate_slopes<T: Scalar>(&self, registers: &mut Registers<T>) {
         let operations = if registers.held {
             &registers.moving
@@ -288,9 +288,9 @@ impl Tape {
         );
     }
 
-    /// The same, where every guard answers by its difference.
+    /// Evaluates the tape with the branch of every guard chosen by its present difference.
     pub fn evaluate_with_guards<T: Scalar>(&self, registers: &mut Registers<T>) {
-        // A guard may stand on what another one decides: after as many rounds as there are guards none changes any more.
+        // A guard may depend on the answer of another guard: after as many rounds as there are guards, no answer changes.
         for _ in 0..=self.guards.len() {
             self.evaluate(registers);
             let mut changed = false;
@@ -306,7 +306,7 @@ impl Tape {
         }
     }
 
-    /// Has the branches follow the answers.
+    /// Updates the branches after a change of answers.
     pub fn answers_changed<T: Scalar>(&self, registers: &mut Registers<T>) {
         let mut changed = false;
         for (branch, taken) in self.branches.iter().zip(&mut registers.taken) {
@@ -319,7 +319,7 @@ impl Tape {
         }
     }
 
-    /// Has the guards that stand on a difference answer for one of its sides.
+    /// Sets the answers of the guards on this difference to those for one sign.
     pub fn answer<T: Scalar>(
         &self,
         registers: &mut Registers<T>,
@@ -335,7 +335,7 @@ impl Tape {
         self.answers_changed(registers);
     }
 
-    /// The state that a difference is, less or from a number, and its sign.
+    /// If a difference is a state plus or minus a constant: the state and its sign.
     pub fn state_of(&self, difference: Register) -> Option<(usize, f64)> {
         let states = self.state(0)..self.state(self.states);
         let state = |register: Register| {
@@ -360,7 +360,7 @@ impl Tape {
         }
     }
 
-    /// Takes over the answers of other registers.
+    /// Copies the answers of the guards from other registers.
     pub fn copy_answers<T: Scalar, S>(&self, from: &Registers<S>, to: &mut Registers<T>) {
         to.answers.copy_from_slice(&from.answers);
         self.answers_changed(to);

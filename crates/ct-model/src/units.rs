@@ -1,7 +1,7 @@
 //! Where units do not fit together: dimensions through every expression.
 //!
-//! A number that stands in a text has any dimension in a sum and a comparison (`T + 273.15`), and none in a product. What has no unit, or one
-//! that is not understood, fits everything. Sizes are not compared: `kW` and `W` are both power.
+//! A number that stands in a text has any dimension in a sum and a comparison (`T + 273.15`), and none in a product. What has no unit, or
+//! one that is not understood, fits everything. Sizes are not compared: `kW` and `W` are both power.
 
 use ct_signals::{Dimension, Unit};
 
@@ -17,12 +17,12 @@ pub struct UnitWarning {
     pub what: String,
 }
 
-/// What is known of a dimension.
+/// Knowledge of a dimension.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Known {
-    /// A number: in a sum it takes that of the others.
+    /// A constant: in a sum it has the dimension of the other terms.
     Number,
-    /// No unit is given, or it is not understood.
+    /// No unit is given, or the unit is unknown.
     Open,
     Is(Dimension),
 }
@@ -30,7 +30,7 @@ enum Known {
 const NONE: Dimension = Dimension::NONE;
 const TIME: Dimension = Dimension::TIME;
 
-/// All places at which units do not fit together, in the order of the equations.
+/// All places with inconsistent units, in the order of the equations.
 #[must_use]
 pub fn unit_warnings(model: &ModelSpec) -> Vec<UnitWarning> {
     let mut walk = Walk {
@@ -94,7 +94,7 @@ fn quotient(a: Known, b: Known) -> Known {
     }
 }
 
-/// The dimension of a unit, as Modelica has it: in a column's head `F` and `C` are temperatures, here farad and coulomb.
+/// The dimension of a unit in Modelica: in a column's header `F` and `C` are temperatures, here they are farad and coulomb.
 fn declared(unit: &str) -> Known {
     let unit = match unit.trim() {
         "F" => "A.s/V",
@@ -105,7 +105,7 @@ fn declared(unit: &str) -> Known {
 }
 
 impl Walk<'_> {
-    /// Notes where two sides differ, and gives what they are together.
+    /// Records a warning if two sides differ, and returns their common dimension.
     fn compare(&mut self, (a, of_a): (&str, Known), (b, of_b): (&str, Known)) -> Known {
         match (of_a, of_b) {
             (Known::Is(own), Known::Is(other)) if own != other => {
@@ -129,7 +129,7 @@ impl Walk<'_> {
         self.compare((&a, of_a), (&b, of_b))
     }
 
-    /// Of the argument of a function that takes pure numbers, and angles.
+    /// Dimension of the argument of a function that takes pure numbers or angles.
     fn pure(&mut self, function: Function, argument: &Expression) {
         if let Known::Is(dimension) = self.dimension(argument)
             && dimension != NONE
@@ -184,7 +184,7 @@ impl Walk<'_> {
                     self.dimension(a);
                     Known::Is(NONE)
                 }
-                // Half a dimension has no name.
+                // A square root of a dimension without a name is not checked.
                 (Function::Sqrt, [a]) => match self.dimension(a) {
                     Known::Is(dimension) => dimension.root().map_or(Known::Open, Known::Is),
                     other => other,

@@ -1,4 +1,5 @@
-//! A million samples of three parameters: the time that the estimator takes, which `python/benches/overhead.py` compares with that of the Python package.
+//! A million samples of three parameters: the time that the estimator takes, which `python/benches/overhead.py` compares with that of the
+//! Python package.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! Prints after how many samples the textbook's covariance update dies, for the table in the crate's documentation.
+//! Prints the number of samples after which the textbook's covariance update fails, for the table in the crate's documentation.
 #![allow(missing_docs)]
 
 #[path = "../tests/all/support/mod.rs"]
@@ -12,7 +12,7 @@ use support::textbook::{Form, Textbook};
 const SEEDS: u64 = 20;
 const LIMIT: u32 = 200_000;
 
-/// When the textbook's update is lost.
+/// Number of updates until the textbook's update fails.
 fn textbook<const P: usize>(form: Form, lambda: f64, seed: u64) -> u32 {
     let mut rng = support::rng(seed);
     let theta: SVector<f64, P> = normals(&mut rng);

@@ -1,4 +1,4 @@
-//! A drifting tank with an inlet that stays closed for ten million samples: what each way to forget makes of it.
+//! A drifting tank with an inlet that stays closed for ten million samples: comparison of forgetting methods.
 #![allow(missing_docs)]
 
 #[path = "../tests/all/support/mod.rs"]

@@ -1,4 +1,4 @@
-//! Two blocks of parameters that share one output and know nothing of each other's uncertainty.
+//! Two blocks of parameters that share one output and have no covariance between them.
 //!
 //! Model: `y = theta1'phi1 + theta2'phi2`, with a `P` that has no entries between the blocks; [U] 4.11, 4.18:
 //! ```text
@@ -13,9 +13,9 @@
 //! theta_i+ = theta_i + P_i phi_i eps(0) int_0^h c_i e^{eta_i t} (eps(t)/eps(0))/d_i dt
 //! P_i+     as of one block
 //! ```
-//! The integrals have no closed form that keeps its digits; with `c = gamma` Gauss and Legendre's rule of 8 points in
-//! `ln(1 + (s_1 + s_2) b)` gives them to 7e-7 for `b s` up to 100, to 1e-12 below 0.1. To take one block after the other instead errs
-//! by a third where the step is stiff. For `gamma < c` the range is cut into pieces; for `gamma = 0` in both there is a closed form.
+//! The integrals have no closed form that keeps its digits; with `c = gamma` Gauss and Legendre's rule of 8 points in `ln(1 + (s_1 + s_2)
+//! b)` gives them to 7e-7 for `b s` up to 100, to 1e-12 below 0.1. Updating one block after the other instead has an error of a third if
+//! the step is stiff. For `gamma < c` the range is cut into pieces; for `gamma = 0` in both there is a closed form.
 //!
 //! Convergence: **not** that of one block. `V = sum delta_i'P_i^-1 delta_i` may grow for every `gamma > 0`; with `gamma = 0` and
 //! `eta = 0` in both it falls, `dV/dt = -2 c eps^2` for `c_1 = c_2`.
@@ -82,7 +82,7 @@ pub fn update_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
         .grown::<I, _>(&step2, outcome2, &mut second.state);
     let outcome = match (one, two) {
         (Outcome::Capped, _) | (_, Outcome::Capped) => Outcome::Capped,
-        // the second block may be silent for long, as where the model is right
+        // the second block may have no excitation for long, for example if the model is right
         (one, _) => one,
     };
     Innovation {
@@ -168,7 +168,7 @@ const POINTS: [(f64, f64); 4] = [
 /// Pieces of the range where the error does not decay as for least squares.
 const PIECES: u32 = 8;
 
-/// What multiplies `P_i phi_i eps(0)` over the step.
+/// Factor of `P_i phi_i eps(0)` over the step.
 fn shares(
     (w1, step1, s1): (&Weights, &Step, f64),
     (w2, step2, s2): (&Weights, &Step, f64),
@@ -218,7 +218,7 @@ fn shares(
     let (pieces, range) = if least_squares && same_memory {
         (1, whole)
     } else {
-        // the slower of two decays; beyond 45 nothing is left of it
+        // the slower of two decays; beyond 45 the result is zero
         let power = (c1 / w1.gamma()).min(c2 / w2.gamma());
         (PIECES, whole.min(4.0 + 45.0 / power))
     };

@@ -1,4 +1,4 @@
-//! Directional forgetting: what is known is only forgotten in the direction of the present regressor.
+//! Directional forgetting: information is only forgotten in the direction of the present regressor.
 //!
 //! Model: `y = theta' phi`, `eps = y - theta^' phi`, with the information `R = P^-1`:
 //! ```text
@@ -77,7 +77,7 @@ impl Memory for Directional {
         weights.gamma() * squared * cap < weights.eta()
     }
 
-    // its bound is that of the eigenvalues, which `weak` keeps
+    // the bound refers to the eigenvalues, which `weak` stores
     #[inline(always)]
     fn raised(bound: f64, _step: &Step, _intensity: &[f64]) -> f64 {
         bound

@@ -125,7 +125,7 @@ impl<I: FactoredIntegrator> DynamicRls<I> {
         Ok(self)
     }
 
-    /// Starts `P` again and keeps the estimates: after a jump of the parameters.
+    /// Starts `P` again and keeps the estimates: after a step change of the parameters.
     ///
     /// # Errors
     /// [`Error::Size`], [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`], [`Error::TraceAboveLimit`]; nothing is

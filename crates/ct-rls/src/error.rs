@@ -1,8 +1,8 @@
-//! What can be wrong with a setting or a run: each message carries the numbers that disagree and the mend.
+//! Errors of settings and runs: each message contains the numbers that disagree and the correction.
 
 use crate::Outcome;
 
-/// Everything this crate can refuse, and why a run has stopped.
+/// All errors of this crate, and the reasons why a run has stopped.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -61,9 +61,9 @@ pub enum Error {
         "P(0) is not positive definite: pivot {index} is {pivot} where the diagonal is {diagonal}; use a diagonal of 10 to 1000 times the squared size of each parameter"
     )]
     NotPositiveDefinite {
-        /// Which pivot of `P = U D U'`, from 0.
+        /// Index of the pivot of `P = U D U'`, from 0.
         index: usize,
-        /// Its value; it has to exceed the diagonal's rounding.
+        /// Value of the pivot; it has to exceed the rounding error of the diagonal.
         pivot: f64,
         /// The diagonal entry of `P(0)` in the same place.
         diagonal: f64,
@@ -71,7 +71,7 @@ pub enum Error {
     /// An entry of `theta(0)` is not finite.
     #[error("theta(0)[{index}] is {value}; take 0 where nothing is known")]
     Theta {
-        /// Which parameter, from 0.
+        /// Index of the parameter, from 0.
         index: usize,
         /// The value that was given.
         value: f64,
@@ -93,7 +93,7 @@ pub enum Error {
         guard: &'static str,
         /// The value that was given.
         value: f64,
-        /// What would do.
+        /// The allowed range.
         range: &'static str,
     },
     /// `P(0)` is above the cap on its own trace.
@@ -106,14 +106,14 @@ pub enum Error {
         /// The cap.
         limit: f64,
     },
-    /// `theta(0)`, `P(0)` and the regressor do not belong together (run-time sizes only).
+    /// `theta(0)`, `P(0)` and the regressor have different sizes (run-time sizes only).
     #[error(
         "{what} has {found} entries a side, but {expected} parameters are estimated; give it that size"
     )]
     Size {
-        /// What has the wrong size.
+        /// The quantity with the wrong size.
         what: &'static str,
-        /// Its size.
+        /// Actual size.
         found: usize,
         /// The number of parameters.
         expected: usize,
@@ -136,14 +136,14 @@ pub enum Error {
         /// The step, s.
         dt: f64,
     },
-    /// `P` lost its definiteness, to a step too long or to rounding. The estimates from before that step are kept.
+    /// `P` is no longer positive definite, because of a long step or of rounding. The estimates before the step are kept.
     #[error(
         "{integrator} stopped: pivot {index} of P became {pivot} over a step of {dt} s; use ExactHold, shorten the step, or lower P(0)"
     )]
     LostDefiniteness {
         /// Name of the integrator.
         integrator: &'static str,
-        /// Which pivot of `P = U D U'`, from 0.
+        /// Index of the pivot of `P = U D U'`, from 0.
         index: usize,
         /// Its value.
         pivot: f64,

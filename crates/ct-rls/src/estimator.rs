@@ -1,4 +1,4 @@
-//! What every recursive estimator offers.
+//! Interface of every recursive estimator.
 
 use crate::Error;
 
@@ -8,9 +8,9 @@ pub trait RecursiveEstimator {
     type Sample;
     /// The estimates.
     type Theta: ?Sized;
-    /// The matrix that stands for their covariance.
+    /// Type of the covariance matrix.
     type Covariance;
-    /// Why a run has stopped.
+    /// Reason why a run has stopped.
     type Error;
 
     /// Advances the estimates by `dt` seconds (above 0) over which `sample` is held.
@@ -25,27 +25,27 @@ pub trait RecursiveEstimator {
     /// The matrix `P`, symmetric.
     fn covariance(&self) -> Self::Covariance;
 
-    /// How the estimator fares. Costs an eigenvalue problem: call it now and then.
+    /// State of the estimator. The call solves an eigenvalue problem: use it only now and then.
     ///
     /// # Errors
     /// Why the run has stopped, where it has.
     fn health(&self) -> Result<Health, Self::Error>;
 }
 
-/// What one sample said.
+/// Result of one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Innovation {
     /// `eps = y - theta^' phi` before the update, unit of y.
     pub epsilon: f64,
-    /// `s = phi' P phi` before the update; times `gamma h` it says how much is learnt: above 1, much.
+    /// `s = phi' P phi` before the update; a value of `gamma h s` above 1 means a large update.
     pub s: f64,
-    /// What was done with the sample.
+    /// Whether and how the sample was used.
     pub outcome: Outcome,
 }
 
 impl Innovation {
-    /// The same where the sample was used; where it was refused, the refusal as an error, for `?`.
+    /// The innovation if the sample was used; the reason as an error if it was rejected, for `?`.
     ///
     /// # Errors
     /// [`Error::Refused`]; the estimates are as before the sample.
@@ -68,7 +68,7 @@ impl Innovation {
     }
 }
 
-/// What an update did.
+/// Outcome of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -80,14 +80,14 @@ pub enum Outcome {
     Capped,
     /// The regressor is silent: nothing was forgotten.
     Silent,
-    /// A signal is not finite, or beyond any sense: a regressor above 1e30, an output error above 1e100; or a step of
-    /// any rule but [`ExactHold`](crate::ExactHold) would, or might, lead beyond the floating-point range. Nothing was done.
+    /// A signal is not finite or too large: the regressor is above 1e30, an output error above 1e100; or a step of any rule but
+    /// [`ExactHold`](crate::ExactHold) would, or might, overflow. The sample was not used.
     NotFinite,
     /// `dt` is not above 0 and at most 1e30 s, or `eta dt` is above 300: nothing was done.
     BadStep,
     /// The regressor has a wrong length (run-time sizes only): nothing was done.
     BadSize,
-    /// The run has stopped; the health says why. Nothing was done.
+    /// The run has stopped; the health gives the reason. The sample was not used.
     Stopped,
 }
 
@@ -101,23 +101,23 @@ impl Outcome {
         match self {
             Self::Updated | Self::Capped | Self::Silent => "it was used",
             Self::NotFinite => {
-                "a signal is NaN, infinite or beyond any sense (a regressor above 1e30, an output error above 1e100); leave it out"
+                "a signal is NaN, infinite or too large (the regressor is above 1e30, an output error above 1e100); leave it out"
             }
             Self::BadStep => {
                 "its step must be above 0 and at most 1e30 s, with eta dt at most 300; check the clock"
             }
             Self::BadSize => "its regressor needs one entry for each parameter",
-            Self::Stopped => "the run has stopped before; health() says why",
+            Self::Stopped => "the estimator has stopped before; health() gives the reason",
         }
     }
 }
 
-/// How an estimator fares.
+/// Numerical state of an estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Health {
-    /// Smallest eigenvalue of the information matrix `P^-1`, unit of `1/theta^2`: what is known about the
-    /// combination of parameters that is known worst. It stays away from 0 while the excitation persists.
+    /// Smallest eigenvalue of the information matrix `P^-1`, unit of `1/theta^2`: the information on the least well determined combination
+    /// of parameters. With persistent excitation it stays above a positive bound.
     pub excitation: f64,
     /// Smallest pivot of `P = U D U'`, unit of `theta^2`: above 0 where `P` is positive definite.
     pub smallest_pivot: f64,

@@ -16,7 +16,7 @@ use crate::integrator::sealed::{Memory, Refusal, Rule};
 use crate::integrator::{Plain, take};
 use crate::settings::{MAX_EPSILON, Step, Weights};
 
-/// Euler's rule, on `P` as it stands. Stops where its step is too long.
+/// Euler's rule for the full matrix `P`. Stops if its step is too long.
 #[derive(Clone, Copy, Debug)]
 pub struct Euler;
 

@@ -97,7 +97,7 @@ pub(crate) fn information_norm(u: &[f64], d: &[f64], x: &mut [f64]) -> f64 {
 #[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((fours_a, rest_a), (fours_b, rest_b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
-    // adding it changes nothing, not even the sign of 0, so where there are no fours it costs nothing
+    // the addition does not change the result, not even the sign of 0, so the loop for groups of four can be skipped
     let mut sums = [-0.0; 4];
     for (a, b) in fours_a.iter().zip(fours_b) {
         for i in 0..4 {
@@ -135,7 +135,7 @@ pub(crate) fn absorb(u: &mut [f64], d: &mut [f64], f: &[f64], a: f64, growth: f6
         let lambda = -a * f[j] * inverse;
         let next = alpha + a * f[j] * g;
         inverse = 1.0 / next;
-        // no underflow to 0, which would make P singular for good
+        // avoids underflow to 0, which would make P singular permanently
         d[j] = (d[j] * growth * (alpha * inverse)).max(f64::MIN_POSITIVE);
         let column = &mut u[j * p..j * p + j];
         for i in 0..j {
@@ -148,7 +148,7 @@ pub(crate) fn absorb(u: &mut [f64], d: &mut [f64], f: &[f64], a: f64, growth: f6
     }
 }
 
-/// One exact step on `theta` and the factors; `None`, and nothing changed, where a number leaves the range.
+/// One exact step of `theta` and the factors; `None`, with no change, if a number overflows.
 #[inline(always)]
 pub(crate) fn exact_step(
     (u, d, theta): (&mut [f64], &mut [f64], &mut [f64]),
@@ -222,7 +222,7 @@ pub(crate) fn largest_eigenvalue(m: &mut [f64], p: usize) -> f64 {
 /// For estimators built on top of this crate's; a user reads [`covariance`](crate::RecursiveEstimator::covariance).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UdFactor<const P: usize> {
-    /// By columns; only the part above the diagonal counts.
+    /// Stored by columns; only the part above the diagonal is used.
     pub(crate) u: [[f64; P]; P],
     pub(crate) d: [f64; P],
 }

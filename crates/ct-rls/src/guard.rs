@@ -1,4 +1,4 @@
-//! What stands around every step, however `P` is kept: the guards, the counts, and why a run has stopped.
+//! Checks around every step for every representation of `P`: the guards, the counts, and the reason why a run has stopped.
 
 use crate::Error;
 use crate::estimator::{Health, Outcome};
@@ -8,7 +8,7 @@ use crate::settings::{Guards, MAX_PHI_SQUARED, Step, Weights};
 /// The start of the cap on the trace, times the trace of `P(0)`.
 const TRACE_LIMIT: f64 = 1e6;
 
-/// Everything around the step that does not depend on how `P` is kept: guards, counts, and why the run stopped.
+/// Parts of the step that are independent of the form of `P`: guards, counts, and the reason why the run stopped.
 #[derive(Clone, Debug)]
 pub(crate) struct Guard {
     pub guards: Guards,
@@ -25,7 +25,7 @@ pub(crate) struct Guard {
     silent: u64,
 }
 
-/// How often what happened.
+/// Counts of events.
 #[cfg(feature = "serde")]
 #[derive(Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Counts {
@@ -37,7 +37,7 @@ pub(crate) struct Counts {
 
 #[cfg(feature = "serde")]
 impl Guard {
-    /// The bound of the trace, and the counts. A factored `P` has no other state: its run does not stop.
+    /// The bound of the trace, and the counts. With a factored `P` there is no other state, because its run does not stop.
     pub fn saved(&self) -> (f64, Counts) {
         let counts = Counts {
             used: self.used,
@@ -50,7 +50,7 @@ impl Guard {
 
     /// The guards as they were saved.
     pub fn restored(guards: Guards, bound: f64, counts: Counts) -> Result<Self, Error> {
-        // The trace may be above the cap by rounding, and its bound is what counts.
+        // Rounding may put the trace above the cap, so the bound is used.
         let mut guard = Self::new(1.0)?;
         guard.set(guards, 0.0)?;
         let Counts {
@@ -116,7 +116,7 @@ impl Guard {
         outcome
     }
 
-    /// The step to make, or why there is none.
+    /// The step to make, or the reason why there is none.
     #[inline(always)]
     pub fn begin<M: Memory>(
         &mut self,

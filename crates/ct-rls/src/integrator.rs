@@ -1,4 +1,4 @@
-//! How `theta` and `P` are carried over a step, and what is forgotten over it.
+//! Integration of `theta` and `P` over a step, and forgetting during the step.
 
 use core::fmt::Debug;
 
@@ -13,7 +13,7 @@ impl Integrator for RandomWalk {}
 impl Integrator for Euler {}
 impl Integrator for Rk4 {}
 
-/// An integrator on the factors of `P`, which stay positive definite: [`ExactHold`], [`Directional`] or [`RandomWalk`].
+/// An integrator for the factors of `P`, which keep `P` positive definite: [`ExactHold`], [`Directional`] or [`RandomWalk`].
 pub trait FactoredIntegrator: Integrator + sealed::FactorRule {}
 
 impl FactoredIntegrator for ExactHold {}
@@ -29,7 +29,7 @@ pub(crate) mod sealed {
     use crate::settings::{Step, Weights};
     use crate::{Error, UdFactor};
 
-    /// What the cap on the trace needs.
+    /// Data that the cap on the trace needs.
     pub trait Capped {
         fn trace(&self) -> f64;
         fn scale(&mut self, factor: f64);
@@ -42,9 +42,9 @@ pub(crate) mod sealed {
         fn set_intensity(&mut self, _q: &[f64]) {}
     }
 
-    /// What the guards have to know of a rule.
+    /// Properties of an integration rule that the guards need.
     pub trait Memory {
-        /// Whether a step may raise the trace of `P` above the bound that was known of it.
+        /// Whether a step may raise the trace of `P` above its known bound.
         #[cfg(feature = "serde")]
         const RAISES: bool = true;
         /// Whether the parameters walk at random.
@@ -64,7 +64,7 @@ pub(crate) mod sealed {
         }
     }
 
-    /// `P` in the form that a rule keeps it in.
+    /// `P` in the form that a rule uses.
     pub trait Covariance<const P: usize>: Capped + Clone + Debug {
         fn from_matrix(matrix: &SMatrix<f64, P, P>) -> Result<Self, Error>;
         /// Another `P`, all else as it is.
@@ -80,7 +80,7 @@ pub(crate) mod sealed {
         fn root(&self) -> Result<SMatrix<f64, P, P>, Error>;
     }
 
-    /// Why a step was not made; the state is as before.
+    /// Reason why a step was not made; the state does not change.
     #[derive(Clone, Copy)]
     pub enum Refusal {
         /// The sample is of no use.
@@ -103,7 +103,8 @@ pub(crate) mod sealed {
             step: &Step,
         ) -> Result<f64, Refusal>;
 
-        /// The same for a statement beside the data: nothing is forgotten, and no parameter walks, since the data's step does that.
+        /// One step for a constraint in addition to the data: without forgetting and without a random walk of the parameters, because the
+        /// step of the data includes both.
         fn statement<const P: usize>(
             theta: &mut [f64; P],
             state: &mut Self::State<P>,
@@ -134,7 +135,7 @@ pub(crate) mod sealed {
         ) -> Option<f64>;
     }
 
-    /// One step of a rule on factors whose number of parameters is known when the program is built; the scratch lies on the stack.
+    /// One step of a rule on factors with a number of parameters that is fixed at compile time; the scratch memory is on the stack.
     #[inline(always)]
     pub fn step_on_factors<R: FactorRule, const P: usize>(
         theta: &mut [f64; P],
@@ -162,7 +163,7 @@ pub(crate) mod sealed {
     }
 }
 
-/// `P` as it stands, for the rules that have no factored form; symmetric to the bit.
+/// The full matrix `P`, for rules without a factored form; exactly symmetric.
 #[derive(Clone, Copy, Debug)]
 pub struct Plain<const P: usize>(pub(crate) [[f64; P]; P]);
 
@@ -187,7 +188,7 @@ impl<const P: usize> sealed::Capped for Plain<P> {
 
 impl<const P: usize> sealed::Covariance<P> for Plain<P> {
     fn from_matrix(matrix: &nalgebra::SMatrix<f64, P, P>) -> Result<Self, crate::Error> {
-        // the same demands as of a factored P
+        // the same conditions as for a factored P
         let factor = crate::UdFactor::new(matrix)?;
         Ok(Self(factor.to_matrix().data.0))
     }

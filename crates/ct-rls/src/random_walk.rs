@@ -6,8 +6,8 @@
 //! dP/dt      = eta P + Q - gamma P phi phi' P
 //! ```
 //! For the Kalman filter `eta = 0` and `c = gamma = 1/r`, with `r` the intensity of white noise on `y` (unit(y)^2 s); with `c = gamma = 1`
-//! `P` and `Q` are in units of that noise. `q` is what a parameter's variance grows by in a second: a parameter that wanders by `d` in
-//! `T` seconds has `q = d^2/T` (divided by `r` where `c = 1`). Only a diagonal `Q` is offered: parameters that drift together need others.
+//! `P` and `Q` are in units of that noise. `q` is what a parameter's variance grows by in a second: a parameter that drifts by `d` in `T`
+//! seconds has `q = d^2/T` (divided by `r` where `c = 1`). Only a diagonal `Q` is offered: parameters that drift together need others.
 //!
 //! Assumptions: `phi`, `y` and the weights are constant over the step `h`. Equations: the whole walk of the step first, as the Kalman
 //! filter predicts, then [`ExactHold`](crate::ExactHold)'s exact step:
@@ -186,7 +186,7 @@ fn raise(u: &mut [f64], d: &mut [f64], j: usize, more: f64, left: &mut [f64]) {
     let raised = d[j] + more;
     let kept = d[j] / raised;
     d[j] = raised;
-    // what the column loses goes to the block before it, as one more rank-one term
+    // the loss of this column is added to the block before it, as one more rank-one term
     let mut weight = more * kept;
     for (left, u) in left.iter_mut().zip(&mut u[j * p..j * p + j]) {
         *left = *u;
@@ -194,7 +194,7 @@ fn raise(u: &mut [f64], d: &mut [f64], j: usize, more: f64, left: &mut [f64]) {
     }
     for m in (0..j).rev() {
         let own = left[m];
-        // in this order no product leaves the floating-point range
+        // in this order no product overflows
         let gain = weight * own;
         let raised = d[m] + gain * own;
         let inverse = 1.0 / raised;

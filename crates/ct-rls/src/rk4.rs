@@ -1,8 +1,8 @@
 //! The classical Runge-Kutta rule of fourth order: to compare with.
 //!
-//! Model and assumptions as of [`ExactHold`](crate::ExactHold); `dtheta/dt` and `dP/dt` are evaluated four times per step.
-//! It bears steps little longer than Euler's rule does; where `P` loses its definiteness the step is not made, the run
-//! stops with its estimates, and the health is [`Error::LostDefiniteness`](crate::Error::LostDefiniteness).
+//! Model and assumptions as of [`ExactHold`](crate::ExactHold); `dtheta/dt` and `dP/dt` are evaluated four times per step. The largest
+//! stable step is little longer than for Euler's rule; if `P` would lose its positive definiteness, the step is not made, the run stops
+//! with its estimates, and the health is [`Error::LostDefiniteness`](crate::Error::LostDefiniteness).
 //!
 //! Cost per update: about `14 p^2` multiplications, and `p^3/6` for the check. Reference: A. J. Udink ten Cate, WP-85-54, 1985, (2.14).
 
@@ -12,7 +12,7 @@ use crate::integrator::sealed::{Covariance, Memory, Refusal, Rule};
 use crate::integrator::{Plain, take};
 use crate::settings::{MAX_EPSILON, Step, Weights};
 
-/// Runge-Kutta of fourth order, on `P` as it stands. Stops where `P` is no longer positive definite.
+/// Runge-Kutta method of fourth order for the full matrix `P`. Stops if `P` is no longer positive definite.
 #[derive(Clone, Copy, Debug)]
 pub struct Rk4;
 
@@ -35,7 +35,7 @@ impl Rule for Rk4 {
             return Err(Refusal::NotFinite);
         }
         let (eta, gamma, c, h) = (step.eta(), weights.gamma(), weights.c(), step.dt);
-        // theta^ moves by `shift`, so that eps - shift' phi is the error along the way
+        // theta^ changes by `shift`, so eps - shift' phi is the error at the intermediate points.
         let (mut at, mut shift) = (*state, [0.0; P]);
         let (mut next, mut moved) = (state.0, [0.0; P]);
         for (reach, share) in [

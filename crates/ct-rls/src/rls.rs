@@ -1,4 +1,4 @@
-//! The estimator for a number of parameters that is known when the program is built.
+//! The estimator for a number of parameters that is known at compile time.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -40,7 +40,8 @@ impl<const P: usize> Sample<P> {
 
 /// Recursive least squares in continuous time, `P` parameters, no allocation.
 ///
-/// Equations, assumptions and convergence: those of the integrator, [`ExactHold`] unless another is named, which also says what is forgotten.
+/// Equations, assumptions and convergence: those of the integrator, [`ExactHold`] unless another is named, which also says what is
+/// forgotten.
 ///
 /// ```
 /// use ct_rls::{ContinuousRls, RecursiveEstimator, Sample, Weights};
@@ -88,7 +89,8 @@ impl<const P: usize, I: FactoredIntegrator> ContinuousRls<P, I> {
         I::factor(&self.state)
     }
 
-    /// `V = delta' P^-1 delta`, with `delta` from `theta` to the estimates: how far the estimates say it is away.
+    /// `V = delta' P^-1 delta`, with `delta` from `theta` to the estimates: distance of the estimates from `theta`, relative to their
+    /// uncertainty.
     pub fn distance(&self, theta: &SVector<f64, P>) -> f64 {
         self.factor().information_norm(&(theta - self.theta))
     }
@@ -169,7 +171,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
         self.weights = weights;
     }
 
-    /// Starts `P` again and keeps the estimates: after a jump of the parameters, or after a run has stopped.
+    /// Starts `P` again and keeps the estimates: after a step change of the parameters, or after a run has stopped.
     ///
     /// # Errors
     /// [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`], [`Error::TraceAboveLimit`]; nothing is changed then.
@@ -250,7 +252,7 @@ impl<const P: usize, I: Integrator> RecursiveEstimator for ContinuousRls<P, I> {
     }
 }
 
-/// With a smaller `f'P f` a step along `P f` may leave the floating-point range.
+/// With a smaller `f'P f` a step along `P f` may overflow.
 const MIN_RELAXED: f64 = 1e-200;
 
 pub(crate) fn check_theta(theta: &[f64]) -> Result<(), Error> {

@@ -1,7 +1,7 @@
 //! An estimator as it stands, saved and restored: after that the next updates give the same numbers to the bit.
 //!
-//! `theta`, the factors of `P`, the settings, and what the guards have counted are written, alike for [`ContinuousRls`] and `DynamicRls`, so
-//! that each reads what the other has saved. `P` is written as `U` and `D`: it is symmetric whatever is read. What is read is checked
+//! `theta`, the factors of `P`, the settings, and what the guards have counted are written, alike for [`ContinuousRls`] and `DynamicRls`,
+//! so that each reads what the other has saved. `P` is written as `U` and `D`: it is symmetric whatever is read. What is read is checked
 //! like what a constructor is given: sizes, numbers that are not finite, pivots that are not above 0.
 
 use core::fmt::{Formatter, Result as Written};
@@ -21,7 +21,7 @@ use crate::{ContinuousRls, Error, FactoredIntegrator, Guards, UdFactor, Weights}
 /// A `bound` of the guards may be below the trace by as much, relative to it, by rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// What is written, in vectors of any kind.
+/// The saved fields, in vectors of any type.
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "Rls")]
 #[serde(bound(
@@ -34,7 +34,7 @@ struct Saved<V, U, I> {
     /// Above the diagonal, by columns.
     u: U,
     d: V,
-    /// Of the random walk; `None` of an integrator without one.
+    /// Intensity of the random walk; `None` for an integrator without one.
     intensity: Option<V>,
     weights: Weights,
     guards: Guards,
@@ -73,7 +73,7 @@ impl<I: FactoredIntegrator> Visitor<'_> for Name<I> {
     }
 }
 
-/// As many numbers as `N`.
+/// An array of `N` numbers.
 struct Entries<const N: usize>([f64; N]);
 
 /// The part of a matrix above its diagonal, by columns.
@@ -98,7 +98,7 @@ impl<const N: usize> Serialize for Above<N> {
     }
 }
 
-/// Reads as many numbers as there are places, no more and no fewer.
+/// Reads exactly as many numbers as the array has entries.
 fn fill<'de, A: SeqAccess<'de>>(
     mut from: A,
     places: &mut dyn Iterator<Item = &mut f64>,

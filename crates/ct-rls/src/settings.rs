@@ -94,7 +94,7 @@ impl Weights {
     }
 }
 
-/// What keeps `P` from growing without end where the regressor says nothing (wind-up).
+/// Limits the growth of `P` while the regressor contains no information (wind-up).
 ///
 /// Both only ever forget less than `eta` asks for, so the Lyapunov function still decreases. They act on all parameters at once;
 /// [`Directional`](crate::Directional) forgets by directions, and [`RandomWalk`](crate::RandomWalk) without `eta` by parameters;
@@ -112,9 +112,9 @@ pub struct Guards {
     /// As a record `f64::INFINITY` is none, which JSON has no number for.
     #[cfg_attr(feature = "serde", serde(with = "infinite_as_none"))]
     pub trace_limit: f64,
-    /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`.
-    /// At 0, the start, only an exactly silent regressor counts; below 0 none does, and `P` winds up as the paper's. Above 1e30 it
-    /// is 1e30, the limit of a regressor. The intensity of a [`RandomWalk`](crate::RandomWalk) goes on.
+    /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`. At 0, the default, this applies only to
+    /// a regressor that is exactly zero; below 0 it never applies, and `P` winds up as in the paper. Above 1e30 the value is 1e30, the
+    /// limit of a regressor. The intensity of a [`RandomWalk`](crate::RandomWalk) is still added.
     pub silent_below: f64,
 }
 
@@ -165,7 +165,7 @@ impl Guards {
     }
 }
 
-/// `e^{eta h}` and `(e^{eta h} - 1)/eta` of one step, kept while `eta` and `h` stay as they are.
+/// `e^{eta h}` and `(e^{eta h} - 1)/eta` of one step; valid while `eta` and `h` do not change.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     eta: f64,
@@ -177,23 +177,23 @@ pub struct Step {
     pub length: f64,
 }
 
-/// A longer regressor is taken for a fault: within this and the other limits no number of updates leaves the floating-point range.
+/// A longer regressor counts as a fault: within this and the other limits no number of updates overflows.
 pub const MAX_REGRESSOR: f64 = 1e30;
 pub(crate) const MAX_PHI_SQUARED: f64 = MAX_REGRESSOR * MAX_REGRESSOR;
-/// As above, for the output error.
+/// Largest output error.
 pub(crate) const MAX_EPSILON: f64 = 1e100;
-/// As above, for the step, s.
+/// Longest step, s.
 const MAX_DT: f64 = 1e30;
-/// As above, for `c`.
+/// Largest `c`.
 const MAX_C: f64 = 1e40;
-/// As above, for the trace of P; its pivots start above the inverse of it.
+/// Largest trace of P; its pivots start above the inverse of it.
 pub(crate) const MAX_TRACE: f64 = 1e100;
 
-/// Beyond this, one step forgets everything, and `e^{eta h}` leaves the floating-point range.
+/// Beyond this value, one step forgets everything, and `e^{eta h}` overflows.
 const MAX_ETA_DT: f64 = 300.0;
 
 impl Step {
-    /// No step yet: matches none.
+    /// No step yet: equal to no step.
     pub fn none() -> Self {
         Self {
             eta: f64::NAN,

@@ -17,16 +17,16 @@ use crate::settings::{MAX_EPSILON, MAX_PHI_SQUARED, Step, Weights};
 use crate::{BlockIntegrator, ContinuousRls, Integrator};
 
 impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
-    /// Takes in the statement `f' theta = chi` at once, with the weight `information` (1/unit(chi)^2, at least 0):
-    /// `P^-1` grows by `information f f'`. Above 1e60 it counts as 1e60, which is exact. Not counted, not guarded.
+    /// Uses the constraint `f' theta = chi` at once, with the weight `information` (1/unit(chi)^2, at least 0): `P^-1` grows by
+    /// `information f f'`. Above 1e60 it counts as 1e60, which is exact. Not counted, not guarded.
     ///
     /// Returns `chi - f' theta` before; `None`, and nothing is done, where a number is out of range or the run has stopped.
     pub fn absorb(&mut self, f: &SVector<f64, P>, chi: f64, information: f64) -> Option<f64> {
         self.absorb_with(f, chi, information, 1.0)
     }
 
-    /// [`absorb`](Self::absorb) with `ratio = gamma/w`, 0 or more and below 2: `P^-1` grows by `ratio information f f'`, and
-    /// `f' theta` goes towards `chi` by the share `1 - (1 + ratio information f'P f)^(-1/ratio)`. 1 is least squares, 0 leaves `P` as it is.
+    /// [`absorb`](Self::absorb) with `ratio = gamma/w`, 0 or more and below 2: `P^-1` grows by `ratio information f f'`, and `f' theta`
+    /// goes towards `chi` by the share `1 - (1 + ratio information f'P f)^(-1/ratio)`. 1 is least squares, 0 leaves `P` as it is.
     ///
     /// Returns as [`absorb`](Self::absorb), and `None` for a ratio out of its range.
     pub fn absorb_with(
@@ -36,7 +36,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
         information: f64,
         ratio: f64,
     ) -> Option<f64> {
-        // with c = 1, the product of weight and length is all that counts
+        // with c = 1, only the product of weight and length matters
         let weights = Weights::new(1.0, ratio, 0.0).ok()?;
         let step = length_of(information, f.norm_squared())?;
         self.guard.running().ok()?;
@@ -58,13 +58,13 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
     }
 }
 
-/// Takes in the statement `f1' theta1 + f2' theta2 = chi` over two blocks with no covariance between them; (4.18) of the paper for one row.
+/// Uses the constraint `f1' theta1 + f2' theta2 = chi` for two blocks with no covariance between them; (4.18) of the paper for one row.
 ///
 /// - `epsilon`: `chi - f1' theta1 - f2' theta2`, which the caller knows.
 /// - `information`, `ratio`: of either block, as of [`ContinuousRls::absorb_with`]; both informations above 0.
 ///
-/// The two share the error, as in [`update_blocks`](crate::update_blocks). With both ratios 0 the step is exact whatever the rule. `None`, and nothing is done, where a number is out of range or a
-/// run has stopped.
+/// The two share the error, as in [`update_blocks`](crate::update_blocks). With both ratios 0 the step is exact whatever the rule. `None`,
+/// and nothing is done, where a number is out of range or a run has stopped.
 pub fn absorb_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     (first, f1): (&mut ContinuousRls<A, I>, &SVector<f64, A>),
     (second, f2): (&mut ContinuousRls<B, I>, &SVector<f64, B>),
@@ -110,7 +110,8 @@ pub fn absorb_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     }
 }
 
-/// The exact solution where `P` stays: both blocks move by what is left of the error, `1 - e^{-(c_1 s_1 + c_2 s_2) length}`.
+/// The exact solution for constant `P`: both blocks change in proportion to the reduction of the error, `1 - e^{-(c_1 s_1 + c_2 s_2)
+/// length}`.
 fn relax_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     (first, f1): (&mut ContinuousRls<A, I>, &SVector<f64, A>),
     (second, f2): (&mut ContinuousRls<B, I>, &SVector<f64, B>),
@@ -134,7 +135,7 @@ fn relax_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
     Some(epsilon)
 }
 
-/// A step that is as long as the information, where it and the coefficients are in range.
+/// A step of the length of the information, if the length and the coefficients are in range.
 fn length_of(information: f64, squared: f64) -> Option<Step> {
     let fits = information >= 0.0 && squared <= MAX_PHI_SQUARED;
     fits.then(|| Step::remembering_for(information.min(MAX_PHI_SQUARED)))

@@ -1,5 +1,5 @@
-//! Reads a CSV file and says what was read, and how long it took:
-//! `cargo run --release -p ct-signals --example read [FILE.csv [TIME INPUT OUTPUT]]`.
+//! Reads a CSV file and prints its summary and the time for reading: `cargo run --release -p ct-signals --example read [FILE.csv [TIME
+//! INPUT OUTPUT]]`.
 //!
 //! Without a file a record of a million rows with dates is made, read and timed.
 

@@ -38,10 +38,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Whitener};
 
-/// Partial correlations stay this far inside -1..1, so that even a constant or a sine leaves a
-/// stable predictor.
+/// Partial correlations keep this distance from -1 and 1, so that even a constant or a sine gives a stable predictor.
 pub(crate) const MARGIN: f64 = 1e-9;
-/// Squares that sum to less are those of nothing: products of them underflow.
+/// A smaller sum of squares counts as zero, because products would underflow.
 pub(crate) const NOTHING: f64 = 1e-200;
 
 /// A stationary autoregressive process of mean 0.
@@ -149,7 +148,7 @@ impl ArModel {
             let terms = self.coefficients.iter().zip(powers);
             terms.map(|(a, power)| a * power).collect()
         };
-        // All poles lie within a radius where the process with its poles divided by the radius is stationary.
+        // All poles are inside a radius if the process with its poles divided by the radius is stationary.
         let within = |factor: f64| {
             Self::from_coefficients(&scaled(factor / radius.max(f64::MIN_POSITIVE)), 1.0).is_ok()
         };
@@ -169,7 +168,7 @@ impl ArModel {
             .unwrap_or_else(|_| ArModel::white(self.sigma))
     }
 
-    /// The same colour with innovations of another standard deviation, `>= 0`.
+    /// The same autoregression with innovations of another standard deviation, `>= 0`.
     #[must_use]
     pub fn with_sigma(&self, sigma: f64) -> Self {
         ArModel {
@@ -178,7 +177,7 @@ impl ArModel {
         }
     }
 
-    /// Of partial correlations that are within -1..1.
+    /// Autoregression with these partial correlations, all within -1..1.
     pub(crate) fn of_stationary(reflections: &[f64], sigma: f64) -> Self {
         ArModel {
             reflections: reflections.to_vec(),
@@ -221,8 +220,9 @@ impl ArModel {
             .fold(self.sigma, |std, k| std / (1.0 - k * k).sqrt())
     }
 
-    /// How large a slow move of the signal is in the whitened signal, over the innovations' standard deviation, where the move is as large
-    /// as the process: `(1 - sum a_i) / sqrt(prod (1 - k_i^2))`. White noise: 1; noise with a long memory: less.
+    /// Gain of the whitening filter for a slow change of the signal: size of the change in the whitened signal over the innovations'
+    /// standard deviation, for a change as large as the standard deviation of the process. `(1 - sum a_i) / sqrt(prod (1 - k_i^2))`. White
+    /// noise: 1; noise with a long memory: less.
     pub fn slow_gain(&self) -> f64 {
         let at_zero = 1.0 - self.coefficients.iter().sum::<f64>();
         self.reflections
@@ -230,8 +230,7 @@ impl ArModel {
             .fold(at_zero, |gain, k| gain / (1.0 - k * k).sqrt())
     }
 
-    /// A filter that whitens `lanes` signals at once, one row of samples at a time: a residual and
-    /// the columns of its Jacobian, say.
+    /// A filter that whitens `lanes` signals at once, one row of samples at a time: a residual and the columns of its Jacobian, say.
     pub fn whitener(&self, lanes: usize) -> Whitener {
         Whitener::new(self, lanes)
     }

@@ -16,7 +16,7 @@
 //! to first order at 0, and may have several minima: the best of a few values is the start. Of two that the samples cannot tell apart, the
 //! positive one: the process that is slower than the sampling.
 //!
-//! **Behind a system** ([`fit_behind`]): the same, where the autoregression is seen through a system that is known; the whitening is then
+//! **After a system** ([`fit_behind`]): the same, where the autoregression is seen through a system that is known; the whitening is then
 //! that of the process they make together ([`StationaryWhitener`](crate::StationaryWhitener)).
 //!
 //! **Cost**: an evaluation is one whitening, `O(n p)` and a little more for missing samples; one or two for each order, and about
@@ -28,9 +28,9 @@ use crate::{ArModel, StationaryNoise};
 
 /// Step of the differences, in a partial correlation.
 const STEP: f64 = 1e-6;
-/// Steps go at most so far towards the end of a partial correlation's range.
+/// A step covers at most this share of the distance to the end of a partial correlation's range.
 const TO_BOUND: f64 = 0.9;
-/// Where fewer than this share of the samples have another one at some lag, the pairs of this lag give no start.
+/// If less than this share of the samples has a partner at some lag, the pairs of this lag give no start.
 const FEW_PAIRS: f64 = 0.1;
 /// Starts without pairs.
 const STARTS: [f64; 5] = [0.8, 0.4, 0.95, -0.8, -0.4];
@@ -48,7 +48,7 @@ const PAIRS: [(f64, f64); 12] = [
     (-0.7, -0.3),
     (-0.7, -0.7),
 ];
-/// Starts whose `D` is above that of the order before by more than so many penalties are given up.
+/// A start is dropped if its `D` exceeds that of the previous order by more than this number of penalties.
 const NEAR: f64 = 10.0;
 /// Falls of `D` that end a refinement: of an order that is a candidate, and of the one that was chosen.
 const ROUGH: f64 = 0.3;
@@ -72,8 +72,8 @@ pub(crate) fn fit(segments: &[&[f64]], n: usize, max_order: usize) -> ArModel {
     )
 }
 
-/// The same where each segment is the autoregression behind a system: `process` makes the process of both from an autoregression whose
-/// innovations have variance 1 and the segment's number.
+/// Fits the autoregression when each segment is the output of a system driven by it. `process` returns the process of both, given an
+/// autoregression with innovation variance 1 and the number of the segment.
 pub(crate) fn fit_behind(
     segments: &[&[f64]],
     n: usize,
@@ -124,12 +124,12 @@ fn of_series(series: &Series<impl Whiten>, max_order: usize) -> ArModel {
             sparse = true;
             series.search(&mut k, &mut at);
         } else if sparse {
-            // Partial correlations that no pairs show are not independent of the others.
+            // Partial correlations without any pairs of samples are determined by the other ones.
             series.refine(&mut k, &mut at, ROUGH);
         } else {
             series.step(&mut k, &mut at, &[order - 1], SMALL * penalty);
         }
-        // The first order has no others.
+        // For the first order there are no other partial correlations.
         if order > 1 && before - at.deviance > penalty {
             series.refine(&mut k, &mut at, ROUGH);
         }
@@ -149,13 +149,13 @@ fn of_series(series: &Series<impl Whiten>, max_order: usize) -> ArModel {
     ArModel::of_stationary(&k, (at.squares / left).sqrt())
 }
 
-/// The samples that are there whitened by a model of variance 1, and `log|R|`.
+/// Whitens the present samples with a model of variance 1, and returns `log|R|`.
 trait Whiten: Fn(&ArModel, &[&[f64]]) -> (Vec<f64>, f64) {}
 impl<F: Fn(&ArModel, &[&[f64]]) -> (Vec<f64>, f64)> Whiten for F {}
 
 struct Series<'a, W> {
     segments: &'a [&'a [f64]],
-    /// Samples that are there.
+    /// Number of present samples.
     n: usize,
     whiten: W,
 }
@@ -184,7 +184,7 @@ fn whiten(model: &ArModel, segments: &[&[f64]]) -> (Vec<f64>, f64) {
 
 #[derive(Clone)]
 struct Whitened {
-    /// `x` of the samples that are there.
+    /// `x` of the present samples.
     x: Vec<f64>,
     /// `sum w^2`.
     squares: f64,
@@ -206,7 +206,7 @@ impl<W: Whiten> Series<'_, W> {
         }
     }
 
-    /// Samples that are there with another one `lag` before.
+    /// Number of present samples with another present sample `lag` before.
     fn pairs(&self, lag: usize) -> usize {
         let there = |(a, b): (&f64, &f64)| usize::from(!a.is_nan() && !b.is_nan());
         self.segments
@@ -217,7 +217,7 @@ impl<W: Whiten> Series<'_, W> {
 
     /// Refines the best of some values of the last partial correlation, of order two together with the first.
     fn search(&self, k: &mut Vec<f64>, at: &mut Whitened) {
-        // Rounding is not a reason.
+        // Changes within rounding are no reason to continue.
         let rounding = 1e-9 * self.n as f64;
         let last = k.len() - 1;
         let pairs = PAIRS.map(|(first, second)| vec![first, second]);
@@ -301,7 +301,7 @@ impl<W: Whiten> Series<'_, W> {
     }
 }
 
-/// The partial correlations after a step of some of them, or as much of it as keeps all of them within their range.
+/// The partial correlations after a step of some of them, with the step shortened so that all stay within their range.
 fn within(k: &[f64], of: &[usize], step: &[f64]) -> Vec<f64> {
     let mut share = 1.0_f64;
     for (&i, step) in of.iter().zip(step) {

@@ -1,33 +1,33 @@
-//! When a record began, and times for people: dates, or numbers in the unit that fits their length.
+//! Start of a record, and times in text: as dates, or as numbers in a unit that suits their length.
 
 use serde::{Deserialize, Serialize};
 
 use crate::{Record, Timestamp, Zone};
 
-/// The date and time at which the clock of a record stands at zero, and the zone in which people read it.
+/// The date and time at zero of a record's clock, and the zone for display.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calendar {
-    /// When `time` is zero.
+    /// Date and time at `time` zero.
     pub start: Timestamp,
     /// The zone of the file.
     pub zone: Zone,
 }
 
 impl Calendar {
-    /// The date and time so many seconds behind the start.
+    /// The date and time so many seconds after the start.
     #[must_use]
     pub fn at(&self, seconds: f64) -> String {
         self.zone.format(self.start.after(seconds))
     }
 
-    /// The same for programs, with the offset from UTC: `2026-01-31T14:25:00+01:00`.
+    /// Date and time for programs, with the offset from UTC: `2026-01-31T14:25:00+01:00`.
     #[must_use]
     pub fn rfc3339(&self, seconds: f64) -> String {
         self.zone.rfc3339(self.start.after(seconds))
     }
 }
 
-/// How the times of records are said: as dates where these are known, otherwise in the unit that fits their length.
+/// Format of the times of records: dates if they are known, otherwise numbers in a unit that suits the length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clock {
     calendar: Option<Calendar>,
@@ -37,7 +37,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Of records that are shown together.
+    /// For records that are shown together.
     #[must_use]
     pub fn of<'a>(records: impl IntoIterator<Item = &'a Record>) -> Self {
         let (mut calendar, mut interval) = (None, f64::INFINITY);
@@ -50,7 +50,7 @@ impl Clock {
             }
         }
         let (unit, seconds) = time_unit(last - first);
-        // As many decimals as tell neighbouring samples apart.
+        // Enough decimals to distinguish neighbouring samples.
         let share = if interval.is_finite() {
             interval / seconds
         } else {

@@ -1,9 +1,8 @@
-//! What can be wrong with the columns of a file. The mend depends on where the columns were named, which a caller may know
-//! better.
+//! Errors in the columns of a file. The correction depends on where the columns were named, which the caller knows.
 
 use crate::unit;
 
-/// What is wrong with a column, without the mend.
+/// An error of a column, without the correction.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum ColumnFault {
@@ -13,7 +12,7 @@ pub enum ColumnFault {
         role: &'static str,
         /// The name that was looked for, quoted, or the letter it was to begin with.
         wanted: String,
-        /// All the columns of the file, quoted.
+        /// All columns of the file, quoted.
         columns: String,
         /// The column whose name is close to the one that was looked for.
         closest: Option<String>,
@@ -25,7 +24,7 @@ pub enum ColumnFault {
         /// The columns that fit, quoted.
         candidates: String,
     },
-    /// One column was named for two roles.
+    /// One column has two roles.
     Shared {
         /// The column's header.
         column: String,
@@ -46,8 +45,8 @@ pub enum ColumnFault {
 }
 
 impl ColumnFault {
-    /// The fault and its mend as they follow the place in a message: `namer` is what named the columns, `mend` begins in small
-    /// letters.
+    /// The fault and its correction in the form that follows the place in a message: `namer` is the source of the column names, `mend`
+    /// begins in small letters.
     #[must_use]
     pub fn said(&self, namer: &str, mend: &str) -> String {
         match self {
@@ -90,7 +89,7 @@ impl ColumnFault {
         }
     }
 
-    /// With the mend for a model file, whose `[columns]` names them.
+    /// The message with the correction for a model file, whose `[columns]` names the columns.
     pub(crate) fn in_model(&self) -> String {
         let mend = match self {
             Self::Missing { role, .. } => format!("set {role} = \"...\" under [columns]"),
@@ -103,7 +102,7 @@ impl ColumnFault {
                 file_unit,
                 named_unit,
             } => {
-                // No constant of a model is in the unit of the time.
+                // No constant of a model has the unit of the time.
                 let of_time = [file_unit, named_unit]
                     .iter()
                     .all(|unit| unit::seconds(unit).is_some());

@@ -27,17 +27,17 @@ pub struct Columns {
     pub outputs: Vec<String>,
     /// The set points. Guessed, one: `r`, `r_...`, `ref`, `reference`, `setpoint`; may be missing when none is named.
     pub references: Vec<String>,
-    /// How dates and times are written, as `strftime` has it: `%d.%m.%Y %H:%M:%S`. Without one it is found from the column.
+    /// Format of dates and times in the notation of `strftime`: `%d.%m.%Y %H:%M:%S`. Without it the format is found from the column.
     pub time_format: Option<String>,
-    /// The zone of dates that do not say: `Europe/Berlin`, `UTC`, `+01:00`. UTC where it is absent.
+    /// Zone of dates without a zone: `Europe/Berlin`, `UTC`, `+01:00`. Default UTC.
     pub time_zone: Option<String>,
-    /// Words and numbers that stand in cells whose sample is missing, beside the usual ones: `-999`, `Offline`.
+    /// Words and numbers that mark a missing sample, in addition to the usual ones: `-999`, `Offline`.
     pub missing: Vec<String>,
     /// The model has no inputs: none is guessed. It follows from the model and is not written down.
     pub without_inputs: bool,
 }
 
-/// The same as a model file writes it: one name or a list of them.
+/// A column name as a model file writes it: one name or a list of names.
 #[derive(Deserialize, Serialize, Default)]
 #[serde(deny_unknown_fields, default)]
 struct Named {
@@ -59,7 +59,7 @@ struct Named {
     missing: Vec<String>,
 }
 
-/// The name of a zone that there is.
+/// Reads the name of an existing zone.
 fn zone<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
     let name = Option::<String>::deserialize(deserializer)?;
     if let Some(name) = &name {
@@ -137,19 +137,19 @@ impl From<Columns> for Named {
     }
 }
 
-/// What stands above a column.
+/// The header of a column.
 #[derive(Serialize, Clone, Debug, PartialEq, Eq)]
 pub struct Heading {
-    /// All of it.
+    /// The whole header.
     pub header: String,
-    /// Without the unit.
+    /// The header without the unit.
     pub name: String,
-    /// The unit; empty where the header does not say.
+    /// The unit; empty if the header has none.
     pub unit: String,
 }
 
 impl Heading {
-    /// From a header.
+    /// Splits a header.
     #[must_use]
     pub fn of(header: &str) -> Self {
         let (name, unit) = unit::split(header);
@@ -161,7 +161,7 @@ impl Heading {
     }
 }
 
-/// One column that was found.
+/// A column that was found.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Found {
     pub index: usize,
@@ -173,7 +173,7 @@ pub(crate) struct Found {
     pub converted: Option<(String, Conversion)>,
 }
 
-/// Where everything is.
+/// The position of every column.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layout {
     pub time: Found,
@@ -182,11 +182,11 @@ pub(crate) struct Layout {
     pub inputs: Vec<Found>,
     pub outputs: Vec<Found>,
     pub references: Vec<Found>,
-    /// Outputs that are named and not there, with their positions among the named ones; where outputs are needed there is none.
+    /// Named outputs that the file does not have, with their positions among the named ones; empty if outputs are required.
     pub absent: Vec<(usize, String)>,
 }
 
-/// What a record is read for.
+/// Purpose of reading a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// A fit, which needs every output.
@@ -196,7 +196,7 @@ pub(crate) enum Purpose {
 }
 
 impl Layout {
-    /// The columns that hold values: inputs, outputs, references.
+    /// The columns with values: inputs, outputs, references.
     pub fn channels(&self) -> impl Iterator<Item = &Found> {
         self.inputs
             .iter()
@@ -221,8 +221,8 @@ impl Columns {
             .map_or("", |output| unit::split(output).1)
     }
 
-    /// The header of the time as a file that goes with these columns has it, with its unit, and the seconds in that; `t [s]`
-    /// where none is named, or its unit is none of the time.
+    /// Header of the time column for a new file with these columns, with its unit, and the unit in seconds; `t [s]` if no column is named,
+    /// or if its unit is no unit of time.
     #[must_use]
     pub fn time_header(&self) -> (String, f64) {
         let named = self.time.as_deref().map(unit::split);
@@ -234,7 +234,7 @@ impl Columns {
         }
     }
 
-    /// The columns that would be taken where none is named; what is not plain is left out.
+    /// The columns that are chosen without names; ambiguous ones are left out.
     #[must_use]
     pub fn guessed(headings: &[Heading]) -> Self {
         let names: Vec<String> = headings.iter().map(|h| h.header.clone()).collect();
@@ -337,7 +337,7 @@ impl Columns {
             }
         }
         let time = time.swap_remove(0);
-        // Nobody has to have a reference: where it is not plain which column it is, there is none.
+        // A reference is optional: if several columns could be the reference, there is none.
         if references.is_empty() {
             references.extend(header.guess(&REFERENCE, &taken).ok().flatten());
         }

@@ -201,8 +201,8 @@ pub fn multisine(
     Ok(u)
 }
 
-/// Lets a sequence change by at most `most` (`> 0`, the actuator's unit) from one sample to the next: each value goes as
-/// far from the one before towards what it was meant to be as it may. It never leaves the range of the sequence.
+/// Limits the change of a sequence to `most` (`> 0`, the actuator's unit) from one sample to the next: each value moves as far as permitted
+/// towards its target. The result stays in the range of the sequence.
 ///
 /// # Errors
 /// [`Error::InvalidSetting`] unless `most > 0`.

@@ -10,39 +10,39 @@ use serde::{Deserialize, Serialize};
 use crate::record::quantile_of_steps;
 use crate::{Channel, Hold, Record};
 
-/// A step of the time is this many sampling intervals or more where rows are missing: half-way between one and two.
+/// A step of the time of this number of sampling intervals or more means missing rows: half-way between one and two.
 const GAP: f64 = 1.5;
 /// Steps of an evenly sampled record differ from whole intervals by at most this part of one ...
 const EVEN: f64 = 0.25;
-/// ... at this share of them.
+/// ... if this share of the steps are multiples of it.
 const MOST: f64 = 0.98;
-/// ... and rows are missing, instead of steps being uneven, where this share of them is one interval.
+/// Rows are missing, and steps are not uneven, if this share of the steps equals one interval.
 const SINGLE: f64 = 0.6;
-/// Rounded stamps make steps of two intervals at more than this share; rows that are lost so often leave longer steps too.
+/// With rounded stamps, more than this share of the steps has two intervals; when rows are lost this often, longer steps occur too.
 const ROUNDED: f64 = 0.05;
-/// Of uneven steps a gap is one that is longer than 1.5 times the one that this share of them does not exceed.
+/// With uneven steps, a gap is a step longer than 1.5 times this quantile of the steps.
 const USUAL: f64 = 0.95;
 /// Steps that belong to one rate of a logger with several differ by at most this part of each other ...
 const SAME_RATE: f64 = 0.2;
-/// ... and stand side by side, so many at least: rows that are lost leave steps of any length, one by one.
+/// ... and at least this many occur one after the other: lost rows cause steps of any length, one at a time.
 const STAYS: usize = 3;
-/// A logger has several rates where this share of the long steps stands in such a row.
+/// A logger has several rates if this share of the long steps occurs in such a sequence.
 const OF_A_RATE: f64 = 0.5;
-/// More rows are never put in.
+/// Largest number of inserted rows.
 const MOST_PUT_IN: usize = 100_000;
-/// A part with fewer samples of an output says less than its initial states take.
+/// A part with fewer samples of an output contains less information than its initial states need.
 const SHORTEST: usize = 8;
 
-/// What was done about rows and samples of inputs that are missing.
+/// How missing rows and missing samples of inputs were handled.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Gaps {
     /// Rows that are missing between the first and the last.
     pub rows: usize,
-    /// Stretches in which rows are missing, or samples of an input.
+    /// Places where rows or samples of an input are missing.
     pub places: usize,
-    /// Of these places those through which the inputs were held.
+    /// Number of these gaps through which the inputs were held.
     pub held: usize,
-    /// Of these places those where the record is cut, and begins anew behind.
+    /// Number of these gaps where the record was cut; a new part begins after the gap.
     pub cut: usize,
     /// Rows of parts that were too short to be used.
     pub unused: usize,
@@ -75,8 +75,8 @@ struct Sampling {
 }
 
 impl Sampling {
-    /// Where the steps are whole multiples of one interval, that is the interval; otherwise their median. Of a logger that goes over to
-    /// longer steps where little happens, as a tester of batteries does, the steps of its slowest rate are no gaps.
+    /// If the steps are whole multiples of one interval, that interval; otherwise their median. For a logger that reduces its rate while
+    /// the signals are slow, such as a battery tester, the steps of the slowest rate are no gaps.
     fn of(time: &[f64]) -> Self {
         let plain = Self::of_one_rate(time);
         match slowest_rate(time, plain.interval) {
@@ -98,7 +98,7 @@ impl Sampling {
         };
         let even = steps(time).filter(whole).count() as f64;
         let all = time.len().saturating_sub(1) as f64;
-        // Where more than a few steps are two intervals long and none is longer, stamps were rounded.
+        // If more than a few steps are two intervals long and no step is longer, the time stamps were rounded.
         let double = all - near.len() as f64;
         let longest = steps(time).fold(0.0, f64::max);
         let rounded = double > ROUNDED * all && longest < 2.5 * interval;
@@ -125,7 +125,7 @@ impl Sampling {
     }
 }
 
-/// The longest step of the slowest rate, where most of the steps that are longer than `interval` stand in rows of equal ones.
+/// The longest step of the slowest rate, if most of the steps longer than `interval` occur in sequences of equal steps.
 fn slowest_rate(time: &[f64], interval: f64) -> Option<f64> {
     let steps: Vec<f64> = steps(time).collect();
     let long = |step: f64| step > GAP * interval;
@@ -140,7 +140,7 @@ fn slowest_rate(time: &[f64], interval: f64) -> Option<f64> {
     (count > 0 && count as f64 >= OF_A_RATE * all as f64).then_some(slowest)
 }
 
-/// The first row behind which rows are missing, and how many.
+/// The first row after which rows are missing, and how many.
 pub(crate) fn first_gap(time: &[f64]) -> Option<(usize, usize)> {
     let sampling = Sampling::of(time);
     let missing = steps(time).map(|step| sampling.missing(step));
@@ -159,7 +159,7 @@ impl Record {
         steps(&self.time).map(|step| sampling.missing(step)).sum()
     }
 
-    /// The time of the row behind which the first row is missing \[s\].
+    /// The time of the row after which the first row is missing \[s\].
     #[must_use]
     pub fn before_missing_row(&self) -> Option<f64> {
         let sampling = Sampling::of(&self.time);
@@ -173,9 +173,9 @@ impl Record {
         self.inputs.iter().any(|u| u.missing() > 0) || self.missing_rows() > 0
     }
 
-    /// The record without gaps, as the head of this file says: inputs are held for at most `longest` \[s\] (from 0 on, infinite: for as long
-    /// as it takes), and the parts between longer gaps are records of their own, under one name and on one clock. A missing row that is
-    /// held through becomes a row without outputs. A reference is held for as long as it takes, as a set point is.
+    /// The record without gaps, as the head of this file says: inputs are held for at most `longest` \[s\] (from 0 on, infinite: for as
+    /// long as it takes), and the parts between longer gaps are records of their own, under one name and on one clock. A missing row that
+    /// is held through becomes a row without outputs. A reference is held for as long as it takes, as a set point is.
     ///
     /// A record without gaps comes back as it is. No part comes back where no row has all inputs.
     #[must_use]
@@ -203,7 +203,7 @@ impl Record {
 
     /// Puts rows without a sample where rows are missing for at most `longest`.
     fn with_missing_rows(&self, sampling: Sampling, longest: f64, gaps: &mut Gaps) -> Record {
-        // Of every row the one that it was, none for one that is put in.
+        // For every row the index of the original row; none for an inserted row.
         let mut from: Vec<Option<usize>> = Vec::with_capacity(self.len());
         let mut time = Vec::with_capacity(self.len());
         for (k, &t) in self.time.iter().enumerate() {
@@ -274,7 +274,7 @@ impl Record {
                     gaps.longest_hold = gaps.longest_hold.max(unknown);
                 } else {
                     gaps.cut += 1;
-                    // A held input acts until its next sample should have come: that row's outputs are still known to follow from it.
+                    // A held input is valid until its next sample is due: the output in that row still depends on known inputs only.
                     let next = last + 1;
                     let acts = !lines
                         && next < k
@@ -284,7 +284,7 @@ impl Record {
                 }
             }
             if end {
-                // Behind the last known input: what follows from it, and no more.
+                // After the last known input, only the row that still depends on that input is kept.
                 let next = last + 1;
                 let acts = !lines && next < self.len();
                 stretches.push(begin..next + usize::from(acts));

@@ -2,7 +2,7 @@
 //!
 //! | question | answer |
 //! |---|---|
-//! | How do I read my measurements? | [`read_csv`], with [`Columns`] to say which column is what |
+//! | How do I read my measurements? | [`read_csv`], with [`Columns`] to assign the columns |
 //! | When was a row recorded, where the file has dates? | [`TimestampReader`], [`Zone`] |
 //! | What does a unit in a header mean, and how is it converted? | [`Unit`] |
 //! | And where they come one by one? | [`Rows`], a line at a time |

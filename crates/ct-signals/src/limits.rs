@@ -1,4 +1,4 @@
-//! How much of a file is read: a device that never ends, or a file that is no record, is refused before it fills the memory.
+//! Limits on the size of a file: an endless device, or a file that is no record, is rejected before it fills the memory.
 
 use std::fs::{self, File};
 use std::io::Read;

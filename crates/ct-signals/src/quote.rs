@@ -1,4 +1,4 @@
-//! What a file says, as a message may quote it: short, and without what steers a terminal or turns the direction of the text.
+//! Quotes text from a file in a message: shortened, and without control characters or characters that change the text direction.
 
 use std::borrow::Cow;
 
@@ -20,7 +20,7 @@ pub fn quoted(text: &str) -> String {
     quotation
 }
 
-/// A number as messages show it: as it was written, or with a power of ten where its digits would fill a line.
+/// A number in messages: as written, or with a power of ten if it has too many digits.
 #[must_use]
 pub fn shown(value: f64) -> String {
     if value == 0.0 || !value.is_finite() || (1e-6..1e15).contains(&value.abs()) {
@@ -30,7 +30,7 @@ pub fn shown(value: f64) -> String {
     }
 }
 
-/// A text with its control characters, and those that turn the direction of what follows or cannot be seen, as `\u{202e}`.
+/// A text with control characters, invisible characters and characters that change the text direction escaped as `\u{202e}`.
 #[must_use]
 pub fn escaped(text: &str) -> Cow<'_, str> {
     if !text.contains(misleading) {

@@ -5,14 +5,14 @@ use statrs::statistics::{Data, OrderStatistics};
 
 use crate::{Calendar, Error, csv::constant};
 
-/// The fewest rows that a record needs, whatever the model.
+/// Least number of rows of a record for any model.
 pub const MIN_ROWS: usize = 20;
 
 /// Rows needed for each fitted parameter.
 pub const ROWS_PER_PARAMETER: usize = 5;
 
-/// What the input does between two samples. It is part of the data's type, because a held input
-/// treated as a continuous one leaves a spurious input term many times larger than a real leak.
+/// Hold: the course of the input between two samples. It is part of the data's type, because a held input that is treated as a continuous
+/// one causes a spurious input term many times larger than a real leak.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Hold {
@@ -23,17 +23,17 @@ pub enum Hold {
     First,
 }
 
-/// One sampled signal: name and unit as the file's header gives them, what happens between its samples, and its samples.
+/// One sampled signal: name and unit from the file's header, hold, and samples.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Channel {
     /// The header's name without its unit, for example `y`.
     pub name: String,
-    /// The unit, for example `cm`; empty where the file does not say.
+    /// The unit, for example `cm`; empty if not known.
     pub unit: String,
-    /// What it does between two samples; of an output, which is only read, it means nothing.
+    /// Hold between two samples; it has no meaning for an output.
     #[serde(default)]
     pub hold: Hold,
-    /// One value for each instant of the record; NaN where the sample is missing.
+    /// One value per instant of the record; NaN if the sample is missing.
     pub values: Vec<f64>,
 }
 
@@ -48,7 +48,7 @@ impl Channel {
         }
     }
 
-    /// The same with another course between the samples.
+    /// The same channel with another hold.
     #[must_use]
     pub fn with_hold(self, hold: Hold) -> Self {
         Self { hold, ..self }
@@ -74,12 +74,12 @@ impl Channel {
             })
     }
 
-    /// The samples that are there, in order.
+    /// The present samples, in order.
     pub fn present(&self) -> impl Iterator<Item = f64> + '_ {
         self.values.iter().copied().filter(|value| !value.is_nan())
     }
 
-    /// How many samples are missing.
+    /// Number of missing samples.
     #[must_use]
     pub fn missing(&self) -> usize {
         self.values.iter().filter(|value| value.is_nan()).count()
@@ -91,7 +91,7 @@ impl Channel {
         interpolated(&self.values)
     }
 
-    /// The name with the unit in brackets, as a header has it; the name alone where there is no unit.
+    /// The name with the unit in brackets, as in a header; the name alone without a unit.
     #[must_use]
     pub fn header(&self) -> String {
         match self.unit.as_str() {
@@ -101,8 +101,8 @@ impl Channel {
     }
 }
 
-/// A series with straight lines, by rows, in place of missing samples (NaN), and the nearest one before the first and behind the last that is
-/// there; as it is where none is.
+/// A series with linear interpolation, by rows, of missing samples (NaN), and constant values before the first and after the last sample;
+/// unchanged if all are missing.
 #[must_use]
 pub fn interpolated(values: &[f64]) -> Vec<f64> {
     let mut values = values.to_vec();
@@ -131,7 +131,7 @@ pub fn interpolated(values: &[f64]) -> Vec<f64> {
 /// `y[k]` is read at `t[k]`, before `u[k]` acts. Outputs at different rates are outputs of which samples are missing.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Record {
-    /// Where it came from (a file's name), for messages.
+    /// Name of the source (a file's name), for messages.
     pub name: String,
     /// Sampling instants \[s\], strictly increasing.
     pub time: Vec<f64>,
@@ -139,9 +139,9 @@ pub struct Record {
     pub inputs: Vec<Channel>,
     /// The sensors' readings; samples may be missing.
     pub outputs: Vec<Channel>,
-    /// The set points, where there is a loop.
+    /// The set points, if there is a loop.
     pub references: Vec<Channel>,
-    /// When its clock stands at zero, where that is known.
+    /// Date and time at zero of the record's clock, if known.
     #[serde(skip)]
     pub calendar: Option<Calendar>,
 }
@@ -157,7 +157,7 @@ impl Record {
         self.time.is_empty()
     }
 
-    /// A part of it, by positions of its rows, under the same name; times are kept.
+    /// A part of the record, by positions of its rows, under the same name; times do not change.
     ///
     /// Positions beyond the last row are left out.
     #[must_use]
@@ -186,7 +186,7 @@ impl Record {
             .chain(&self.references)
     }
 
-    /// What the first input does between samples.
+    /// Hold of the first input.
     #[must_use]
     pub fn hold(&self) -> Hold {
         self.inputs.first().map_or(Hold::Zero, |input| input.hold)
@@ -219,7 +219,7 @@ impl Record {
             .map_or((f64::NAN, f64::NAN), Channel::range)
     }
 
-    /// Checks that an input moves.
+    /// Checks that an input changes.
     ///
     /// # Errors
     /// [`Error::ConstantInput`], which names the record and the first input's column.

@@ -1,10 +1,10 @@
-//! A record on an even grid: done only where somebody asks for it, as it changes the data.
+//! Resampling of a record on an even grid: only on request, because it changes the data.
 
 use crate::{Channel, Error, Hold, Record};
 
 /// Most rows of a grid.
 const MOST_ROWS: f64 = 1e7;
-/// A held sample acts for so many sampling intervals at most: what the command did behind it is not known.
+/// A held sample is valid for at most this number of sampling intervals: the command after it is not known.
 const ACTS: f64 = 1.5;
 
 impl Record {
@@ -48,13 +48,13 @@ impl Record {
         })
     }
 
-    /// Means of a held channel over the intervals of a grid; missing where a part of it is.
+    /// Means of a held channel over the intervals of a grid; missing if a part of an interval is missing.
     fn means(&self, channel: &Channel, grid: &[f64], interval: f64) -> Vec<f64> {
         let mut k = 0;
         let end = |k: usize| self.time.get(k + 1).copied().unwrap_or(f64::INFINITY);
         let acts = ACTS * self.sample_interval();
         let known = |k: usize, until: f64| {
-            // The last sample goes on to the end of its interval of the grid.
+            // The last sample is valid to the end of its interval of the grid.
             k + 1 >= self.len() || until - self.time[k] <= acts
         };
         grid.iter()
@@ -81,7 +81,7 @@ impl Record {
             .collect()
     }
 
-    /// A channel read on lines between its samples.
+    /// Linear interpolation of a channel.
     fn readings(&self, channel: &Channel, grid: &[f64], apart: f64) -> Vec<f64> {
         let present = (0..self.len()).filter(|&k| !channel.values[k].is_nan());
         let samples: Vec<(f64, f64)> = present.map(|k| (self.time[k], channel.values[k])).collect();
@@ -128,10 +128,10 @@ mod tests {
         let coarse = record.resampled(2.0).unwrap();
         assert_eq!(coarse.time, [0.0, 2.0, 4.0, 6.0, 8.0]);
         assert_eq!(coarse.inputs[0].values[..2], [2.0, 5.0]);
-        // What the command did between 5.5 and 8 is not known.
+        // The command between 5.5 and 8 is not known.
         assert!(coarse.inputs[0].values[2..4].iter().all(|u| u.is_nan()));
         assert_eq!(coarse.inputs[0].values[4], 0.0);
-        // Between 4 and 8 nothing was read.
+        // There is no reading between 4 and 8.
         assert_eq!(coarse.outputs[0].values[..3], [0.0, 2.0, 4.0]);
         assert!(coarse.outputs[0].values[3].is_nan() && coarse.outputs[0].values[4] == 8.0);
         assert!(record.resampled(1e-9).is_err());

@@ -1,7 +1,7 @@
-//! Is anything left in a residual? Whiteness, and correlation with the input.
+//! Tests of a residual: whiteness, and correlation with the input.
 //!
 //! Both tests give a probability `p`: how often a residual that is pure noise would look at least
-//! this far from it. Below 0.01, say, something remains.
+//! this far from it. Below 0.01, say, the residual is not noise.
 //!
 //! **Missing samples**: NaN. Means, sums and counts are then over the samples and the pairs of samples that are there. In a
 //! white Gaussian series of `n` samples with `n_k` pairs at lag k,
@@ -17,7 +17,7 @@ use crate::{ArModel, Error};
 /// Highest order of the filters that whiten the input and the residual.
 const MAX_PREWHITENING_ORDER: usize = 20;
 
-/// Lags with fewer pairs of samples do not count where samples are missing: their products are far from Gaussian.
+/// With missing samples, lags with fewer pairs are not used: their products are far from Gaussian.
 const FEWEST_PAIRS: usize = 5;
 
 const LJUNG_BOX: &str = "Ljung-Box test";
@@ -35,16 +35,16 @@ pub fn autocorrelation(x: &[f64], max_lag: usize) -> Vec<f64> {
     correlation
 }
 
-/// Correlation of `u[k]` with `e[k + lag]`, means removed, at lags `0..=max_lag`: `u` leads, so a
-/// residual that the input explains shows at lags above 0.
+/// Correlation of `u[k]` with `e[k + lag]`, means removed, at lags `0..=max_lag`: `u` leads, so the effect of an input on a residual is
+/// visible at lags above 0.
 ///
 /// The sum at each lag is divided by the number of samples, as is usual, which keeps values within
 /// -1..1. 0 at lags that the record is too short for, and at all when one of the two does not vary.
 /// Of two series of different lengths the end of the longer is left out.
 ///
-/// Where samples are missing (NaN) it is, at each lag, the correlation over the pairs that are there, times
-/// `(N - lag)/N` for the series' length `N`, as that of a whole series has it. Its standard deviation is then about `(N - lag)/N` over the root of
-/// the number of [`pairs`], for white series.
+/// Where samples are missing (NaN) it is, at each lag, the correlation over the pairs that are there, times `(N - lag)/N` for the series'
+/// length `N`, as that of a whole series has it. Its standard deviation is then about `(N - lag)/N` over the root of the number of
+/// [`pairs`], for white series.
 pub fn cross_correlation(u: &[f64], e: &[f64], max_lag: usize) -> Vec<f64> {
     let n = u.len().min(e.len());
     let (u, e) = (centred(&u[..n]), centred(&e[..n]));
@@ -72,7 +72,7 @@ pub fn cross_correlation(u: &[f64], e: &[f64], max_lag: usize) -> Vec<f64> {
         .collect()
 }
 
-/// How many pairs `u[k]`, `e[k + lag]` are there at lags `0..=max_lag`: `n - lag` where no sample is missing (NaN).
+/// Number of pairs `u[k]`, `e[k + lag]` at lags `0..=max_lag`: `n - lag` if no sample is missing (NaN).
 pub fn pairs(u: &[f64], e: &[f64], max_lag: usize) -> Vec<usize> {
     let n = u.len().min(e.len());
     let (u, e) = (&u[..n], &e[..n]);
@@ -93,8 +93,8 @@ pub fn pairs(u: &[f64], e: &[f64], max_lag: usize) -> Vec<usize> {
 /// Reference: G. M. Ljung, G. E. P. Box, *On a measure of lack of fit in time series models*,
 /// Biometrika 65 (1978) 297-303.
 ///
-/// Missing samples are NaN: `n` counts the samples that are there, and `rho_k` is the sum over the pairs that are there over
-/// that of all squares. Where `x` is a whitened series, its innovations behind a gap count like any others.
+/// Missing samples are NaN: `n` counts the samples that are there, and `rho_k` is the sum over the pairs that are there over that of all
+/// squares. Where `x` is a whitened series, its innovations after a gap count like any others.
 ///
 /// # Errors
 /// [`Error::InvalidSetting`] unless `fitted < lags`, [`Error::TooFewSamples`] unless there are more
@@ -118,12 +118,11 @@ pub fn ljung_box(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Error> {
 /// Whether the residual `e` is independent of the input's past: the correlation at lags `0..=lags`
 /// and the probability `p` of lags `1..=lags` under that hypothesis.
 ///
-/// The correlation of two smooth signals is large by chance alone, so both are first made white,
-/// each by an autoregressive filter fitted to it (Haugh's test). The order is at most 20, by BIC,
-/// and 0 for a residual that is white already. The share of `e` that its regression on `u` at lags `1..=lags` explains, times `n`, is then
-/// chi-square with as many degrees of freedom as lags are distinct. Haugh's sum of squared correlations is the same where `u` is white; a filter
-/// leaves the moves of an input that steps at regular times periodic, and its correlations at lags a period apart are then one and
-/// the same.
+/// The correlation of two smooth signals is large by chance alone, so both are first made white, each by an autoregressive filter fitted to
+/// it (Haugh's test). The order is at most 20, by BIC, and 0 for a residual that is white already. The share of `e` that its regression on
+/// `u` at lags `1..=lags` explains, times `n`, is then chi-square with as many degrees of freedom as lags are distinct. Haugh's sum of
+/// squared correlations is the same where `u` is white; a filter leaves the moves of an input that steps at regular times periodic, and its
+/// correlations at lags a period apart are then one and the same.
 ///
 /// Lag 0 is reported but does not count: `y[k]` is read before `u[k]` acts, so the input cannot
 /// show there, while a controller that reads `y[k]` can.
@@ -161,8 +160,8 @@ pub fn prewhitened_input_test(u: &[f64], e: &[f64], lags: usize) -> Result<(Vec<
     Ok((correlation, regression_on_lags(TASK, &u, &e, lags)?))
 }
 
-/// The probability that white `e` is explained that well by `u` at lags `1..=lags`. What is missing of `u` is its mean, rows that `e` lacks
-/// do not count.
+/// p-value of the regression of a white `e` on `u` at lags `1..=lags`. Missing samples of `u` are replaced by its mean; rows without `e`
+/// are not used.
 fn regression_on_lags(task: &'static str, u: &[f64], e: &[f64], lags: usize) -> Result<f64, Error> {
     let (u, e) = (centred(u), centred(e));
     let counted: Vec<usize> = (1..=lags)
@@ -203,7 +202,7 @@ fn regression_on_lags(task: &'static str, u: &[f64], e: &[f64], lags: usize) -> 
         }
     }
     if rank == 0 || squares <= 0.0 {
-        // A series that does not vary is correlated with nothing.
+        // A constant series has no correlation with any series.
         return Ok(1.0);
     }
     exceedance(e.len() as f64 * explained / squares, rank)
@@ -272,7 +271,7 @@ fn check_length(task: &'static str, n: usize, lags: usize) -> Result<(), Error> 
     })
 }
 
-/// Sums over the pairs `u[t]`, `e[t + lag]` that are there.
+/// Sums over the present pairs `u[t]`, `e[t + lag]`.
 struct Pairs {
     count: usize,
     product: f64,
@@ -304,7 +303,7 @@ fn has_missing(x: &[f64]) -> bool {
     x.iter().any(|x| x.is_nan())
 }
 
-/// Samples that are there.
+/// Number of present samples.
 fn present(x: &[f64]) -> usize {
     x.iter().filter(|x| !x.is_nan()).count()
 }

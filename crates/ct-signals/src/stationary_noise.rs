@@ -40,7 +40,7 @@ impl StationaryNoise {
         }
     }
 
-    /// Of an autoregression, with innovations of variance 1.
+    /// From an autoregression, with innovations of variance 1.
     pub fn of_ar(ar: &ArModel) -> Self {
         let ar = ar.coefficients();
         let o = ar.len();
@@ -170,7 +170,7 @@ impl CovarianceSum<'_> {
         }
     }
 
-    /// What was pushed so far, symmetric, row by row.
+    /// The matrix of the pushed values, symmetric, row by row.
     pub fn finish(self) -> Vec<f64> {
         let q = self.q;
         let at = |ij: usize| self.sum[ij] + self.sum[(ij % q) * q + ij / q];

@@ -1,4 +1,4 @@
-//! The filter that whitens signals of any stationary process row by row, missing rows among them.
+//! The filter that whitens signals of any stationary process row by row, with missing rows.
 //!
 //! Model: that of [`StationaryNoise`](crate::StationaryNoise), by its autocovariance alone, `R(0) = r`, `R(j) = c' A^{j-1} g`.
 //!
@@ -18,7 +18,7 @@
 
 use crate::StationaryNoise;
 
-/// The least `r_e` over `r`: less is rounding.
+/// The least ratio of `r_e` to `r`: smaller values are rounding errors.
 const ROUNDING: f64 = 1e-14;
 
 /// Whitens rows of several signals, without allocating; made by [`StationaryNoise::whitener`].
@@ -28,7 +28,7 @@ pub struct StationaryWhitener<'a> {
     /// Row by row, the entries of A that are not 0.
     a: Vec<Vec<(usize, f64)>>,
     lanes: usize,
-    /// x^, lane by lane.
+    /// x^, signal by signal.
     states: Vec<f64>,
     next: Vec<f64>,
     /// S, and `A S`.
@@ -56,7 +56,7 @@ impl<'a> StationaryWhitener<'a> {
         }
     }
 
-    /// Replaces the row of samples at one instant, one value for each lane, by its whitened row, and gives the variance of its prediction
+    /// Replaces the row of samples at one instant, one value for each signal, by its whitened row, and gives the variance of its prediction
     /// from the rows before it, in that of the innovations.
     pub fn push(&mut self, row: &mut [f64]) -> f64 {
         let (nu, c) = (self.noise.order(), self.noise.c());
@@ -120,7 +120,7 @@ impl<'a> StationaryWhitener<'a> {
         }
     }
 
-    /// `x^+ = A x^ + k e` of a lane.
+    /// `x^+ = A x^ + k e` of a signal.
     fn advance(&mut self, lane: usize, error: f64) {
         let nu = self.noise.order();
         let state = &mut self.states[lane * nu..(lane + 1) * nu];
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
     use crate::ArModel;
 
-    /// Of an autoregression it is the exact whitening of [`ArModel`], whichever rows are missing.
+    /// For an autoregression the result equals the exact whitening of [`ArModel`], whichever rows are missing.
     #[test]
     fn an_autoregression_is_whitened_as_by_its_own_filter() {
         let ar = ArModel::from_coefficients(&[1.2, -0.5, 0.1], 1.0).unwrap();

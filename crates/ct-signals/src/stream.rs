@@ -21,60 +21,60 @@ use crate::{
 /// The names of the columns in use, where they have no header.
 const ROLES: [&str; 3] = ["time", "input", "output"];
 
-/// How the times of rows are written.
+/// Format of the times of rows.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RowTimes {
-    /// As numbers.
+    /// Times are numbers.
     Numbers,
-    /// As times of day, which say no day; they count from the first row.
+    /// Times of day without a date; they count from the first row.
     TimesOfDay,
-    /// As dates.
+    /// Times are dates.
     Dates {
-        /// Where the times count from.
+        /// Origin of the times.
         calendar: Calendar,
-        /// The first cell has no offset from UTC: what it means follows from the zone.
+        /// The first cell has no offset from UTC: its instant depends on the zone.
         civil: bool,
     },
 }
 
-/// How rows are read.
+/// Format of rows.
 #[derive(Debug, Clone)]
 pub struct Rows {
     delimiter: u8,
-    /// The header, where there is one: it may come again.
+    /// The header, if there is one: it may be repeated in the stream.
     header: Option<String>,
     /// Fields of a row.
     fields: usize,
     /// Positions of time, inputs and outputs.
     at: Vec<usize>,
-    /// How many of them are inputs, one at least.
+    /// Number of inputs, at least one.
     inputs: usize,
-    /// Their headers.
+    /// Headers of the columns.
     names: Vec<String>,
     /// Units of inputs and outputs.
     units: Vec<String>,
-    /// How inputs and outputs are converted to these, where the header has other ones.
+    /// Conversion of each input and output from the header's unit.
     conversions: Vec<Option<Conversion>>,
     /// The cells of the latest row: time, inputs, outputs.
     values: Vec<Result<f64, BadLine>>,
     /// Seconds in one unit of the time, where it is a number.
     seconds: f64,
     columns: Columns,
-    /// How the time is written; `None` until a row has been read.
+    /// Format of the time; `None` before the first row.
     times: Option<Times>,
-    /// Where dates count from and what they follow, where this is known beforehand.
+    /// Origin of dates and the date before it, if known beforehand.
     start: Option<(Timestamp, Timestamp)>,
     /// Dates of this stream have no offset.
     civil: bool,
     numbers: Numbers,
 }
 
-/// What a line holds.
+/// Content of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Line {
     /// Time \[s\] and the first input, NaN where there is none; all inputs are in [`Rows::inputs`], the outputs in [`Rows::outputs`].
     Row([f64; 2]),
-    /// Nothing: it is blank, a comment, or the header again.
+    /// No data: blank line, comment, or repeated header.
     Nothing,
 }
 
@@ -83,8 +83,8 @@ impl Rows {
     /// The second value is whether the line is a row, to be read by [`Rows::read`] too.
     ///
     /// # Errors
-    /// As of [`read_csv`](crate::read_csv) for a header; [`Error::NoOrder`] for numbers that are neither time, input and outputs nor these with
-    /// a reference. There is one output where `columns` name none.
+    /// As of [`read_csv`](crate::read_csv) for a header; [`Error::NoOrder`] for numbers that are neither time, input and outputs nor these
+    /// with a reference. There is one output where `columns` name none.
     pub fn begin(
         file: &str,
         row: u64,
@@ -113,7 +113,7 @@ impl Rows {
         };
         if is_row(&cells, columns) {
             let outputs = columns.outputs.len().max(1);
-            // Where the first channel stands: behind the time, or behind the reference that follows it.
+            // Position of the first channel: after the time, or after the reference.
             let inputs = usize::from(!columns.without_inputs);
             let first = match cells.len().checked_sub(outputs + inputs) {
                 Some(1) => 1,
@@ -201,12 +201,12 @@ impl Rows {
         self.names.get(before + at).map_or("", String::as_str)
     }
 
-    /// Units of inputs and outputs, in order and in printable text; empty where nothing says.
+    /// Units of inputs and outputs, in order and in printable text; empty if unknown.
     pub fn units(&self) -> impl Iterator<Item = &str> {
         self.units.iter().map(String::as_str)
     }
 
-    /// The outputs of the row that was read last, or why there is none: its cell says that the sample is missing, or holds no number.
+    /// Outputs of the last row, or the reason why one is missing: its cell marks a missing sample, or contains no number.
     pub fn outputs(&self) -> &[Result<f64, BadLine>] {
         &self.values[1 + self.inputs..]
     }
@@ -223,7 +223,7 @@ impl Rows {
         self.seconds
     }
 
-    /// How the times are written, once a row has been read.
+    /// Format of the times, known after the first row.
     #[must_use]
     pub fn times(&self) -> Option<RowTimes> {
         let times = self.times.as_ref()?;
@@ -242,8 +242,7 @@ impl Rows {
         self.start = Some((calendar.start, calendar.start.after(last)));
     }
 
-    /// The times go on as those of other rows of the same stream, which came before: dates count from the same zero, and what was a number
-    /// stays one.
+    /// Continues the times of earlier rows of the same stream: dates count from the same zero, and numbers stay numbers.
     pub fn go_on(&mut self, before: &Self) {
         self.times = match &before.times {
             Some(Times::Numbers(_)) => Some(Times::Numbers(self.seconds)),
@@ -253,7 +252,7 @@ impl Rows {
         self.start = before.start;
     }
 
-    /// In which order a row's fields are read, in words.
+    /// Order of a row's fields, in words.
     #[must_use]
     pub fn order(&self) -> String {
         let (inputs, outputs) = self.names[1..].split_at(self.inputs);
@@ -294,7 +293,7 @@ impl Rows {
     }
 }
 
-/// Whether the cells of a first line are a row, and no names: numbers alone, or a time, whole or the end of one, and what may stand for samples.
+/// Whether the cells of a first line are a row and no names: numbers only, or a complete or partial time, and marks of missing samples.
 fn is_row(cells: &[String], columns: &Columns) -> bool {
     let format = columns.time_format.as_deref();
     let is_time = |cell: &str| {
@@ -314,13 +313,13 @@ fn is_row(cells: &[String], columns: &Columns) -> bool {
     }
 }
 
-/// Whether a cell may be what is left of a date or a time where a stream was joined within a row.
+/// Whether a cell may be the end of a date or a time, if the stream was joined within a row.
 fn is_end_of_time(cell: &str) -> bool {
     let part = |c: char| c.is_ascii_digit() || " -/.:+TZ".contains(c);
     cell.chars().all(part) && cell.ends_with(|c: char| c.is_ascii_digit() || c == 'Z')
 }
 
-/// What so many readings of a row without a header are called.
+/// Names of the readings of a row without a header.
 pub(crate) fn letters(outputs: usize, between: &str) -> String {
     let of_output = |output: usize| match outputs {
         1 => "y".to_string(),
@@ -343,7 +342,7 @@ fn cells(line: &str, delimiter: u8) -> Vec<String> {
         .has_headers(false)
         .delimiter(delimiter)
         .trim(Trim::All)
-        // The line was cut at its end, so nothing in it ends it again.
+        // A line without its end, so that no character in it ends the line again.
         .terminator(Terminator::Any(b'\n'))
         .from_reader(line.as_bytes());
     let mut record = StringRecord::new();

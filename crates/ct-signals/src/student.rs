@@ -2,11 +2,11 @@
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-/// From so many degrees of freedom on, the quantile is that of the series in 1/freedom.
+/// From this number of degrees of freedom on, the quantile is computed from the series in 1/freedom.
 const MANY: f64 = 1e4;
 
-/// Half the width, in standard errors, of the interval that holds the truth with probability `level` (0 to 1, both excluded), for a variance of so
-/// many degrees of freedom (fewer than 1 count as 1); NaN for another level.
+/// Half the width, in standard errors, of the interval that contains the true value with probability `level` (0 to 1, both excluded), for a
+/// variance of so many degrees of freedom (fewer than 1 count as 1); NaN for another level.
 ///
 /// Beyond 10 000 degrees these are the first two terms of Cornish and Fisher, the third being below 1e-12 there.
 pub fn student_half_width(level: f64, freedom: f64) -> f64 {
@@ -16,7 +16,7 @@ pub fn student_half_width(level: f64, freedom: f64) -> f64 {
     let at = 0.5 + 0.5 * level;
     let freedom = freedom.max(1.0);
     if freedom < MANY {
-        // StudentsT loses its digits for many degrees, and above 1e8 its end.
+        // StudentsT loses accuracy for many degrees of freedom, and above 1e8 its tail.
         return StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(at));
     }
     let z = Normal::standard().inverse_cdf(at);
@@ -30,7 +30,7 @@ pub fn student_half_width(level: f64, freedom: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The values of tables, and no jump between the two ways.
+    /// Compares with tables, and checks that the two formulas agree where they meet.
     #[test]
     fn quantiles_are_those_of_tables() {
         for (freedom, level, quantile) in [

@@ -70,7 +70,7 @@ impl Timestamp {
         self.nanoseconds
     }
 
-    /// Seconds from another instant to this one; nothing is lost but what an `f64` cannot hold.
+    /// Seconds from another instant to this one, exact to the precision of an `f64`.
     #[must_use]
     pub fn seconds_since(self, first: Self) -> f64 {
         let seconds = self.seconds.saturating_sub(first.seconds);
@@ -80,7 +80,7 @@ impl Timestamp {
             .and_then(|total| total.checked_add(nanoseconds));
         match total {
             Some(total) => total as f64 / 1e9,
-            // Three hundred years hold no nanoseconds in an `f64`.
+            // An `f64` cannot represent nanoseconds over three hundred years.
             None => seconds as f64 + nanoseconds as f64 / 1e9,
         }
     }
@@ -136,7 +136,7 @@ pub struct TimestampReader {
     zone: Zone,
     /// The first cell, for messages.
     first: String,
-    /// Times for which the offset of the zone is known.
+    /// Time intervals for which the offset of the zone is known.
     known: KnownOffset,
     previous: Option<Timestamp>,
     /// Seconds at the last midnight that was passed, where the cells have no date.
@@ -146,7 +146,7 @@ pub struct TimestampReader {
 #[derive(Debug, Clone)]
 enum Written {
     Form(Form),
-    /// Day and month are the same in all cells that were shown, so that it is not known which is which.
+    /// Day and month are equal in all cells so far, so their order is not known.
     Symmetric(Form),
     Format(String),
 }
@@ -155,8 +155,8 @@ impl TimestampReader {
     /// Finds how the cells of a column are written.
     ///
     /// `format` is a format of `strftime`, which is then not looked for. `zone` is the zone of times that have no offset; UTC where it is
-    /// absent. `cells` are the first cells of the column or all of them: further ones than the first are looked at only where
-    /// day and month cannot be told apart without them.
+    /// absent. `cells` are the first cells of the column or all of them: further ones than the first are looked at only where day and month
+    /// cannot be distinguished without them.
     ///
     /// # Errors
     /// [`TimestampError::UnknownZone`], [`TimestampError::NoCells`], [`TimestampError::UnknownForm`], [`TimestampError::DayOrMonth`],
@@ -205,7 +205,7 @@ impl TimestampReader {
         self.dated
     }
 
-    /// That the cells that were shown tell day and month apart: of a stream no later cell will, before it is read.
+    /// Checks that the cells so far distinguish day and month: a stream cannot be read ahead.
     ///
     /// # Errors
     /// [`TimestampError::DayOrMonth`].
@@ -222,7 +222,7 @@ impl TimestampReader {
         fields.is_ok_and(|fields| fields.offset.is_none())
     }
 
-    /// The next cell follows this instant: of an hour that occurs twice it tells which one is meant.
+    /// Notes that the next cell is later than this instant: this decides between the two occurrences of a repeated hour.
     pub(crate) fn follow(&mut self, instant: Timestamp) {
         self.previous = Some(instant);
     }
@@ -246,8 +246,8 @@ impl TimestampReader {
         Ok(instant)
     }
 
-    /// An instant that a person gives as a limit of this column: as [`Zone::bound`], or as the column is written, or a time of day where
-    /// it has no dates.
+    /// An instant that a user gives as a limit of this column: as [`Zone::bound`], in the format of the column, or a time of day if the
+    /// column has no dates.
     ///
     /// # Errors
     /// As of [`Zone::bound`].
@@ -278,7 +278,7 @@ impl TimestampReader {
         }
     }
 
-    /// An instant for people as [`Zone::format`] writes it; without dates the time of day, and how many midnights have passed.
+    /// An instant in the format of [`Zone::format`]; without dates the time of day, and the number of midnights passed.
     #[must_use]
     pub fn format(&self, instant: Timestamp) -> String {
         if self.has_dates() {
@@ -332,7 +332,7 @@ impl TimestampReader {
         }
     }
 
-    /// Seconds since the first midnight. The time has passed another one where it falls by more than half a day.
+    /// Seconds since the first midnight. A fall of the time by more than half a day means another midnight.
     fn time_of_day(&mut self, fields: &Fields) -> Timestamp {
         let mut seconds = self.midnight + fields.seconds;
         if let Some(previous) = self.previous

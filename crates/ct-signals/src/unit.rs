@@ -8,8 +8,8 @@ mod table;
 pub use dimension::Dimension;
 pub use quantity::{Conversion, Unit};
 
-/// Units that are understood after an underscore, where there is no bracket to say so. Missing are those that are more often a part of the
-/// name: `T_l`, `u_in`, `q_h`, `T_rad`, `omega_N`.
+/// Units that are understood after an underscore, without brackets. Units that are usually a part of the name are not included: `T_l`,
+/// `u_in`, `q_h`, `T_rad`, `omega_N`.
 const SUFFIXES: &[&str] = &[
     "V", "mV", "kV", "A", "mA", "m", "cm", "mm", "C", "degC", "°C", "degF", "°F", "K", "bar",
     "mbar", "Pa", "hPa", "kPa", "MPa", "psi", "%", "pct", "percent", "ppm", "Hz", "kHz", "rpm",
@@ -23,7 +23,7 @@ const TIME_SUFFIXES: &[&str] = &["us", "ms", "s", "min", "h", "d"];
 /// The units of time that are understood, as a message lists them.
 pub(crate) const TIMES: &str = "us, ms, s, min, h and d";
 
-/// A header's name and unit; the unit is empty where the header does not say.
+/// Name and unit of a header; the unit is empty if there is none.
 pub(crate) fn split(header: &str) -> (&str, &str) {
     let header = header.trim();
     if let Some(split) = split_bracket(header) {
@@ -52,7 +52,7 @@ pub(crate) fn split_bracket(header: &str) -> Option<(&str, &str)> {
     None
 }
 
-/// The conversion of values in one unit to another, by their texts; `None` where either is unknown or they measure different things.
+/// The conversion of values in one unit to another, by their texts; `None` if either is unknown or their dimensions differ.
 pub(crate) fn conversion(from: &str, to: &str) -> Option<Conversion> {
     Unit::parse(from)?.conversion_to(&Unit::parse(to)?)
 }

@@ -13,7 +13,7 @@ use crate::ArModel;
 
 /// Gaps of up to so many rows for each coefficient are passed row by row, which is cheaper.
 const ONE_BY_ONE: usize = 16;
-/// Powers of the state's matrix below this have forgotten the state.
+/// Powers of the state's matrix below this are treated as zero.
 const FORGOTTEN: f64 = 1e-40;
 
 /// Whitens a row of several signals at a time, without allocating; made by [`ArModel::whitener`].
@@ -34,15 +34,15 @@ pub struct Whitener {
     slot: usize,
     /// The slots of the last `p` rows that are lost, the oldest first.
     lost: Vec<usize>,
-    /// Covariance of the lost rows' estimates by slots, `(p + 1) x (p + 1)`, in `sigma^2`; other rows' entries hold nothing.
+    /// Covariance of the lost rows' estimates by slots, `(p + 1) x (p + 1)`, in `sigma^2`; entries of other rows are not used.
     covariance: Vec<f64>,
-    /// For each of the lost: its covariance with the next row; after that row has come, its gain.
+    /// For each lost row: its covariance with the next row; after the next row, its gain.
     with_next: Vec<f64>,
     predicted: Vec<f64>,
 }
 
 impl Whitener {
-    /// Of `lanes` signals at once.
+    /// For `lanes` signals at once.
     pub(crate) fn new(model: &ArModel, lanes: usize) -> Self {
         let p = model.order();
         let reflections = model.reflections();
@@ -68,9 +68,8 @@ impl Whitener {
         }
     }
 
-    /// Replaces the row of samples at one instant, one value for each lane, by its whitened row, in
-    /// the same unit: innovations of the process come out with variance `sigma^2`. Order 0 leaves
-    /// the row as it is, bit for bit.
+    /// Replaces the row of samples at one instant, one value for each signal, by its whitened row, in the same unit: innovations of the
+    /// process come out with variance `sigma^2`. Order 0 leaves the row as it is, bit for bit.
     pub fn push(&mut self, row: &mut [f64]) {
         debug_assert_eq!(row.len(), self.lanes, "one value for each lane");
         let p = self.scales.len();
@@ -122,8 +121,8 @@ impl Whitener {
         1.0 / (scale * scale)
     }
 
-    /// The row of the next instant is lost. The rows behind it come out whitened all the same, with variance `sigma^2` and
-    /// independent of each other: until `p` of them have come, the lost ones are estimated from their neighbours.
+    /// The row of the next instant is lost. The rows after it come out whitened all the same, with variance `sigma^2` and independent of
+    /// each other: until `p` of them have come, the lost ones are estimated from their neighbours.
     ///
     /// Lost rows before the first of a record change nothing.
     pub fn skip(&mut self) {
@@ -161,7 +160,7 @@ impl Whitener {
         }
     }
 
-    /// As so many calls of [`Whitener::skip`] where all of the last `p` rows are lost.
+    /// As `rows` calls of [`Whitener::skip`] if all of the last `p` rows are lost.
     fn skip_squaring(&mut self, mut rows: usize) {
         let (p, lanes) = (self.scales.len(), self.lanes);
         let slots: Vec<usize> = (1..=p)
@@ -174,7 +173,7 @@ impl Whitener {
         }
         let at = |ij: usize| self.covariance[slots[ij / p] * (p + 1) + slots[ij % p]];
         let mut covariance: Vec<f64> = (0..p * p).map(at).collect();
-        // Of 1, 2, 4, ... steps: their matrix, and the covariance of the noise that they add.
+        // For 1, 2, 4, ... steps: the transition matrix, and the covariance of the noise over these steps.
         let mut power = vec![0.0; p * p];
         power[..p].copy_from_slice(&self.coefficients);
         for i in 1..p {
@@ -192,7 +191,7 @@ impl Whitener {
         };
         while rows > 0 {
             if power.iter().all(|a| a.abs() < FORGOTTEN) {
-                // Whatever was before does not matter any more.
+                // The earlier rows have no influence any more.
                 self.reset();
                 return;
             }
@@ -212,11 +211,11 @@ impl Whitener {
         }
     }
 
-    /// As [`Whitener::push_with_variance`], where one of the last `p` rows is lost.
+    /// As [`Whitener::push_with_variance`], if one of the last `p` rows is lost.
     fn push_behind_lost(&mut self, row: &mut [f64]) -> f64 {
         let (p, lanes) = (self.scales.len(), self.lanes);
         let variance = self.predict();
-        // What this row says of the lost ones.
+        // Update of the lost rows from this row.
         for (i, &slot) in self.lost.iter().enumerate() {
             let gain = self.with_next[i] / variance;
             let past = &mut self.history[slot * lanes..][..lanes];
@@ -247,7 +246,7 @@ impl Whitener {
         lags.zip(self.with_next.iter().copied())
     }
 
-    /// How many rows before the next one, 1 to `p`.
+    /// Distance to the next row, 1 to `p`.
     fn lag(&self, slot: usize) -> usize {
         if self.slot > slot {
             self.slot - slot

@@ -1,5 +1,4 @@
-//! The trace of every effect of the catalogue, as `docs/gallery.md` shows it:
-//! `cargo run --release -p ctid --example gallery`.
+//! The signature of every effect of the catalogue for `docs/gallery.md`: `cargo run --release -p ctid --example gallery`.
 
 fn main() {
     print!("{}", ctid::catalogue::gallery());

@@ -1,4 +1,4 @@
-//! Writes a file whole or not at all: beside it under another name first, then renamed.
+//! Writes a file completely or not at all: first under a temporary name in the same folder, then renamed.
 
 #[cfg_attr(unix, path = "atomic/unix.rs")]
 #[cfg_attr(not(unix), path = "atomic/other.rs")]
@@ -15,11 +15,11 @@ use tempfile::NamedTempFile;
 
 use crate::Error;
 
-/// A lock is held for some milliseconds: so often and after such a pause it is asked for again.
+/// A lock is held for some milliseconds: number of attempts to get it, and the pause between them.
 const TRIES: u32 = 100;
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// What a run that was killed leaves behind has such a name, with so many letters and digits between.
+/// Prefix of a temporary file, which a killed run may leave behind; random letters and digits follow the prefix.
 const PREFIX: &str = ".ctid-";
 const SUFFIX: &str = ".part";
 const LETTERS: usize = 12;
@@ -35,7 +35,7 @@ pub(crate) fn write_if(
     replace(path, content, still).map_err(|error| unwritten(path, &error))
 }
 
-/// Puts `content` into a new file; whether there was none.
+/// Writes `content` into a new file; returns false if the file exists.
 pub(crate) fn create(path: &Path, content: &[u8]) -> Result<bool, Error> {
     let created = fs::symlink_metadata(path).is_err();
     let created = created.then(|| new(path, content));
@@ -91,7 +91,7 @@ fn replace(path: &Path, content: &[u8], still: impl FnOnce() -> bool) -> io::Res
             "it is write-protected",
         ));
     }
-    // Nobody reads the new text whom the old file does not let.
+    // The new file is readable only for those who could read the old one.
     let mut file = beside_with(&target, 0o600)?;
     let alike = attributes::links(&metadata) == 1
         && attributes::copy(&old, &metadata, file.as_file()).is_ok();
@@ -109,7 +109,7 @@ fn replace(path: &Path, content: &[u8], still: impl FnOnce() -> bool) -> io::Res
     Ok(true)
 }
 
-/// A new file; one that is there is an error, also where it came at the last moment.
+/// Creates a file; an existing one is an error, also if it appeared at the last moment.
 fn new(path: &Path, content: &[u8]) -> io::Result<()> {
     let mut file = beside(path)?;
     file.write_all(content)?;
@@ -127,18 +127,18 @@ fn target(path: &Path) -> io::Result<PathBuf> {
             io::ErrorKind::NotFound,
             "it is a link to a file that is not there",
         )),
-        // A file that is not there yet has no canonical name.
+        // A file that does not exist yet has no canonical name.
         Err(_) => Ok(path.to_path_buf()),
     }
 }
 
-/// A link whose file is not there.
+/// A link to a file that does not exist.
 pub(crate) fn leads_nowhere(path: &Path) -> bool {
     let link = fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink());
     link && fs::metadata(path).is_err()
 }
 
-/// The last resort: what stood there is written back where this fails, but a kill between leaves a part.
+/// The last resort: the old content is restored after an error, but a kill in between leaves a partial file.
 fn write_in_place(path: &Path, content: &[u8]) -> io::Result<()> {
     let before = fs::read(path)?;
     let mut file = OpenOptions::new().write(true).open(path)?;
@@ -153,16 +153,16 @@ fn write_in_place(path: &Path, content: &[u8]) -> io::Result<()> {
     })
 }
 
-/// The new name is then on the disk too. Some systems cannot do this to a folder; the file is in its place all the same.
+/// Makes the new name durable. Some systems cannot do this for a folder; the file is in its place nevertheless.
 fn sync_folder(path: &Path) {
     if let Ok(folder) = File::open(folder(path)) {
         let _ = folder.sync_all();
     }
 }
 
-/// A file in the same folder that vanishes unless it is renamed.
+/// A file in the same folder that is deleted unless it is renamed.
 pub(crate) fn beside(path: &Path) -> io::Result<NamedTempFile> {
-    // As any new file: the umask takes its part away.
+    // Permissions of a new file, reduced by the umask.
     beside_with(path, 0o666)
 }
 
@@ -174,7 +174,7 @@ fn beside_with(path: &Path, mode: u32) -> io::Result<NamedTempFile> {
     attributes::set_mode(&mut builder, mode);
     for _ in 0..TRIES {
         let file = builder.tempfile_in(&folder)?;
-        // Another run may have taken it for abandoned just before it was locked.
+        // Another run may have deleted it as abandoned just before it was locked.
         let taken = matches!(file.as_file().try_lock(), Err(TryLockError::WouldBlock));
         if !taken && file.path().exists() {
             return Ok(file);
@@ -183,7 +183,7 @@ fn beside_with(path: &Path, mode: u32) -> io::Result<NamedTempFile> {
     Err(io::ErrorKind::ResourceBusy.into())
 }
 
-/// Removes what killed runs have left in a folder: a run locks its file as long as it lives.
+/// Removes temporary files of killed runs from a folder: a running program holds a lock on its file.
 fn remove_abandoned(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else {
         return;
@@ -208,7 +208,7 @@ fn is_temporary(name: &OsStr) -> bool {
     })
 }
 
-/// The folder that holds a path.
+/// The folder that contains a path.
 pub(crate) fn folder(path: &Path) -> PathBuf {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),

@@ -1,4 +1,4 @@
-//! `ctid effects`: the catalogue, and what it knows of one effect.
+//! `ctid effects`: the catalogue of effects, and the description of one effect.
 
 use plants::{CATALOGUE, Domain, EffectInfo, Known, ParameterInfo, Place, Placed, Plant};
 
@@ -25,7 +25,7 @@ fn offered(model: &ModelFile, effect: &'static EffectInfo) -> bool {
         && model.effects.iter().all(|on| on.effect.id != effect.id)
 }
 
-/// The effects that go with what somebody says of the plant, best first; of a model those that may be added to it.
+/// The effects that match a description of a symptom, best first; with a model, those that may be added to it.
 ///
 /// # Errors
 /// Where none does.
@@ -48,7 +48,7 @@ pub(crate) fn like(
     Ok(rows.collect())
 }
 
-/// An effect and what it is.
+/// Describes one effect of the catalogue.
 fn row(effect: &EffectInfo, domain: Domain, widest: usize, look: Look) -> String {
     let first = format!(
         "  {}{}  ",
@@ -131,7 +131,7 @@ pub fn describe(id: &str, look: Look) -> Result<String, Error> {
     Ok(text)
 }
 
-/// The traces of all effects as a page of Markdown, for `docs/gallery.md`.
+/// The signatures of all effects as a page of Markdown, for `docs/gallery.md`.
 #[must_use]
 pub fn gallery() -> String {
     let mut text = String::new();
@@ -180,7 +180,7 @@ fn place(effect: &'static EffectInfo) -> String {
     }
 }
 
-/// The parameters that it has on any plant, in any vessel.
+/// The parameters of the effect on any plant, in any vessel.
 fn parameters(effect: &'static EffectInfo, look: Look) -> String {
     let mut all: Vec<ParameterInfo> = Vec::new();
     for plant in applies_to(effect) {

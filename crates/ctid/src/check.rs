@@ -1,4 +1,4 @@
-//! `ctid check`: what a model's text holds.
+//! `ctid check`: summary of a model's text.
 
 use std::path::Path;
 
@@ -10,10 +10,10 @@ use crate::look::{Look, Side, table};
 use crate::model_file;
 use crate::own_model::{self, AnyModelFile};
 
-/// Reads a model and says what it holds; of a model file the model that it names, with its effects in it.
+/// Reads a model and prints a summary; for a model file, the model that it names with its effects included.
 ///
 /// # Errors
-/// One line that names the file, line and column, what is wrong and the mend.
+/// One line that names the file, line and column, what is wrong and the correction.
 pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     if path.extension().is_none_or(|kind| kind != "toml") {
         return Ok(said(&own_model::read_model(path)?, look) + &unknown(path, look));
@@ -27,9 +27,9 @@ pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     }
 }
 
-/// Warnings of units that are none, each with its place in the text.
+/// Warnings about unknown units, each with its place in the text.
 fn unknown(path: &Path, look: Look) -> String {
-    // What cannot be read twice, as a pipe, was read as a model.
+    // A file that cannot be read twice, such as a pipe, was read as a model.
     let Ok(text) = model_file::read_text(path) else {
         return String::new();
     };
@@ -42,7 +42,7 @@ fn unknown(path: &Path, look: Look) -> String {
     lines.collect()
 }
 
-/// What a model holds, in words.
+/// Summary of a model in words.
 pub(crate) fn said(model: &ModelSpec, look: Look) -> String {
     let mut text = String::new();
     let title = match model.description.as_str() {
@@ -135,7 +135,7 @@ fn linearity(model: &ModelSpec) -> String {
     }
 }
 
-/// Name, unit, what is said of it, bounds, description.
+/// Name, unit, kind, bounds, description.
 fn row(about: &About, value: &str, kind: &str) -> Vec<String> {
     let bounds = match (about.min.is_finite(), about.max.is_finite()) {
         (false, false) => String::new(),

@@ -1,10 +1,10 @@
-//! What is wrong with the columns of a record that the option `--columns` names.
+//! Errors in the columns of a record that the option `--columns` names.
 
 use ct_signals::{ColumnFault, Error as Record};
 
 use crate::Error;
 
-/// The error with the mend for the option; that of `ct-signals` is for `[columns]` of a model file.
+/// The error with the correction for the option; that of `ct-signals` is for `[columns]` of a model file.
 pub(crate) fn of_option(error: Record) -> Error {
     const OPTION: &str = "--columns TIME,INPUT,OUTPUT";
     let Record::Column { file, row, fault } = &error else {

@@ -1,4 +1,4 @@
-//! How much time a search may take.
+//! Time limit of a search.
 
 use std::time::Duration;
 
@@ -29,7 +29,7 @@ impl EffortLevel {
         }
     }
 
-    /// The limit for a model of its user's text, which is simulated in small steps beside more candidates.
+    /// Time limit for a user's own model, which is simulated in small steps and has more candidates.
     #[must_use]
     pub fn limit_of_own_model(self) -> Duration {
         match self {

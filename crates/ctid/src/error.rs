@@ -1,21 +1,21 @@
-//! What the program can refuse: every message is one line that names the place and the mend.
+//! Errors of the program: every message is one line that names the place and the correction.
 
 use std::path::Path;
 
 use ct_signals::escaped;
 
-/// Everything that ends the program with exit code 2.
+/// All errors that end the program with exit code 2.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Something in a file, at a line.
+    /// An error at a line of a file.
     #[error("{file}:{line}: {what}")]
     AtLine {
         /// The path as it was given.
         file: String,
         /// Line number, from 1.
         line: usize,
-        /// What is wrong and the mend.
+        /// The error and the correction.
         what: String,
     },
     /// A model's text.
@@ -23,29 +23,29 @@ pub enum Error {
     Text {
         /// The path as it was given.
         file: String,
-        /// Line, column, what is wrong and the mend.
+        /// Line, column, what is wrong and the correction.
         source: ct_model::TextError,
     },
-    /// Something about a file as a whole.
+    /// An error about a file as a whole.
     #[error("{file}: {what}")]
     File {
         /// The path as it was given.
         file: String,
-        /// What is wrong and the mend.
+        /// The error and the correction.
         what: String,
     },
-    /// A file that was changed by somebody else between reading and writing.
+    /// Another program changed the file between reading and writing.
     #[error("{file}: {what}")]
     Changed {
         /// The path as it was given.
         file: String,
-        /// What has changed and the mend.
+        /// The change and the correction.
         what: String,
     },
-    /// No effect of that name.
+    /// No effect has this name.
     #[error("{0}")]
     UnknownEffect(String),
-    /// The command line asks for something that does not go together.
+    /// The command line combines options that exclude each other.
     #[error("{0}")]
     Usage(String),
     /// The columns of a record that an option names.
@@ -69,7 +69,7 @@ pub enum Error {
     /// A linear model in a loop.
     #[error(transparent)]
     Loop(#[from] fcloe::Error),
-    /// Standard output is gone.
+    /// Standard output cannot be written.
     #[error("cannot write to standard output: {0}")]
     Output(#[from] std::io::Error),
 }
@@ -89,7 +89,7 @@ impl From<paper_tables::Error> for Error {
             E::Estimator(error) => Self::Estimator(error),
             E::Linear(error) => Self::Linear(error),
             E::Loop(error) => Self::Loop(error),
-            // The message begins with the argument's name, which is that of the option.
+            // The message begins with the argument's name, which is the name of the option.
             E::TooFewRunsForRange { .. } | E::TooFewRunsForVariance { .. } => {
                 Self::Usage(format!("--{error}"))
             }
@@ -125,7 +125,7 @@ impl From<linear_identification::Error> for Error {
 }
 
 impl Error {
-    /// Something about a file as a whole.
+    /// An error about a file as a whole.
     pub(crate) fn file(path: &Path, what: impl Into<String>) -> Self {
         Self::File {
             file: path.display().to_string(),

@@ -1,4 +1,4 @@
-//! What a diagnosis says of its parts, for the terminal, the report and the page alike.
+//! Texts about the parts of a diagnosis, shared by the terminal, the report and the page.
 
 use missing_effect::{
     Acceptance, Diagnosis, Effort, GROUP_MARGIN, HeldOutError, PerOutput, PlaceScore, Score, Step,
@@ -8,10 +8,10 @@ use plants::Domain;
 use crate::effort::{EffortLevel, limit_text};
 use crate::numbers;
 
-/// Effects of each ranking that are shown where two rankings differ.
+/// Number of effects of each ranking that are shown if two rankings differ.
 const COMPARED: usize = 5;
 
-/// This effect, in this tank, is one of those that were added.
+/// Whether this effect, in this tank, was added.
 pub(crate) fn is_added(diagnosis: &Diagnosis, score: &Score) -> bool {
     diagnosis
         .steps
@@ -19,8 +19,8 @@ pub(crate) fn is_added(diagnosis: &Diagnosis, score: &Score) -> bool {
         .any(|step| step.added.as_ref() == Some(&score.effect) && step.place == score.place)
 }
 
-/// It was not added, but these data cannot tell it from one that was. A group names no tanks: the added effect in the
-/// other tank is none of them.
+/// Whether the data cannot distinguish this effect from an added one. A group names no tanks: the added effect in the other tank does not
+/// count.
 pub(crate) fn fits_as_well(diagnosis: &Diagnosis, score: &Score) -> bool {
     !diagnosis.effects.contains(&score.effect)
         && diagnosis
@@ -34,15 +34,15 @@ pub(crate) fn tank(diagnosis: &Diagnosis, index: usize) -> Option<&str> {
     diagnosis.steps.get(index + 1)?.place.as_deref()
 }
 
-/// There are several outputs, so that what is said of one of them needs its name.
+/// Whether there are several outputs: then sentences name the output.
 pub(crate) fn several(diagnosis: &Diagnosis) -> bool {
     diagnosis.outputs.len() > 1
 }
 
-/// What numbers that are weighted by the noise are multiples of.
+/// Unit of numbers that are divided by the noise.
 pub(crate) const TIMES_THE_NOISE: &str = "times the noise";
 
-/// A number of each output: `0.55 V`, of several outputs `0.55 V (upper), 0.20 V (lower)`.
+/// A number for each output: `0.55 V`, with several outputs `0.55 V (upper), 0.20 V (lower)`.
 pub(crate) fn per_output(values: &PerOutput, digits: i32, unit: &str) -> String {
     let several = values.0.len() > 1;
     let of_output = |(name, value): &(String, f64)| {
@@ -57,7 +57,7 @@ pub(crate) fn per_output(values: &PerOutput, digits: i32, unit: &str) -> String 
     all.join(", ")
 }
 
-/// The noise floors as numbers of their outputs.
+/// The noise floors of the outputs as text.
 pub(crate) fn noise_floors(diagnosis: &Diagnosis) -> PerOutput {
     let floors = diagnosis.noise.iter();
     PerOutput(
@@ -67,8 +67,8 @@ pub(crate) fn noise_floors(diagnosis: &Diagnosis) -> PerOutput {
     )
 }
 
-/// Errors of several outputs are one number only where each is divided by its noise: of an only output the error itself, of several the
-/// weighted one, and the unit that goes with it.
+/// Errors of several outputs are combined only after division by their noise: with one output the error itself, with several the weighted
+/// one, and its unit.
 fn one_error<T>(diagnosis: &Diagnosis, only: T, weighted: T) -> (T, &str) {
     if several(diagnosis) {
         (weighted, TIMES_THE_NOISE)
@@ -77,7 +77,7 @@ fn one_error<T>(diagnosis: &Diagnosis, only: T, weighted: T) -> (T, &str) {
     }
 }
 
-/// The error that a single effect leaves, and its unit.
+/// Simulation error with a single effect, and its unit.
 pub(crate) fn score_error<'a>(diagnosis: &'a Diagnosis, score: &Score) -> (f64, &'a str) {
     one_error(diagnosis, score.rmse, score.weighted_rmse)
 }
@@ -87,12 +87,12 @@ pub(crate) fn step_error<'a>(diagnosis: &'a Diagnosis, step: &Step) -> (f64, &'a
     one_error(diagnosis, step.rmse, step.weighted_rmse)
 }
 
-/// The same on held-out records, where there are some.
+/// Simulation error of a step on the held-out records, if there are some.
 pub(crate) fn held_out_step_error(diagnosis: &Diagnosis, step: &Step) -> Option<f64> {
     one_error(diagnosis, step.rmse_test, step.weighted_rmse_test).0
 }
 
-/// Where a step fails, output by output, behind the name of the output where there are several.
+/// Sentences about the errors of a step, output by output, with the name of the output if there are several.
 pub(crate) fn sentences(diagnosis: &Diagnosis, step: &Step) -> Vec<String> {
     let several = several(diagnosis);
     let outputs = step.outputs.iter();
@@ -125,11 +125,11 @@ pub(crate) fn held_out_errors(diagnosis: &Diagnosis, step: &Step) -> Vec<String>
     errors.collect()
 }
 
-/// A part of something in whole percent; `-` where there is none.
+/// A ratio in whole percent; `-` if it is not known.
 pub(crate) fn percent(part: f64) -> String {
     if part.is_finite() {
         let rounded = (100.0 * part).clamp(-999.0, 999.0).round();
-        // No negative zero.
+        // Avoids a negative zero.
         format!("{:.0} %", rounded + 0.0)
     } else {
         "-".to_string()
@@ -189,7 +189,7 @@ pub(crate) fn acceptance_rows(test: &Acceptance, unit: &str) -> Vec<AcceptanceRo
         "Squared error above the floor that is explained, fitted data",
         share(test.share),
         format!(
-            "{} where more than noise remains; {} for a partial answer",
+            "{} where the residual is not noise; {} for a partial explanation",
             percent(test.required),
             percent(test.required_partial)
         ),
@@ -207,17 +207,17 @@ pub(crate) fn acceptance_rows(test: &Acceptance, unit: &str) -> Vec<AcceptanceRo
         format!("more than {}", numbers::whole(test.required_bic_fall)),
     ));
     rows.push((
-        "Floor: noise that counts as no error",
+        "Noise floor: error of this size is attributed to noise",
         per_output(&test.floor, 2, unit),
         String::new(),
     ));
     rows
 }
 
-/// What the acceptance test was made of.
+/// Description of the acceptance test.
 pub(crate) fn acceptance_title(diagnosis: &Diagnosis, test: &Acceptance) -> String {
     if test.effects.is_empty() {
-        return "Acceptance test: no candidate lowers the error".to_string();
+        return "Acceptance test: no candidate effect lowers the error".to_string();
     }
     let names = test.effects.join(" + ");
     if diagnosis.effects.is_empty() {
@@ -227,7 +227,7 @@ pub(crate) fn acceptance_title(diagnosis: &Diagnosis, test: &Acceptance) -> Stri
     }
 }
 
-/// Where each effect may act, for those that have a choice: `overflow: upper tank 1.00, lower tank 0.31: cannot be told`.
+/// Places of each effect that can act in several places: `overflow: upper tank 1.00, lower tank 0.31: cannot be told`.
 pub(crate) fn places(diagnosis: &Diagnosis) -> Vec<String> {
     let of_effects = diagnosis.effects.iter().zip(&diagnosis.places);
     of_effects
@@ -236,7 +236,7 @@ pub(crate) fn places(diagnosis: &Diagnosis) -> Vec<String> {
         .collect()
 }
 
-/// `upper tank 1.00, lower tank 0.31: cannot be told`.
+/// Places of an effect in words: `upper tank 1.00, lower tank 0.31: cannot be told`.
 pub(crate) fn place_scores(domain: Domain, places: &[PlaceScore]) -> String {
     let scores: Vec<String> = places
         .iter()
@@ -249,7 +249,7 @@ pub(crate) fn place_scores(domain: Domain, places: &[PlaceScore]) -> String {
             format!("{} {likelihood}", place_name(domain, &score.place))
         })
         .collect();
-    // As far apart as effects that are told apart: a difference of BIC of the margin of a group.
+    // Places are distinguished by the same margin of BIC as effects of a group.
     let least = (-0.5 * GROUP_MARGIN).exp();
     let possible = places
         .iter()
@@ -294,7 +294,7 @@ pub(crate) fn rankings(diagnosis: &Diagnosis) -> Vec<(String, String, String)> {
         .collect()
 }
 
-/// Why two rankings are shown.
+/// Explanation of the two rankings.
 pub(crate) const RANKINGS_DISAGREE: &str = "The ranking of the effects depends on the noise model: as if the noise were white (least simulation error), and \
      prewhitened by the noise model (GLS). Take both for candidates.";
 
@@ -308,7 +308,7 @@ pub(crate) fn held_out_error(error: &HeldOutError, unit: &str) -> String {
     if !total.is_finite() || total <= 0.0 {
         return with_unit(&numbers::significant(total, 2), unit);
     }
-    // Parts to the decimals of the whole, so that they can be compared at a glance.
+    // Parts with the number of decimals of the whole, so that they are easy to compare.
     let places = (1 - numbers::exponent(total)).max(0);
     let [total, offset, gain, shape] =
         [total, error.offset, error.gain, error.shape].map(|part| numbers::decimals(part, places));
@@ -317,20 +317,20 @@ pub(crate) fn held_out_error(error: &HeldOutError, unit: &str) -> String {
     format!("{total}: offset {offset}, gain {gain}, shape {shape}")
 }
 
-/// What the parts of the error on held-out data mean.
-pub(crate) const HELD_OUT_PARTS: &str = "Held-out error: its offset is the mean of measured minus model, its gain what a factor on the model's deviations from \
-     its mean would remove, its shape the rest; root mean squares.";
+/// Meaning of the parts of the error on held-out data.
+pub(crate) const HELD_OUT_PARTS: &str = "Held-out error: its offset is the mean of measured minus model, its gain the part that a factor on the model's deviations \
+     from its mean would remove, its shape the rest; root mean squares.";
 
-/// Where the reader can ask for more time.
+/// How the reader can request more time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reader {
-    /// On the command line, or of its report.
+    /// On the command line, or in its report.
     Commands,
-    /// On the page that is served.
+    /// On the served page.
     Page,
 }
 
-/// What the limit on the time, or the user, has left out.
+/// Steps that were left out because of the time limit or an interruption.
 pub(crate) fn left_out(effort: &Effort) -> Option<String> {
     if effort.left_out.is_empty() {
         return None;
@@ -342,7 +342,7 @@ pub(crate) fn left_out(effort: &Effort) -> Option<String> {
     Some(format!("{why}: {}.", effort.left_out.join("; ")))
 }
 
-/// What the limit on the time, or the user, has left out, and how to get more.
+/// Steps that were left out because of the time limit or an interruption, and how to get them.
 pub(crate) fn effort(effort: &Effort, reader: Reader) -> Vec<String> {
     let mut said = Vec::new();
     if effort.interrupted {

@@ -8,7 +8,7 @@
 //! | a missing term as a file | [`term_file`] |
 //! | the next experiment | [`mod@design`] |
 //! | a model on new inputs | [`mod@simulate`] |
-//! | a model of the user's own, without the command line | [`own_model`] |
+//! | a user's own model, without the command line | [`own_model`] |
 //! | the tour | [`tour`] |
 //! | rows watched as they come | [`mod@monitor`] |
 //! | linear models from a record, as text | [`mod@identify`] |
@@ -16,7 +16,8 @@
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
 //! | what is written, and what is not overwritten | [`output`] |
 //!
-//! The algorithms are in the crates below, the search in `missing-effect`, linear models in `linear-identification`, the papers' tables in `paper-tables`; here is only what surrounds them.
+//! The algorithms are in the crates below, the search in `missing-effect`, linear models in `linear-identification`, the papers' tables in
+//! `paper-tables`; here is only what surrounds them.
 
 mod atomic;
 pub mod catalogue;

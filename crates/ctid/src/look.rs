@@ -1,32 +1,32 @@
-//! What the terminal can show: colours, width; and text laid out for it.
+//! Capabilities of the terminal (colours, width), and layout of text for it.
 
 use std::fmt::Display;
 
 use console::{Style, Term};
 
-/// The widest a line is made: longer ones are hard to read.
+/// Largest width of a line: longer lines are hard to read.
 const WIDEST: usize = 100;
 const NARROWEST: usize = 48;
-/// Where the width is not known: a pipe, a file.
+/// Default width for a pipe or a file.
 const USUAL: usize = 80;
 
-/// How text is laid out.
+/// Layout of text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Look {
-    /// Colours may be used.
+    /// Whether colours may be used.
     pub colour: bool,
     /// Columns to fill.
     pub width: usize,
 }
 
 impl Look {
-    /// What standard output can show: no colours into a pipe or where `NO_COLOR` is set.
+    /// Layout for standard output: no colours into a pipe or if `NO_COLOR` is set.
     #[must_use]
     pub fn of_stdout() -> Self {
         Self::of(&Term::stdout(), console::colors_enabled())
     }
 
-    /// What standard error can show.
+    /// Layout for standard error.
     #[must_use]
     pub fn of_stderr() -> Self {
         Self::of(&Term::stderr(), console::colors_enabled_stderr())
@@ -57,22 +57,22 @@ impl Look {
         self.paint(Style::new().bold().cyan(), lines.trim_end())
     }
 
-    /// What matters most.
+    /// Emphasised text.
     pub(crate) fn strong(self, text: impl Display) -> String {
         self.paint(Style::new().bold(), text)
     }
 
-    /// What may be skipped.
+    /// Text of lesser importance.
     pub(crate) fn faint(self, text: impl Display) -> String {
         self.paint(Style::new().dim(), text)
     }
 
-    /// Good news.
+    /// Text of a positive result.
     pub(crate) fn good(self, text: impl Display) -> String {
         self.paint(Style::new().bold().green(), text)
     }
 
-    /// What needs attention.
+    /// Text of a warning.
     pub(crate) fn warning(self, text: impl Display) -> String {
         self.paint(Style::new().bold().yellow(), text)
     }
@@ -106,14 +106,14 @@ impl Look {
     }
 }
 
-/// How a column of a table is set.
+/// Alignment of a table's column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Side {
     Left,
     Right,
 }
 
-/// A table without rules: columns two blanks apart, as wide as they need to be.
+/// A table without rules: columns separated by two blanks, as wide as necessary.
 pub(crate) fn table(sides: &[Side], rows: &[Vec<String>]) -> Vec<String> {
     let widths: Vec<usize> = (0..sides.len())
         .map(|column| {
@@ -154,7 +154,7 @@ mod tests {
             colour: false,
             width: 20,
         };
-        let text = look.paragraph("  - ", "the level stands still at the rim");
+        let text = look.paragraph("  - ", "the level stays constant at the rim");
         assert_eq!(text, "  - the level stands\n    still at the rim\n");
     }
 

@@ -5,7 +5,7 @@ use plants::{CATALOGUE, EffectInfo};
 
 use crate::Error;
 
-/// `; did you mean X?` where a name of the list is close to what was written, else nothing.
+/// `; did you mean X?` if a name of the list is similar, else empty.
 pub(crate) fn suggestion<'a>(written: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let written = written.to_lowercase().replace('-', "_");
     names
@@ -25,7 +25,7 @@ pub(crate) fn effect(id: &str) -> Result<&'static EffectInfo, Error> {
     EffectInfo::find(id).ok_or_else(|| Error::UnknownEffect(unknown_effect(id)))
 }
 
-/// What to say of a name that is not in the catalogue.
+/// Message for a name that is not in the catalogue.
 pub(crate) fn unknown_effect(id: &str) -> String {
     format!(
         "unknown effect \"{}\": `ctid effects` lists the catalogue{}",

@@ -1,4 +1,4 @@
-//! `--json` and `--report`: checked before anything is computed, written at the end, whole or not at all.
+//! `--json` and `--report`: checked before the computation, written at the end, completely or not at all.
 
 use std::fs;
 use std::io::{BufReader, Read};
@@ -10,13 +10,13 @@ use serde::{Deserialize, Serialize};
 use crate::{Error, atomic, report, term_file};
 use linear_identification::{Identification, side_by_side::SideBySide};
 
-/// How much of an existing page is looked at: the mark stands in its head.
+/// Number of bytes of an existing page that are searched for the mark.
 const HEAD: u64 = 4096;
 
-/// Who has written a file of results, as its first key says.
+/// Name of the program in the first key of a file of results.
 const WRITTEN_BY: &str = "ctid";
 
-/// Results as they are written.
+/// Results in the written form.
 #[derive(Serialize)]
 struct Marked<'a, T> {
     written_by: &'static str,
@@ -24,7 +24,7 @@ struct Marked<'a, T> {
     found: &'a T,
 }
 
-/// What tells JSON of ctid's from others'.
+/// Mark that identifies JSON files of ctid.
 #[derive(Deserialize)]
 struct Mark {
     written_by: String,
@@ -32,39 +32,39 @@ struct Mark {
     _schema: u32,
 }
 
-/// What is in a file that the program writes.
+/// Kind of a file that the program writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The result as JSON.
     Json,
     /// The result as a page.
     Report,
-    /// A record as CSV; nothing is written where there is none to play.
+    /// A record as CSV; no file is written without a record.
     Record,
-    /// The shape of what is missing, as CSV; nothing is written where nothing is.
+    /// The unexplained error as CSV; no file is written without it.
     Unknown,
     /// A model's text.
     Model,
 }
 
-/// What a command finds, which is written as JSON with `schema` and the mark that ctid knows its own files by, or as a page.
+/// Result of a command, written as JSON with `schema` and a mark that identifies files of ctid, or as a page.
 pub trait Found: Serialize {
-    /// The page, complete, where there is one.
+    /// The complete page, if there is one.
     fn page(&self) -> String {
         String::new()
     }
 
-    /// The record as CSV, where there is one.
+    /// The record as CSV, if there is one.
     fn record(&self) -> Option<String> {
         None
     }
 
-    /// The model's text, where there is one.
+    /// The model's text, if there is one.
     fn model(&self) -> Option<String> {
         None
     }
 
-    /// The shape of what nothing explains as CSV, where there is one.
+    /// The unexplained error as CSV, if there is one.
     fn unknown(&self) -> Option<String> {
         None
     }
@@ -84,7 +84,7 @@ impl Found for Diagnosis {
 pub struct Output {
     kind: Kind,
     path: PathBuf,
-    /// A file of ctid's, or an empty one, stood there when the command began.
+    /// A file of ctid, or an empty file, was there when the command began.
     replaces: bool,
 }
 
@@ -100,11 +100,11 @@ impl Found for Identification {
     }
 }
 
-/// Checks where results may go: not onto an input, not onto each other, not over a file that ctid
-/// did not write, and into a folder that is there and may be written to.
+/// Checks the files of results: not an input, not the same file twice, not over a file of another program, and in an existing writable
+/// folder.
 ///
 /// # Errors
-/// One line that names the file and the mend; nothing has been written.
+/// One line that names the file and the correction; nothing has been written.
 pub fn plan(wanted: &[(Kind, &Path)], inputs: &[&Path]) -> Result<Vec<Output>, Error> {
     let mut outputs = Vec::with_capacity(wanted.len());
     for (index, &(kind, path)) in wanted.iter().enumerate() {
@@ -133,19 +133,19 @@ pub fn plan(wanted: &[(Kind, &Path)], inputs: &[&Path]) -> Result<Vec<Output>, E
 }
 
 impl Output {
-    /// What is in it.
+    /// Kind of the file.
     #[must_use]
     pub fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// Where it goes.
+    /// Path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes it; says whether there was something to write.
+    /// Writes the result; returns whether there was a result to write.
     ///
     /// # Errors
     /// Where the disk does not take it, or something else stands there than when the command began; that is then still there.
@@ -184,9 +184,8 @@ impl Output {
     }
 }
 
-/// The first of `report.html`, `report-2.html`, `report-3.html`, ... in a folder that is free, or
-/// that is a report on this record already: nobody asked for that name, so a report on anything
-/// else stays.
+/// The first free name of `report.html`, `report-2.html`, `report-3.html`, ... in a folder, or the name of an earlier report on this
+/// record: the user did not choose this name, so other reports are not overwritten.
 ///
 /// # Errors
 /// Where the folder cannot be written to.
@@ -210,7 +209,7 @@ pub fn free_report(folder: &Path, record: &str) -> Result<Output, Error> {
     }
 }
 
-/// The first of `STEM.csv`, `STEM-2.csv`, ... in a folder that is free: nothing in a record says who wrote it.
+/// The first free name of `STEM.csv`, `STEM-2.csv`, ... in a folder: a record does not contain its author, so it is never overwritten.
 pub(crate) fn free_record(folder: &Path, stem: &str) -> PathBuf {
     let first = PathBuf::from(format!("{stem}.csv"));
     let others = (2_u64..).map(|number| PathBuf::from(format!("{stem}-{number}.csv")));
@@ -219,13 +218,13 @@ pub(crate) fn free_record(folder: &Path, stem: &str) -> PathBuf {
     free.unwrap_or(first)
 }
 
-/// A report on this record, as its data name it.
+/// A report on this record, identified by its data.
 fn is_empty_or_shows(record: &str, path: &Path) -> bool {
     let name = format!("\"{record}\"");
     fs::read_to_string(path).is_ok_and(|page| page.is_empty() || page.contains(&name))
 }
 
-/// What stands where a result is to go.
+/// Kind of the file that exists at the place of a result.
 #[derive(Debug, PartialEq, Eq)]
 enum Standing {
     Nothing,
@@ -249,20 +248,20 @@ fn standing(kind: Kind, path: &Path) -> Standing {
     if metadata.is_dir() {
         Standing::Folder
     } else if metadata.is_file() && (metadata.len() == 0 || is_ours(kind, path)) {
-        // An empty file has nothing to lose.
+        // An empty file may be overwritten.
         Standing::Ours
     } else {
         Standing::NotOurs
     }
 }
 
-/// ctid wrote it: a page that begins as its pages do, JSON with the mark, or the header of a shape with all its columns.
+/// A file of ctid: a page with the beginning of its pages, JSON with the mark, or a shape with all columns in the header.
 fn is_ours(kind: Kind, path: &Path) -> bool {
     let Ok(file) = fs::File::open(path) else {
         return false;
     };
     match kind {
-        // Nothing in a record says who wrote it, and a text may have been changed by hand since.
+        // A record does not contain its author, and a text may have been edited by hand.
         Kind::Record | Kind::Model => false,
         Kind::Report => {
             let mut head = Vec::new();
@@ -275,7 +274,7 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
             read.is_ok() && term_file::is_own(&String::from_utf8_lossy(&head))
         }
         Kind::Json => {
-            // As a stream: it may be of any size.
+            // Read as a stream, because the file may be large.
             let mark = serde_json::from_reader::<_, Mark>(BufReader::new(file));
             mark.is_ok_and(|mark| mark.written_by == WRITTEN_BY)
         }
@@ -292,7 +291,7 @@ fn check(kind: Kind, path: &Path) -> Result<Standing, Error> {
             ));
         }
         Standing::NotOurs => {
-            // These do not say who wrote them.
+            // Files of these kinds contain no mark.
             let why = match kind {
                 Kind::Record | Kind::Model => {
                     "it is there already; choose another name or delete it"
@@ -318,7 +317,7 @@ fn check(kind: Kind, path: &Path) -> Result<Standing, Error> {
             format!("there is no folder {}; make it first", folder.display()),
         ));
     }
-    // A file that vanishes at once shows whether the folder takes one, before hours of computing.
+    // A temporary file shows whether the folder is writable, before hours of computing.
     atomic::beside(path)
         .and_then(tempfile::NamedTempFile::close)
         .map_err(|error| {
@@ -330,7 +329,7 @@ fn check(kind: Kind, path: &Path) -> Result<Standing, Error> {
     Ok(standing)
 }
 
-/// Two paths lead to one file, whether it is there yet or not.
+/// Whether two paths lead to the same file, existing or not.
 pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     let resolve = |path: &Path| {
         fs::canonicalize(path).ok().or_else(|| {

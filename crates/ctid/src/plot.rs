@@ -12,21 +12,21 @@ const DOWN: usize = 4;
 /// The cell without dots; the dots of a cell are the bits above it.
 const BLANK: u32 = 0x2800;
 
-/// What was measured.
+/// Colour of measured values.
 pub(crate) const MEASURED: Color = Color::Cyan;
-/// What the model says.
+/// Colour of the model's output.
 pub(crate) const MODEL: Color = Color::Yellow;
-/// What is left between the two.
+/// Colour of the residual.
 pub(crate) const RESIDUAL: Color = Color::Magenta;
 
-/// A line through points; where there are more than dots it becomes the band they fill.
+/// A line through points; with more points than dots it becomes a band.
 pub(crate) struct Curve<'a> {
     pub values: &'a [f64],
     pub colour: Color,
 }
 
-/// Draws curves that share their abscissa, which runs evenly from `x.0` to `x.1`; `rows` lines
-/// high, within the width, with the ordinate's limits at the left and `x` in seconds below.
+/// Draws curves with a common abscissa, evenly from `x.0` to `x.1`; `rows` lines high, within the width, with the ordinate's limits at the
+/// left and `x` in seconds below.
 pub(crate) fn plot(
     curves: &[Curve],
     x: (f64, f64),
@@ -43,7 +43,7 @@ pub(crate) fn plot(
         .max(6)
         + 2;
     let columns = look.width.saturating_sub(margin + 3).max(20);
-    // The canvas has one dot more than it is told, in both directions.
+    // The canvas has one more dot than requested, in both directions.
     let (width, height) = (columns * ACROSS - 1, rows * DOWN - 1);
     // A flat curve still needs a scale.
     let (low, high) = if y.1 > y.0 { y } else { (y.0 - 1.0, y.0 + 1.0) };
@@ -54,7 +54,7 @@ pub(crate) fn plot(
         for (row, line) in drawn(&points, width, height).lines().enumerate() {
             for (column, cell) in line.chars().enumerate() {
                 let dots = u32::from(cell).saturating_sub(BLANK);
-                // A later curve lies above an earlier one.
+                // A later curve covers an earlier one.
                 if dots > 0
                     && let Some(cell) = cells.get_mut(row).and_then(|row| row.get_mut(column))
                 {
@@ -94,7 +94,7 @@ fn drawn(points: &[(f32, f32)], width: usize, height: usize) -> String {
     chart.frame()
 }
 
-/// A line of cells; neighbours of one colour share their escape codes.
+/// A line of cells; neighbours of the same colour share their escape codes.
 fn coloured(cells: &[(u32, Option<Color>)], look: Look) -> String {
     let mut line = String::new();
     let drawn = cells.iter().rposition(|(dots, _)| *dots != BLANK);
@@ -111,7 +111,7 @@ fn coloured(cells: &[(u32, Option<Color>)], look: Look) -> String {
     line
 }
 
-/// Points in dots across and parts of the height; of many values in one dot the least and the most.
+/// Points in dots across and shares of the height; for several values in one dot the smallest and the largest.
 fn points(values: &[f64], width: usize, (low, high): (f64, f64)) -> Vec<(f32, f32)> {
     let last = values.len().saturating_sub(1).max(1);
     let at = |k: usize| (k * width) as f64 / last as f64;

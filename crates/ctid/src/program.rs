@@ -1,4 +1,4 @@
-//! The program from its arguments to its exit code: 0 on any verdict, 2 with one line on standard error where something is wrong.
+//! The program from its arguments to its exit code: 0 for any verdict, 2 with one line on standard error after an error.
 
 use std::ffi::OsString;
 use std::io::{self, Write};
@@ -11,14 +11,14 @@ use nix::sys::signal::{SigSet, Signal};
 use crate::look::Look;
 use crate::{Cli, one_line, run};
 
-/// Runs the program on its arguments, of which the first is its name. It starts the threads of the whole process: call it once.
+/// Runs the program with its arguments, of which the first is its name. The function starts the threads of the whole process: call it once.
 pub fn program(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let message = match Cli::try_parse_from(arguments) {
         Ok(cli) => match start_threads().and_then(|()| done(cli)) {
             Ok(()) => return ExitCode::SUCCESS,
             Err(error) => format!("error: {error}"),
         },
-        // Help and version are asked for: they are no errors, and go to standard output.
+        // Help and version were requested: they are no errors, and go to standard output.
         Err(asked) if !asked.use_stderr() => {
             return match asked.print() {
                 Err(error) if error.kind() != io::ErrorKind::BrokenPipe => ExitCode::from(2),
@@ -27,7 +27,7 @@ pub fn program(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
         Err(error) => error.to_string(),
     };
-    // Whoever has closed standard error still gets the exit code.
+    // If standard error is closed, the exit code is still correct.
     let _ = writeln!(io::stderr(), "{}", one_line(&message));
     ExitCode::from(2)
 }
@@ -45,7 +45,7 @@ fn start_threads() -> Result<(), String> {
         held_back.add(Signal::SIGXFSZ);
         held_back
             .thread_block()
-            .map_err(|error| format!("a signal cannot be held back: {error}"))?;
+            .map_err(|error| format!("a signal handler cannot be installed: {error}"))?;
     }
     rayon::ThreadPoolBuilder::new().build_global().map_err(|error| {
         format!(

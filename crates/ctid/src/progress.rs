@@ -1,4 +1,4 @@
-//! How far a computation is, on standard error; nothing is drawn where that is not a terminal.
+//! Progress of a computation on standard error; nothing is drawn if standard error is not a terminal.
 
 use std::fmt::Write;
 use std::sync::Mutex;
@@ -9,12 +9,12 @@ use missing_effect::Progress;
 
 use crate::interrupt;
 
-/// A bar that names the phase and vanishes at the end.
+/// A bar that names the phase and is removed at the end.
 #[derive(Debug)]
 pub struct Bar {
     bar: ProgressBar,
     phase: Mutex<&'static str>,
-    /// Limit on the time of the search, where there is one.
+    /// Time limit of the search, if there is one.
     limit: Option<Duration>,
 }
 
@@ -35,7 +35,7 @@ impl Bar {
         }
     }
 
-    /// The same for a search whose time is limited: it says how much of the limit is left.
+    /// Progress of a search with a time limit: it shows the remaining time.
     #[must_use]
     pub fn with_limit(limit: Option<Duration>) -> Self {
         Self {
@@ -61,10 +61,10 @@ impl Bar {
         self.bar.enable_steady_tick(Duration::from_millis(120));
     }
 
-    /// Shows how far it is; may be called from any thread.
+    /// Shows the progress; may be called from any thread.
     pub fn show(&self, progress: Progress) {
         if let Ok(mut phase) = self.phase.lock() {
-            // The threads report in any order: a bar never runs back within a phase.
+            // The threads report in any order: a bar never goes back within a phase.
             if *phase != progress.phase {
                 *phase = progress.phase;
                 self.phase(progress.phase);
@@ -87,13 +87,13 @@ impl Bar {
         }
     }
 
-    /// Takes it away.
+    /// Removes the progress bar.
     pub fn clear(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-/// The time since the beginning, and how much of the limit is left.
+/// The time since the beginning, and the remaining part of the limit.
 fn clock(elapsed: Duration, limit: Option<Duration>, interrupted: bool) -> String {
     let seconds = elapsed.as_secs();
     if interrupted {

@@ -1,4 +1,4 @@
-//! The trace that an effect leaves: a standard experiment on a tank that has it, and what a model that lacks it cannot follow.
+//! Signature of an effect: a standard experiment on a tank with the effect, and the residual of a model without it.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::plot::{Curve, MEASURED, RESIDUAL, limits, plot};
 const COMMANDS: [f64; 16] = [
     5.0, 6.4, 6.2, 5.9, 4.6, 4.4, 3.6, 3.8, 4.2, 5.4, 5.5, 5.3, 6.0, 6.5, 4.9, 4.0,
 ];
-/// Samples that each is held for, and their interval \[s\].
+/// Number of samples of each level, and their interval \[s\].
 const HELD: usize = 40;
 const INTERVAL: f64 = 4.0;
 const STOPPING: Stopping = Stopping {
@@ -21,8 +21,8 @@ const STOPPING: Stopping = Stopping {
     cost: 1e-8,
 };
 
-/// The experiment on a tank with the effect, and the residual of the fitted model that lacks it, both over time; `None`
-/// where the effect acts on no tank.
+/// The experiment on a tank with the effect, and the residual of the fitted model without it, both over time; `None` if the effect acts on
+/// no tank.
 pub(crate) fn picture(effect: &'static EffectInfo, look: Look) -> Option<String> {
     let (measured, residual) = experiment(effect)?;
     let end = (0.0, INTERVAL * (measured.len() - 1) as f64);
@@ -32,7 +32,7 @@ pub(crate) fn picture(effect: &'static EffectInfo, look: Look) -> Option<String>
     };
     let mut text = look.paragraph(
         "  ",
-        "The trace that it leaves. A tank with the effect, without noise, under steps of the command; its reading [cm]:",
+        "Its signature. A tank with the effect, without noise, under steps of the command; its reading [cm]:",
     );
     text += &draw(&measured, MEASURED, 4);
     text += "  Measured minus a fitted model without the effect [cm]:\n";
@@ -40,7 +40,7 @@ pub(crate) fn picture(effect: &'static EffectInfo, look: Look) -> Option<String>
     Some(text)
 }
 
-/// The reading of a tank with the effect, and what the fitted model without it leaves of that.
+/// The reading of a tank with the effect, and the residual of the fitted model without it.
 fn experiment(effect: &'static EffectInfo) -> Option<(Vec<f64>, Vec<f64>)> {
     let plants = [Plant::SingleTank, Plant::SingleTankLinear];
     let plant = plants
@@ -85,7 +85,7 @@ fn experiment(effect: &'static EffectInfo) -> Option<(Vec<f64>, Vec<f64>)> {
     let bare = Structure::new(plant, known.clone(), rough);
     let base = with_scales(&[simulate(&bare, &own)?])?;
 
-    // The effect in the middle of the values that a search would try.
+    // The effect in the middle of the search's start values.
     let placed = Placed { effect, vessel: 0 };
     let middle = |info: plants::ParameterInfo| info.starts[info.starts.len() / 2];
     let parameters = base.effect_parameters(placed).into_iter().map(middle);

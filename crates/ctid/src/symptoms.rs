@@ -1,4 +1,4 @@
-//! `ctid effects --like WORD`: effects by what a person at the plant says of them.
+//! `ctid effects --like WORD`: effects by a description of symptoms.
 
 use ct_model::effects::Candidate;
 use ct_signals::quoted;
@@ -6,7 +6,7 @@ use plants::EffectInfo;
 
 use crate::Error;
 
-/// Beginnings of words that mean the same at a plant; the first one names the family.
+/// Beginnings of words with the same meaning at a plant; the first one names the family.
 const FAMILIES: [&[&str]; 12] = [
     &["clog", "foul", "block", "plug", "dirt", "lodged", "narrow"],
     &[
@@ -75,7 +75,7 @@ const FAMILIES: [&[&str]; 12] = [
     &["hot", "heat", "temperature", "steam"],
 ];
 
-/// What is looked for: beginnings of words, and how much each counts.
+/// Search terms: beginnings of words, and their weights.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sought {
     said: String,
@@ -83,7 +83,7 @@ pub(crate) struct Sought {
 }
 
 impl Sought {
-    /// From what somebody typed.
+    /// Search terms from the typed text.
     pub fn of(said: &str) -> Self {
         let mut stems: Vec<(String, u32)> = Vec::new();
         for word in said.to_lowercase().split_whitespace() {
@@ -91,7 +91,7 @@ impl Sought {
                 |stem: &&str| word.starts_with(stem) || word.len() > 3 && stem.starts_with(word);
             let family = FAMILIES.iter().find(|family| family.iter().any(&means));
             let of_family = family.into_iter().flat_map(|family| family.iter());
-            // The word itself counts for more than others of its family.
+            // The word itself has more weight than related words.
             stems.extend(
                 of_family.map(|stem| ((*stem).to_string(), if means(stem) { 4 } else { 1 })),
             );
@@ -114,7 +114,7 @@ impl Sought {
         }
     }
 
-    /// How well texts go with it, the first counting most; zero where they do not.
+    /// Score of texts, with the largest weight for the first text; zero without a match.
     fn score(&self, texts: &[&str]) -> u32 {
         let mut score = 0;
         for (text, weight) in texts.iter().zip([4, 2, 1]) {
@@ -129,7 +129,7 @@ impl Sought {
         score
     }
 
-    /// How well an effect of a tank goes with it.
+    /// Score of an effect of a tank.
     pub fn score_of_plant(&self, effect: &EffectInfo) -> u32 {
         self.score(&[
             effect.id,
@@ -138,7 +138,7 @@ impl Sought {
         ])
     }
 
-    /// How well an effect at a port, or a candidate of the model file, goes with it.
+    /// Score of an effect at a port, or of a candidate of the model file.
     pub fn score_of(&self, candidate: &Candidate) -> u32 {
         match candidate.effect {
             Some(effect) => self.score(&[effect.id, &effect.symptoms.join(", "), effect.physics]),
@@ -146,7 +146,7 @@ impl Sought {
         }
     }
 
-    /// What is said where nothing goes with it.
+    /// Message without a match.
     pub fn nothing(&self) -> Error {
         let known: Vec<&str> = FAMILIES.iter().map(|family| family[0]).collect();
         Error::UnknownEffect(format!(
@@ -157,7 +157,7 @@ impl Sought {
     }
 }
 
-/// Those with a score, best first; equals stay in their order.
+/// Items with a score, best first; equal scores keep their order.
 pub(crate) fn best<T>(all: impl IntoIterator<Item = T>, score: impl Fn(&T) -> u32) -> Vec<T> {
     let scored = all.into_iter().map(|one| (score(&one), one));
     let mut scored: Vec<(u32, T)> = scored.filter(|(score, _)| *score > 0).collect();

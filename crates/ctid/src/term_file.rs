@@ -1,13 +1,14 @@
-//! The shape of a missing term as a CSV file: `ctid diagnose --unknown` writes it, `ctid add NAME --from` reads it, and a
-//! person may draw one by hand.
+//! The shape of a missing term as a CSV file: `ctid diagnose --unknown` writes it, `ctid add NAME --from` reads it, and a user may write
+//! one.
 //!
 //! ```csv
 //! place,variable,at [cm],value [cm^3/s],std_error [cm^3/s]
 //! vessel,level,8.2,-0.3,0.2
 //! vessel,level,11.0,-4.1,0.3
 //! ```
-//! `place` is `actuator` (of two pumps the first), `sensor` (of several `sensor upper`), `vessel`, or of several vessels the name of one; `variable` is `level`, `rate` (the
-//! vessel's net inflow), `input` or `time` (since the record began). The standard errors are for the reader alone.
+//! `place` is `actuator` (of two pumps the first), `sensor` (of several `sensor upper`), `vessel`, or of several vessels the name of one;
+//! `variable` is `level`, `rate` (the vessel's net inflow), `input` or `time` (since the record began). The standard errors are for the
+//! reader alone.
 
 use std::path::Path;
 
@@ -26,7 +27,7 @@ pub(crate) const HEADER: &str = "place,variable,at";
 pub struct TermFile {
     /// Where it acts.
     pub place: String,
-    /// What it depends on.
+    /// Variable of the term.
     pub variable: String,
     /// Knots.
     pub at: Vec<f64>,
@@ -106,7 +107,7 @@ pub(crate) fn variable_of(word: &str) -> Result<Variable, String> {
         })
 }
 
-/// Whether a file begins as those of a diagnosis do: with all their columns, of which nobody need write the last.
+/// Whether a file has the header of a diagnosis, with all its columns; in a user's file the last column is optional.
 pub(crate) fn is_own(text: &str) -> bool {
     let header = text.lines().next().unwrap_or_default();
     let columns: Vec<&str> = header.split(',').collect();
@@ -115,7 +116,7 @@ pub(crate) fn is_own(text: &str) -> bool {
         && columns.len() == 5
 }
 
-/// The file of what a diagnosis found.
+/// The file for the result of a diagnosis.
 #[must_use]
 pub fn text(unknown: &Unknown) -> String {
     let values = unknown.knots.iter().zip(&unknown.ordinates);
@@ -127,7 +128,7 @@ pub fn text(unknown: &Unknown) -> String {
     )
 }
 
-/// The file of a curve: its place and variable, the units of the variable and of the term, and where it is, its value and its standard error.
+/// The file of a curve: its place and variable, the units of the variable and of the term, and its points, values and standard errors.
 pub(crate) fn of_curve(
     (place, variable): (&str, &str),
     (at, of): (&str, &str),
@@ -144,7 +145,7 @@ pub(crate) fn of_curve(
 /// Reads a file.
 ///
 /// # Errors
-/// One line that names the file, the row, the column and the mend.
+/// One line that names the file, the row, the column and the correction.
 pub fn read(path: &Path) -> Result<TermFile, Error> {
     let text = read_file(path, LARGEST as u64).map_err(|error| match error {
         ct_signals::Error::CannotOpen { source, .. } => Error::file(

@@ -1,4 +1,4 @@
-//! The tour: the bundled record with a hidden effect, from the first comparison to the error that falls.
+//! The tour: the bundled record with a hidden effect, from the first comparison to the fall of the error.
 
 use std::fs;
 use std::io::Write;
@@ -17,22 +17,22 @@ const DATA: (&str, &str) = ("tour.csv", include_str!("../records/tour.csv"));
 const TEST: (&str, &str) = ("tour-test.csv", include_str!("../records/tour-test.csv"));
 const MODEL: (&str, &str) = ("tour.toml", include_str!("../records/tour.toml"));
 
-/// What the tour leaves behind.
+/// Files of the tour.
 #[derive(Debug)]
 pub struct Tour {
-    /// The page that it wrote.
+    /// The page of the tour.
     pub report: PathBuf,
-    /// What it found.
+    /// Diagnosis of the tour.
     pub diagnosis: Diagnosis,
 }
 
-/// Walks through the five steps, tells them on `out`, and writes `report.html` into `folder`; where
-/// a file that is not of an earlier tour has that name, `report-2.html`, and so on.
+/// Runs the five steps with explanations on `out`, and writes `report.html` into `folder`; if a file with this name is not from an earlier
+/// tour, `report-2.html`, and so on.
 ///
 /// # Errors
 /// Where the folder or `out` cannot be written to.
 pub fn run(folder: &Path, out: &mut dyn Write, look: Look, bar: &Bar) -> Result<Tour, Error> {
-    // Before anything is told: a tour that cannot end well does not begin.
+    // Checked before the first output: if the report cannot be written, the tour does not begin.
     let report = output::free_report(folder, DATA.0)?;
     let problem = problem()?;
     let options = Options::default();
@@ -59,7 +59,7 @@ pub fn run(folder: &Path, out: &mut dyn Write, look: Look, bar: &Bar) -> Result<
     })
 }
 
-/// The bundled records and model, read as a user's are: from files.
+/// The bundled records and model, read from files like a user's.
 fn problem() -> Result<Problem, Error> {
     let folder = tempfile::tempdir()?;
     let path = |name: &str| folder.path().join(name);
@@ -89,8 +89,8 @@ fn step(number: usize, title: &str, text: &str, look: Look) -> String {
 
 fn introduction(look: Look) -> String {
     let text = "A pump fills a tank, and the water leaves through a hole in the bottom. Half an hour was \
-                recorded: the voltage of the pump and the level. Somebody wrote down what they believe \
-                about the tank; one thing about it they do not know, and ctid is not told either.";
+                recorded: the voltage of the pump and the level. The model file states what is known about the tank. One effect is \
+                missing in it, and ctid does not know which.";
     let mut said = format!(
         "{}\n{}\n",
         look.heading("ctid: what is your model missing?"),
@@ -105,7 +105,7 @@ fn introduction(look: Look) -> String {
 
 fn compare(diagnosis: &Diagnosis, look: Look) -> String {
     let text = "The model is fitted, then it runs on the pump's voltage alone: a simulation, never corrected \
-                by a measurement. A second record is held out; it takes part in no fit and no choice.";
+                by a measurement. A second record is held out; it not used for fits or selection.";
     let mut said = step(1, "Compare", text, look) + &terminal::header(diagnosis, look);
     if let Some(first) = diagnosis.steps.first() {
         said += &terminal::overlay(diagnosis, first, look);
@@ -115,8 +115,8 @@ fn compare(diagnosis: &Diagnosis, look: Look) -> String {
 }
 
 fn where_it_fails(diagnosis: &Diagnosis, look: Look) -> String {
-    let text = "A single number does not say what is wrong. So the residual is looked at by time, by level, \
-                by flow, by direction of change and by frequency, and tested for traces of the input.";
+    let text = "A single number does not show what is wrong. So the residual is divided by time, level, flow, \
+                direction of change and frequency, and tested for dependence on the input.";
     let mut said = step(2, "See where it fails", text, look);
     for first in &diagnosis.steps {
         said += &terminal::failures(diagnosis, first, look);
@@ -126,7 +126,7 @@ fn where_it_fails(diagnosis: &Diagnosis, look: Look) -> String {
 
 fn what_is_missing(diagnosis: &Diagnosis, look: Look) -> String {
     let text = "Every effect of the catalogue is tried at every place where it can act, alone and together, \
-                and confirmed by a refit. `visible from` is the smallest size that these data would have shown.";
+                and confirmed by a refit. `visible from` is the smallest size that these data would have shown (minimum detectable size).";
     step(3, "Learn what is missing", text, look)
         + &terminal::ranking(diagnosis, look)
         + &terminal::groups(diagnosis, look)
@@ -156,8 +156,8 @@ fn add(diagnosis: &Diagnosis, look: Look) -> Result<String, Error> {
 fn watch(diagnosis: &Diagnosis, look: Look) -> String {
     let text = match diagnosis.verdict {
         Verdict::Effect | Verdict::Undecided | Verdict::Partial => {
-            "The same simulation, with the effect in the model. What is left is noise when the bars meet the \
-             noise floor and the residual has no shape."
+            "The same simulation, with the effect in the model. The residual is noise when the bars reach the noise \
+             floor and the residual has no pattern."
         }
         Verdict::Unexplained | Verdict::Adequate => "The error, from step to step.",
     };

@@ -1,4 +1,4 @@
-//! The acceptance test: which effects of a set stay when the noise may explain what they explain.
+//! Acceptance test: backward elimination of effects that the noise may explain as well.
 
 use ct_signals::Record;
 use estimation::{Fit, Noise, coloured};
@@ -9,8 +9,8 @@ use crate::Error;
 use crate::node::{Context, FINE, Node};
 
 impl Context<'_> {
-    /// Whether a set lowers the deviance by more than chance would against one that lacks some of its effects: chi-square, corrected
-    /// (Bonferroni) for all candidates and starts that were looked at.
+    /// Whether a set lowers the deviance significantly compared with one that lacks some of its effects: chi-square, corrected (Bonferroni)
+    /// for all tried candidates and starts.
     pub fn beyond_chance(&self, gained: (&Node, &Fit), lacking: (&Node, &Fit)) -> bool {
         let new = gained
             .0
@@ -31,7 +31,7 @@ impl Context<'_> {
         chance * looks < self.thresholds.false_claim
     }
 
-    /// Takes out, one by one, what the noise explains as well, first what is worth least.
+    /// Backward elimination: removes effects that the noise explains as well, the least significant first.
     pub fn confirm(&self, mut node: Node, base: &Node, noise: &Noise) -> Result<Node, Error> {
         loop {
             let lacking = self.each_lacking(&node, base, noise);
@@ -47,7 +47,8 @@ impl Context<'_> {
         }
     }
 
-    /// Whether a set is better than one that lacks some of its effects by one reading alone: without it both, fitted again, are alike.
+    /// Whether a set is better than one that lacks some of its effects because of a single reading: without this reading both sets, fitted
+    /// again, are equally good.
     fn rests_on_one_reading(&self, node: &Node, lacking: &Node, noise: &Noise) -> bool {
         let without = |node: &Node, records: &[Record]| {
             let setup = self.setup(&node.model).ok()?;
@@ -68,8 +69,8 @@ impl Context<'_> {
             || !self.beyond_chance((node, &with), (lacking, &lacks))
     }
 
-    /// A set, compared by its simulation error, less the effects that rest on one reading; `None` where no other stays that the criterion
-    /// needs.
+    /// A set without the effects that depend on a single reading, compared by its simulation error; `None` if no effect stays that the
+    /// criterion needs.
     pub fn of_many_readings(&self, mut node: Node, base: &Node) -> Option<Node> {
         let white = Noise::white(node.spec().outputs.len());
         while node.added.len() > base.added.len() {
@@ -86,8 +87,8 @@ impl Context<'_> {
         None
     }
 
-    /// The reading (series and row) that makes half or more of what a set fits better than one that lacks some of its effects. In coloured noise
-    /// a reading shows in as many rows after it as the noise model has coefficients.
+    /// The reading (series and row) that causes half or more of the improvement of a set over one that lacks some of its effects. With
+    /// coloured noise, a reading affects as many rows after it as the noise model has coefficients.
     fn telling_reading(
         &self,
         node: &Node,
@@ -107,7 +108,7 @@ impl Context<'_> {
             .map(|(s, (with, lacks))| {
                 let scale = scales[s % scales.len()].powi(2);
                 let rows = with.iter().zip(lacks);
-                // A reading that is missing has no part in it.
+                // A missing reading has no influence.
                 rows.map(|(a, b)| (b * b - a * a) / scale)
                     .map(|fall| if fall.is_nan() { 0.0 } else { fall })
                     .collect::<Vec<f64>>()
@@ -143,8 +144,8 @@ impl Context<'_> {
         )?)
     }
 
-    /// The noise model of a set's residual, with a memory of at most a part of the longest record: a root near one takes every slow effect
-    /// for noise. And whether the memory had to be limited: then what remains may be slow physics.
+    /// The noise model of a set's residual, with a memory limited to a share of the longest record, because a root near one would absorb
+    /// every slow effect. Also returns whether the memory had to be limited: then the residual may contain slow physics.
     pub fn noise_of(&self, node: &Node) -> Result<(Noise, bool), Error> {
         let setup = self.setup(&node.model)?;
         let noise = estimation::noise_of(&setup, &node.fit, self.thresholds.noise_order)?;
@@ -152,7 +153,7 @@ impl Context<'_> {
         Ok((noise.with_memory_at_most(self.longest_memory()), slow))
     }
 
-    /// The first output whose noise has a longer memory than noise that a search may trust.
+    /// The first output with a longer noise memory than a search accepts.
     pub fn slow_output(&self, noise: &Noise) -> Option<usize> {
         if self.longest_record() < self.thresholds.memory_times * self.thresholds.ordinary_memory {
             return None;
@@ -163,12 +164,12 @@ impl Context<'_> {
         pairs.position(|(noise, limited)| noise != limited)
     }
 
-    /// Whether the memory of a noise model is longer than that of noise that a search may trust.
+    /// Whether the memory of a noise model is longer than a search accepts.
     pub fn is_slow(&self, noise: &Noise) -> bool {
         self.slow_output(noise).is_some()
     }
 
-    /// The longest memory of a noise model in whose metric effects are searched \[samples\].
+    /// The longest memory of a noise model for a search \[samples\].
     pub fn longest_memory(&self) -> f64 {
         self.thresholds.longest_memory * self.longest_record()
     }

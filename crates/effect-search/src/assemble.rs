@@ -1,4 +1,4 @@
-//! The result of a search as plain values: the model that was believed, then the effects one by one, with what each does to the error.
+//! The result of a search as plain values: the believed model, then the effects one by one, with the change of the error.
 
 use std::collections::BTreeMap;
 
@@ -13,12 +13,12 @@ use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 use crate::search::Grown;
 use crate::{Error, held_out};
 
-/// What was found.
+/// A result.
 pub(crate) struct Finding<'a> {
-    /// The believed model, and the last one.
+    /// The believed model.
     pub base: &'a Node,
     pub last: &'a Node,
-    /// The fit whose noise is told: that of the last model with the noise model of its own residual.
+    /// The fit that gives the reported noise: the last model with the noise model of its own residual.
     pub own: &'a Fit,
     pub verdict: Verdict,
     pub groups: Vec<Vec<usize>>,
@@ -51,7 +51,7 @@ pub(crate) fn assemble(
     let problem = context.problem;
     let outputs = &problem.records[0].outputs;
     let level = |noise: &ArModel| {
-        // The deviation of what is slower than noise is not known from so short a record.
+        // A short record does not determine the variance of slow disturbances.
         if context.is_slow(&own.noise) {
             noise.sigma()
         } else {
@@ -59,8 +59,8 @@ pub(crate) fn assemble(
         }
     };
     let floors: Vec<f64> = own.noise.iter().map(level).collect();
-    // Outputs count by their noise. Errors are compared in one metric, that of the simulation error; the last model has its own where it
-    // leaves noise.
+    // Outputs are weighted by their noise. Errors are compared with a single weighting, that of the simulation error; the last model is
+    // weighted by its own noise model if its residual is noise.
     let white = Noise::white(outputs.len());
     let weighted = Context {
         scales: (outputs.len() > 1).then(|| floors.clone()),
@@ -106,7 +106,7 @@ pub(crate) fn assemble(
         innovation: noise.sigma(),
         coefficients: noise.coefficients().to_vec(),
     });
-    // In the order of the ladder.
+    // In the order of the error ladder.
     let order = &ladder.last().map_or(&last.added, |node| &node.added)[base.added.len()..];
     let groups: Vec<Vec<String>> = order
         .iter()
@@ -141,10 +141,10 @@ pub(crate) fn assemble(
     })
 }
 
-/// The believed model, then the effects one by one, each time the one that lowers the error most.
+/// Error ladder: the believed model, then the effects one by one, each time the one that lowers the error most.
 fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<Vec<Node>, Error> {
     let mut nodes = vec![context.subset(last, base.added.clone(), noise, FINE)?];
-    // From where the believed model was fitted, too.
+    // Fit also from the estimates of the believed model.
     if let Ok(again) = context.refitted(base, noise, FINE)
         && again.fit.cost < nodes[0].fit.cost
     {
@@ -173,7 +173,7 @@ fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<
     Ok(nodes)
 }
 
-/// What was found of the parameters of an effect in a set.
+/// Estimates of an effect's parameters in a set.
 pub(crate) fn sizes(node: &Node, candidate: &Candidate) -> Vec<Estimate> {
     let errors = node.fit.std_errors();
     let parameters = node.spec().parameters.iter().enumerate();

@@ -1,4 +1,4 @@
-//! The believed model, with the effects that the model file has already, fitted to the records; and the candidates beside it.
+//! The believed model, including the effects of the model file, fitted to the records; and the candidates.
 //!
 //! The candidates follow from what the model without effects visits. The listed effects are added one after the other, each from its best
 //! start, as the search would add them.
@@ -17,12 +17,12 @@ use crate::Error;
 use crate::node::{Context, FINE, Node};
 use crate::problem::{Kept, Limit, Options, Problem};
 
-/// The believed model with the effects of the model file in it.
+/// The believed model, including the effects of the model file.
 #[derive(Debug, Clone)]
 pub struct Believed {
-    /// The model; the values of its parameters are fitted ones, in white noise.
+    /// The model; the values of its parameters are fitted ones, with white noise.
     pub spec: ModelSpec,
-    /// What of the records its effects are written in, by their identifiers.
+    /// Numbers of the record that each effect contains, by effect identifiers.
     pub record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
@@ -44,8 +44,8 @@ pub fn believed(problem: &Problem, options: &Options) -> Result<Believed, Error>
     })
 }
 
-/// All that can act in a model where its records visit this, those of the catalogue with what is kept of earlier records, then those of the
-/// user's own, then smooth functions ([`Candidate::is_shape`]), which no search looks at.
+/// All effects that can act in a model for the visited ranges: those of the catalogue with kept record numbers, those of the user, then
+/// smooth functions ([`Candidate::is_shape`]), which searches do not use.
 ///
 /// # Errors
 /// As [`own_candidates`].
@@ -65,7 +65,7 @@ pub fn all_candidates(
     Ok(all)
 }
 
-/// The believed model fitted, and the candidates.
+/// Fits the believed model, and lists the candidates.
 pub(crate) fn begin<'a>(
     problem: &'a Problem,
     options: &Options<'a>,
@@ -108,7 +108,7 @@ pub(crate) fn begin<'a>(
 }
 
 impl Context<'_> {
-    /// A set with one more effect of the model file, fitted from its best start and from the one that the file has.
+    /// A set with one more effect of the model file, fitted from its best start and from the values of the file.
     fn with_listed(&self, node: Node, id: &str) -> Result<Node, Error> {
         let white = Noise::white(self.problem.spec.outputs.len());
         let Some(i) = self.candidates.iter().position(|c| c.id == *id) else {
@@ -136,7 +136,7 @@ impl Context<'_> {
     }
 }
 
-/// What the fitted model visits in all records.
+/// Ranges that the fitted model visits in all records.
 fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
     let (count, states) = (setup.parameter_count(), problem.spec.states.len());
     let mut all: Option<Visited> = None;

@@ -1,6 +1,6 @@
-//! What can go wrong in a search.
+//! Errors of a search.
 
-/// What can go wrong in a search.
+/// Error of a search.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -16,7 +16,7 @@ pub enum Error {
     /// A candidate of the user's own.
     #[error("candidates.{0}")]
     Own(#[from] ct_model::effects::OwnError),
-    /// Effects that do not go together.
+    /// Effects that exclude each other.
     #[error(transparent)]
     Apply(#[from] ct_model::effects::ApplyError),
     /// The simulation of the fitted model.
@@ -25,24 +25,24 @@ pub enum Error {
     /// An experiment that cannot be proposed.
     #[error(transparent)]
     Design(#[from] crate::design::Refused),
-    /// The unit of the model's time is none.
+    /// The unit of the model's time is not positive.
     #[error("a unit of the model's time of {seconds} s: it has to be above zero and finite")]
     TimeUnit {
-        /// How many seconds it was to have.
+        /// The given number of seconds.
         seconds: f64,
     },
-    /// An effect of the model file that the model cannot have.
+    /// An effect of the model file that cannot act in the model.
     #[error("effect {id} cannot act in this model: `ctid effects --model` lists what can")]
     UnknownEffect {
-        /// Its identifier.
+        /// Identifier of the effect.
         id: String,
     },
-    /// An effect of the model file beside which the model cannot be simulated.
+    /// With an effect of the model file, the model cannot be simulated.
     #[error(
-        "with {id} no start of its parameters gives a simulation: start them nearer under [effect.\"{id}\"], or remove it"
+        "with {id} the simulation fails from every start of its parameters: give better start values under [effect.\"{id}\"], or remove it"
     )]
     NoStart {
-        /// Its identifier.
+        /// Identifier of the effect.
         id: String,
     },
 }

@@ -1,8 +1,8 @@
-//! The score of a candidate whose absence is a limit: an RC pair is not there at no value of its resistance and capacity.
+//! The score of a candidate that is absent only in a limit: no values of resistance and capacity remove an RC pair.
 //!
-//! A factor before its terms ([`Candidate::with_factor`]) takes it out of the model. The score is the step of Gauss-Newton by this factor and
-//! all other parameters, from zero, over the starts of the candidate's own parameters. The fit has no factor: it begins where these parameters
-//! give, to the order of a product or a quotient, what the factor of the step gives.
+//! A factor before its terms ([`Candidate::with_factor`]) takes it out of the model. The score is the step of Gauss-Newton by this factor
+//! and all other parameters, from zero, over the starts of the candidate's own parameters. The fit has no factor: it begins where these
+//! parameters give, to the order of a product or a quotient, what the factor of the step gives.
 
 use std::sync::Arc;
 
@@ -19,14 +19,14 @@ use crate::score::{DAMPING, Trial, thinned};
 struct Place {
     /// Cost that the step predicts.
     predicted: f64,
-    /// The vector there, without the factor; and one step from there.
+    /// The parameter vector at this point, without the factor; and one step from this point.
     x: Vec<f64>,
     stepped: Vec<f64>,
     factor: f64,
 }
 
 impl Context<'_> {
-    /// A candidate with a factor, at its best start; `None` where no start gives a simulation.
+    /// A candidate with a factor, at its best start; `None` if no start gives a simulation.
     pub fn trial_by_factor(
         &self,
         node: &Node,
@@ -62,7 +62,7 @@ impl Context<'_> {
         let place = |values: Vec<f64>| {
             let mut x = begin.clone();
             for (&at, value) in own.iter().zip(values) {
-                // What the model file fixes stays as it is.
+                // Parameters that the model file fixes do not change.
                 if setup.free().contains(&at) {
                     x[at] = value;
                 }
@@ -78,7 +78,7 @@ impl Context<'_> {
             for (d, &at) in step.iter().zip(setup.free()) {
                 stepped[at] = within(stepped[at] + d, setup.bounds()[at]);
             }
-            // An effect of the other sign explains nothing.
+            // An effect of the opposite sign explains nothing.
             let predicted = if stepped[factor] == 0.0 {
                 triangle.cost()
             } else {
@@ -103,7 +103,7 @@ impl Context<'_> {
         };
         let fall = self.samples() * (node.fit.cost / best.predicted.max(f64::MIN_POSITIVE)).ln();
         scored.truncate(self.thresholds.kept_factor_starts);
-        // Without the factor every entry behind it is one place nearer.
+        // Removing the factor shifts every later entry by one.
         let own: Vec<usize> = own
             .iter()
             .map(|&at| at - usize::from(at > factor))
@@ -144,7 +144,7 @@ impl Context<'_> {
     }
 }
 
-/// Every combination of scales of so many parameters: one, the factor, and its inverse; one alone for more than `most` parameters.
+/// Every combination of scales of the parameters: one, the factor, and its inverse; only one for more than `most` parameters.
 fn scalings(parameters: usize, factor: f64, most: usize) -> impl Iterator<Item = Vec<f64>> {
     let usable = factor.is_finite() && factor != 0.0 && parameters <= most;
     let each = [1.0, factor, factor.recip()];

@@ -1,9 +1,9 @@
-//! Sets of effects that grow from what earlier searches found: one effect more at a time, then each effect exchanged for others while that
-//! lowers the error (floating search).
+//! Sets of effects that grow from what earlier searches found: one effect more at a time, then swap steps while they lower the
+//! error (floating search).
 //!
-//! The effects of a measured record act together: two heaters on one board couple, their supply sags under both, and their sensors lag; any one
-//! of these explains little without the others. A beam of the best pairs loses such a set to effects that follow time, which imitate any slow
-//! error. Here sets are compared by their simulation error, without what follows time.
+//! The effects of a measured record act together: two heaters on one board couple, their supply sags under both, and their sensors lag; any
+//! one of these explains little without the others. A beam of the best pairs drops such a set in favour of functions of time, which fit any
+//! slow error. Here sets are compared by their simulation error, without functions of time.
 //!
 //! **Reference**: P. Pudil, J. Novovicova, J. Kittler, Pattern Recognition Letters 15 (1994) 1119-1125 (floating search).
 
@@ -14,7 +14,8 @@ use crate::node::{Context, Node, ROUGH};
 use crate::search::{best_first, same_set};
 
 impl Context<'_> {
-    /// Sets of up to so many effects that do not follow time, fitted in white noise. `sets`: what earlier searches fitted, in whatever metric.
+    /// Floating search: sets of up to the given number of effects that are no functions of time, fitted with white noise. `sets`: sets of
+    /// earlier searches, with any noise model.
     pub fn floating(&self, base: &Node, sets: &[Node], max_effects: usize) -> Vec<Node> {
         let white = Noise::white(base.spec().outputs.len());
         let timeless = self.timeless();
@@ -33,7 +34,7 @@ impl Context<'_> {
         fitted
     }
 
-    /// The set with the least criterion when each model has the noise model of its own residual, where that is less than a fit's.
+    /// The set with the least criterion when each model has the noise model of its own residual, if this is less than that of a fit.
     pub fn better_in_own_noise(&self, sets: Vec<Node>, than: &Fit) -> Option<Node> {
         let best = best_first(sets)
             .into_iter()
@@ -50,7 +51,7 @@ impl Context<'_> {
         (least.fit.bic() < than.bic() - self.thresholds.growth_margin).then_some(least)
     }
 
-    /// What of the best sets does not follow time, fitted in white noise.
+    /// The best sets without their functions of time, fitted with white noise.
     fn seeds(&self, base: &Node, sets: &[Node], white: &Noise) -> Vec<Node> {
         let (by_error, coloured): (Vec<Node>, Vec<Node>) = sets
             .iter()
@@ -84,7 +85,7 @@ impl Context<'_> {
             .into_par_iter()
             .filter_map(|seed| self.refitted(&seed, white, ROUGH).ok());
         let seeds = best_first(fits.collect());
-        // The best set of few effects, and the best of all: what grew beside effects that follow time may lead astray.
+        // The best small set, and the best of all: sets that were grown together with functions of time may be wrong.
         let few = |seed: &&Node| {
             seed.added.len() <= base.added.len() + self.thresholds.floating_small_set
         };
@@ -94,7 +95,7 @@ impl Context<'_> {
         begin
     }
 
-    /// The set with the one effect more that lowers the criterion most.
+    /// The set with the one additional effect that lowers the criterion most.
     fn one_more(
         &self,
         set: &Node,
@@ -111,7 +112,7 @@ impl Context<'_> {
         (best.gain_over(set) > self.thresholds.growth_margin).then_some(best)
     }
 
-    /// The set with effects exchanged for others, or left out, one by one, while that lowers the criterion.
+    /// The set improved by swaps or removals of effects, one by one, while the criterion falls.
     fn exchanged(
         &self,
         mut set: Node,

@@ -1,4 +1,4 @@
-//! The model that a diagnosis ends with.
+//! The final model of a diagnosis.
 
 use std::collections::BTreeMap;
 

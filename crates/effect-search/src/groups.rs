@@ -1,4 +1,4 @@
-//! Which candidates cannot be told from an effect of the answer: each is put in its place, and everything is fitted again.
+//! Ambiguity: candidates that fit as well as an effect of the result. Each candidate replaces the effect, and everything is fitted again.
 
 use ct_signals::ArModel;
 use estimation::{Fit, Noise};
@@ -9,13 +9,13 @@ use crate::node::{Context, FINE, Node};
 use crate::partial::explained;
 use crate::search::best_first;
 
-/// What is left out where the time has passed.
+/// Step that is left out if the time is over.
 const OTHERS: &str = "other effects that may explain the same";
 
 impl Context<'_> {
-    /// For each effect that the search added itself, then all that can stand in for it, best first; and the set, in which a candidate of the
-    /// user's own has the place of an effect of the catalogue that is the same. `slowness`: samples over independent ones, where the metric
-    /// of `noise` is not that of the noise ([`Context::slowness`]).
+    /// For each added effect: the effect and all candidates that fit as well in its place, best first; and the set, in which the user's own
+    /// candidate replaces an equal effect of the catalogue. `slowness`: samples per independent sample, if the weighting by `noise` is not
+    /// that of the actual noise ([`Context::slowness`]).
     pub fn groups(
         &self,
         mut last: Node,
@@ -52,7 +52,7 @@ impl Context<'_> {
         Ok((last, groups))
     }
 
-    /// The sets in which something else stands in the place of an effect and explains the data as well, best first.
+    /// The sets in which an alternative replaces an effect and explains the data as well, best first.
     fn stand_ins(
         &self,
         last: &Node,
@@ -89,7 +89,7 @@ impl Context<'_> {
             let deviance = (node.fit.deviance - last.fit.deviance) / slowness;
             let further = node.fit.parameters as f64 - last.fit.parameters as f64;
             let bic = deviance + further * (self.samples() / slowness).ln();
-            // As many parameters or fewer: the deviance decides; more have to pay for themselves.
+            // With as many parameters or fewer, the deviances are compared; additional parameters have to lower the criterion.
             bic < self.thresholds.same_bic
                 || deviance < self.thresholds.same_deviance
                     && node.fit.parameters <= last.fit.parameters
@@ -108,9 +108,9 @@ impl Context<'_> {
         last.is_some_and(|&i| self.candidates[i].effect.is_none())
     }
 
-    /// Whether a set explains most of what another one does of what a third leaves, and leaves what may be noise of another colour: with a
-    /// noise model of its own, what the other one gains is not beyond chance. The users of a model name its likely physics, and it is rarely
-    /// all that acts in a measured record: an effect of the catalogue that bends further wins by the rest.
+    /// Whether a set explains most of what another one does of what a third leaves, and leaves what may be noise of another spectrum: with
+    /// a noise model of its own, what the other one gains is not beyond chance. Users propose the likely physics of their model, and a
+    /// measured record usually contains more: a more flexible effect of the catalogue would win by fitting the rest.
     fn explains_most(
         &self,
         (set, last): (&Node, &Node),

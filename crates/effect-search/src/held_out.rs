@@ -1,8 +1,9 @@
-//! Errors on held-out records: their initial states are fitted on the first samples, all else stays, and the rest is scored.
+//! Errors on held-out records: their initial states are fitted on the first samples, all other parameters are fixed, and the rest is
+//! scored.
 //!
-//! The first five samples, as the benchmark of the cascaded tanks has it, wherever they determine the states well enough. A speed that is not
-//! measured, say, follows from five noisy positions so badly that its error alone decides the score: then the samples are doubled until what is
-//! not known of the states moves the outputs by no more than their noise.
+//! The first five samples, as the benchmark of the cascaded tanks has it, wherever they determine the states well enough. A speed that is
+//! not measured, say, follows from five noisy positions so badly that its error alone decides the score: then the samples are doubled until
+//! what is not known of the states moves the outputs by no more than their noise.
 
 use ct_signals::Record;
 use estimation::Fit;
@@ -13,7 +14,7 @@ use crate::Error;
 
 /// Samples on which the initial states of a held-out record are fitted at least, and which are not scored.
 const STATE_ROWS: usize = 5;
-/// They are no more than this part of the record.
+/// Largest share of the record for these rows.
 const MOST_OF_RECORD: usize = 4;
 
 /// A fitted model on held-out records.
@@ -21,13 +22,13 @@ const MOST_OF_RECORD: usize = 4;
 pub struct HeldOut {
     /// Simulation error of each output \[its unit\].
     pub rmse: Vec<f64>,
-    /// What the model gives: a series for each record and output; NaN where the simulation cannot go on.
+    /// Simulated output: a series for each record and output; NaN after the simulation diverges.
     pub simulated: Vec<Vec<f64>>,
-    /// On so many first samples of each record the initial states were fitted; they are not scored.
+    /// Number of first samples of each record for the fit of the initial states; they are not scored.
     pub state_rows: Vec<usize>,
 }
 
-/// A fitted model on held-out records; `None` without any. `fit`: of the model that `setup` has.
+/// A fitted model on held-out records; `None` without any. `fit`: fit of the model in `setup`.
 ///
 /// # Errors
 /// Where a record is not one of this model, or its initial states cannot be fitted.
@@ -75,8 +76,8 @@ pub fn held_out(setup: &ModelSetup, fit: &Fit, test: &[Record]) -> Result<Option
     }))
 }
 
-/// Whether what the first rows leave unknown of the initial states moves the outputs of the whole record by no more than their noise (root
-/// mean square). `noise`: standard deviation at each output \[its unit\].
+/// Whether the uncertainty of the initial states after the first rows changes the outputs of the whole record by no more than their noise
+/// (root mean square). `noise`: standard deviation at each output \[its unit\].
 fn states_are_known(setup: &ModelSetup, x: &[f64], first: usize, noise: &[f64]) -> bool {
     let Some(rows) = estimation::rows(setup, x) else {
         return true;
@@ -103,7 +104,7 @@ fn states_are_known(setup: &ModelSetup, x: &[f64], first: usize, noise: &[f64]) 
             count += 1;
         }
     }
-    // A state that moves nothing needs not be known.
+    // A state without influence needs no estimate.
     let ridge = 1e-9 * all.diagonal().max() / count.max(1) as f64;
     for i in 0..states {
         information[(i, i)] += ridge;

@@ -1,4 +1,4 @@
-//! A candidate beside a set whose rows are known.
+//! A candidate added to a set with known Jacobian.
 //!
 //! Where a candidate is absent the outputs and their derivatives by all that the set has are those of the set: only the derivatives by the
 //! candidate's own entries have to be simulated, which is a small part of all. Elsewhere this is an approximation, with the right residual.
@@ -8,14 +8,14 @@ use greybox::ModelSetup;
 
 use crate::node::{Context, Node};
 
-/// Where a column comes from.
+/// Source of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Column {
     Known(usize),
     Own(usize),
 }
 
-/// Which columns of a candidate's model are those of the set.
+/// Columns of a candidate's model that belong to the set.
 pub(crate) struct Columns {
     all: Vec<Column>,
     /// Entries of the vector that are the candidate's own.
@@ -31,7 +31,7 @@ pub(crate) struct Joined<'a> {
 }
 
 impl Context<'_> {
-    /// Which columns of a larger model are those of a set.
+    /// Columns of a larger model that belong to a set.
     pub fn columns_beside(&self, set: &Node, own: &ModelSetup, larger: &ModelSetup) -> Columns {
         let (old, new) = (set.spec(), larger.model().spec());
         let (old_first, first) = (old.parameters.len(), new.parameters.len());
@@ -102,7 +102,7 @@ impl Residuals for Joined<'_> {
         self.setup.samples()
     }
 
-    /// The rows at the point that was given, whatever the vector.
+    /// The rows at the given point, independent of the vector.
     fn each_row(&self, _: &[f64], mut each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
         let mut row = vec![0.0; self.columns.len() + 1];
         for ((output, known), (_, own)) in self.known.series().zip(self.own.series()) {

@@ -1,4 +1,4 @@
-//! A set of effects with its fit, and how vectors of one set become those of another.
+//! A set of effects with its fit, and the conversion of parameter vectors between sets.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,25 +12,25 @@ use crate::Error;
 use crate::problem::{Limit, Problem};
 use crate::thresholds::Thresholds;
 
-/// A first fit: its rank is sought, not its digits.
+/// Stopping criteria of a first fit, which only has to give a rank.
 pub(crate) const ROUGH: Stopping = Stopping {
     evaluations: 25,
     cost: 1e-4,
 };
-/// The fit of what is reported or compared closely.
+/// Stopping criteria of fits that are reported or compared closely.
 pub(crate) const FINE: Stopping = Stopping {
     evaluations: 120,
     cost: 1e-9,
 };
 
-/// What all sets of one search share.
+/// Data that all sets of one search share.
 #[derive(Clone)]
 pub(crate) struct Context<'a> {
     pub problem: &'a Problem,
-    /// Standard deviation of each output's noise, where it is known by now.
+    /// Standard deviation of each output's noise, if it is known already.
     pub scales: Option<Vec<f64>>,
     pub candidates: Vec<Candidate>,
-    /// Smooth functions, for the shape of what no candidate explains.
+    /// Smooth functions, for the shape of the error that no candidate explains.
     pub shapes: Vec<Candidate>,
     pub limit: Limit<'a>,
     pub thresholds: Thresholds,
@@ -46,7 +46,7 @@ pub(crate) struct Node {
 }
 
 impl Node {
-    /// Fall of the criterion against another set in the same metric.
+    /// Fall of the criterion against another set with the same weighting.
     pub fn gain_over(&self, other: &Self) -> f64 {
         other.fit.bic() - self.fit.bic()
     }
@@ -63,7 +63,7 @@ impl Node {
     }
 }
 
-/// What is said of the parameters that a model has.
+/// Description of the parameters of a model.
 fn of_model<T: Clone>(model: &Model, said: &BTreeMap<String, T>) -> BTreeMap<String, T> {
     let mut said = said.clone();
     let parameters = &model.spec().parameters;
@@ -81,7 +81,7 @@ impl Context<'_> {
     /// A model against the fitted records.
     pub fn setup<'b>(&'b self, model: &'b Model) -> Result<ModelSetup<'b>, Error> {
         let problem = self.problem;
-        // Effects of the model file may be fixed too, but not all sets have them.
+        // Effects of the model file may have fixed parameters too, but not all sets contain these effects.
         let known = of_model(model, &problem.known);
         let priors = of_model(model, &problem.priors);
         let setup = ModelSetup::new(model, &problem.records, &known, problem.time_unit)?;
@@ -92,7 +92,7 @@ impl Context<'_> {
         })
     }
 
-    /// The fit of a set from starts in a metric.
+    /// The fit of a set from starts with a given weighting.
     pub fn fitted(
         &self,
         added: Vec<usize>,
@@ -107,7 +107,7 @@ impl Context<'_> {
         Ok(Node { added, model, fit })
     }
 
-    /// A set fitted anew from where it is.
+    /// A set fitted again from its estimates.
     pub fn refitted(&self, node: &Node, noise: &Noise, stopping: Stopping) -> Result<Node, Error> {
         let mut refitted = self.fitted(
             node.added.clone(),
@@ -120,7 +120,7 @@ impl Context<'_> {
         Ok(refitted)
     }
 
-    /// The set without one of its effects, fitted from where it was.
+    /// The set without one of its effects, fitted from its estimates.
     pub fn without(
         &self,
         node: &Node,
@@ -133,7 +133,7 @@ impl Context<'_> {
         self.subset(node, added, noise, stopping)
     }
 
-    /// A part of the set, fitted from where it was.
+    /// A part of the set, fitted from its estimates.
     pub fn subset(
         &self,
         node: &Node,
@@ -149,7 +149,7 @@ impl Context<'_> {
         self.fitted(added, model, vec![start], noise, stopping)
     }
 
-    /// The vector of a set as another set begins with it: what only the other one has is as it starts.
+    /// The vector of a set as a start of another set: additional parameters have their start values.
     pub fn transfer(&self, from: &Node, to: &Model, start: &[f64]) -> Vec<f64> {
         let (old, new) = (from.spec(), to.spec());
         let mut x = start.to_vec();
@@ -180,7 +180,7 @@ impl Context<'_> {
         x
     }
 
-    /// Identifiers of a set, in the order in which it was made.
+    /// Identifiers of a set, in the order in which the effects were added.
     pub fn ids(&self, added: &[usize]) -> Vec<String> {
         added
             .iter()
@@ -188,16 +188,17 @@ impl Context<'_> {
             .collect()
     }
 
-    /// Whether a candidate may be added to a set: one that repeats another only beside that one, as alone the two are the same.
+    /// Whether a candidate may be added to a set: a candidate that repeats another one only in addition to it, because alone the two are
+    /// equal.
     pub fn may_stand_beside(&self, candidate: usize, added: &[usize]) -> bool {
         let repeated = self.candidates[candidate].repeats.as_ref();
         repeated.is_none_or(|id| added.iter().any(|&i| self.candidates[i].id == *id))
     }
 
-    /// Whether a candidate is, under another name, one of a set.
+    /// Whether a candidate equals an effect of a set under another name.
     pub fn repeats_one_of(&self, candidate: usize, added: &[usize]) -> bool {
         let first = |mut i: usize| {
-            // A candidate repeats one that stands before it.
+            // A candidate repeats an earlier one.
             while let Some(id) = &self.candidates[i].repeats
                 && let Some(before) = self.candidates[..i].iter().position(|c| c.id == *id)
             {
@@ -208,7 +209,8 @@ impl Context<'_> {
         added.iter().any(|&i| first(i) == first(candidate))
     }
 
-    /// Positions of the candidates that do not follow time: those that do imitate any slow disturbance, and leave no room for others.
+    /// Positions of the candidates that are no functions of time: functions of time compensate for any slow disturbance, and leave nothing
+    /// for other effects.
     pub fn timeless(&self) -> Vec<usize> {
         let all = 0..self.candidates.len();
         all.filter(|&i| !self.candidates[i].follows_time())

@@ -1,7 +1,7 @@
 //! Joint scores of all pairs of candidates: the fall of the cost that both predict together, from one linearisation of each.
 //!
-//! A candidate's columns are its derivatives at its best start and, where it is not absent there, the change of the outputs. All columns are
-//! whitened and projected off those of the believed model; a pair then costs one solution of a small system.
+//! A candidate's columns are its derivatives at its best start and, where it is not absent there, the change of the outputs. All columns
+//! are whitened and projected off those of the believed model; a pair then costs one solution of a small system.
 
 use estimation::{Noise, Rows, rows};
 use nalgebra::{DMatrix, DVector};
@@ -10,14 +10,14 @@ use rayon::prelude::*;
 use crate::node::{Context, Node};
 use crate::score::Trial;
 
-/// Values in all columns together above which rows are thinned out.
+/// Number of values in all columns above which rows are thinned out.
 const MOST_VALUES: usize = 20_000_000;
-/// What is left of a column by the projection is nothing below this part.
+/// A column whose projection residual is below this share counts as linearly dependent.
 const NOTHING: f64 = 1e-6;
 /// Ridge of the small systems, as a share of the squared length.
 const RIDGE: f64 = 1e-9;
 
-/// Pairs of positions in `trials`, the best first, that predict more than their members.
+/// Pairs of positions in `trials`, the best first, with a larger prediction than their members.
 pub(crate) fn joint_scores(
     context: &Context,
     base: &Node,
@@ -135,7 +135,7 @@ fn columns_of(
     let matrix = whitened(&all, chosen, noise, weights, every)?;
     let last = matrix.ncols() - 1;
     let mut columns: Vec<DVector<f64>> = (0..last).map(|j| matrix.column(j).into_owned()).collect();
-    // Residual of the believed model less that of this start: what the effect does there.
+    // Residual of the believed model minus the residual of this start: the response to the effect.
     let change = residual - matrix.column(last);
     if change.norm() > NOTHING * residual.norm() {
         columns.push(change);
@@ -143,7 +143,7 @@ fn columns_of(
     Some(columns)
 }
 
-/// Chosen columns of all rows whose sample is there, whitened and weighted, every so many.
+/// Selected columns of all present rows, whitened and weighted, every n-th column entry.
 fn whitened(
     all: &Rows,
     chosen: Vec<usize>,

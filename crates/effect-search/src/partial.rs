@@ -1,11 +1,11 @@
-//! The largest part of the error that effects explain, where what they leave is slower than noise that a search may trust.
+//! Partial explanation: the largest part of the error that effects explain, if the residual is slower than noise that a search can model.
 //!
-//! Measured records hold several causes, and disturbances that are nearly integrated. A noise model with a long memory looks at changes from
-//! sample to sample alone: it takes every slow effect for noise, and a fit in its metric lets the simulation drift off. There sets are compared
-//! by their simulation error. A set is a part of the answer where
-//! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an effect
-//!   that follows time alone, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and without others
-//!   beside it, as those then bend to any disturbance;
+//! Measured records hold several causes, and disturbances that are nearly integrated. A noise model with a long memory uses changes from
+//! sample to sample only: it treats every slow effect as noise, and a fit with this weighting lets the simulation drift. In this case sets
+//! are compared by their simulation error. A set is a partial explanation if
+//! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an
+//!   effect that follows time alone, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and
+//!   without others beside it, as those then bend to any disturbance;
 //! - several effects are called for where each model has a noise model of its own, of limited memory;
 //! - it predicts the next sample as well as the model without it, each beside a noise model of its own;
 //! - what is fitted to three quarters of the records predicts the fourth (cross-validation);
@@ -25,8 +25,8 @@ use crate::node::{Context, FINE, Node, ROUGH};
 use crate::search::{best_first, same_set};
 
 impl Context<'_> {
-    /// The set that explains the largest part of the error, fitted in white noise, and that part; `None` where no set is a part of the answer.
-    /// `sets`: fitted in whatever metric; `base`: fitted in white noise.
+    /// The set that explains the largest part of the error, fitted with white noise, and that part; `None` if no set is a partial
+    /// explanation. `sets`: fitted with any noise model; `base`: fitted with white noise.
     pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<(Node, f64)>, Error> {
         let white = Noise::white(self.problem.records[0].outputs.len());
         let own_base = self.in_limited_noise(base)?;
@@ -83,13 +83,13 @@ impl Context<'_> {
         Ok(best)
     }
 
-    /// Effects of a set; those that follow time count twice, as they imitate more.
+    /// Number of effects of a set; functions of time count twice, because they are more flexible.
     fn size(&self, set: &Node) -> usize {
         let in_time = |&&i: &&usize| self.candidates[i].follows_time();
         set.added.len() + set.added.iter().filter(in_time).count()
     }
 
-    /// The share of the error above the noise that a set explains, and whether it is a part of the answer.
+    /// The share of the error above the noise that a set explains, and whether the set is a partial explanation.
     fn is_part(&self, base: &Node, own_base: &Fit, set: &Node) -> Result<(f64, bool), Error> {
         let own = self.in_limited_noise(set)?;
         let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
@@ -114,7 +114,7 @@ impl Context<'_> {
         Ok((share, accepted))
     }
 
-    /// The fit of a set with a noise model of its own residual whose memory is limited.
+    /// The fit of a set with a noise model of its own residual, with limited memory.
     pub fn in_limited_noise(&self, node: &Node) -> Result<Fit, Error> {
         let setup = self.setup(&node.model)?;
         let memory = Some(self.longest_memory());
@@ -127,8 +127,8 @@ impl Context<'_> {
         )?)
     }
 
-    /// Samples over independent samples of a noise whose memory is limited: by how much slow parameters, and differences of the deviance in
-    /// white noise, are less certain than under white noise of the same size.
+    /// Samples per independent sample of a noise with limited memory: factor by which slow parameters, and differences of the deviance with
+    /// white noise, are less certain than under white noise of the same variance.
     pub fn slowness(&self, noise: &Noise) -> f64 {
         let limited = noise.with_memory_at_most(self.longest_memory());
         let outputs = limited.iter().zip(&self.problem.records[0].outputs);
@@ -154,8 +154,8 @@ impl Context<'_> {
         all.any(|(parameter, error)| error.is_none() && names.contains(&&parameter.about.name))
     }
 
-    /// The part of the mean squared error that a set explains on parts of the records that it was not fitted to: a quarter of each record is
-    /// left out in turn (cross-validation). Negative where the set does harm.
+    /// The part of the mean squared error that a set explains on parts of the records that it was not fitted to: a quarter of each record
+    /// is left out in turn (cross-validation). Negative if the error rises.
     fn carried_over(&self, base: &Node, set: &Node) -> Result<f64, Error> {
         let before = self.left_out_squares(base)?;
         let after = self.left_out_squares(set)?;
@@ -165,7 +165,7 @@ impl Context<'_> {
         })
     }
 
-    /// The squared error of each output on parts of the records that take no part in the fit; `None` where a simulation is not finite.
+    /// The squared error of each output on parts of the records that are not used for the fit; `None` if a simulation is not finite.
     pub fn left_out_squares(&self, node: &Node) -> Result<Option<Vec<f64>>, Error> {
         let mut squares = vec![0.0; self.problem.records[0].outputs.len()];
         for fold in 0..self.thresholds.folds {
@@ -179,7 +179,7 @@ impl Context<'_> {
         Ok(Some(squares))
     }
 
-    /// The squared error of each output on a part of all records, when the readings of this part take no part in the fit; `None` where the
+    /// The squared error of each output on a part of all records, if the readings of this part are not used for the fit; `None` if the
     /// simulation is not finite.
     fn left_out(&self, node: &Node, fold: usize) -> Result<Option<Vec<f64>>, Error> {
         let part = |record: &Record| {
@@ -210,7 +210,7 @@ impl Context<'_> {
     }
 }
 
-/// The relative fall of squared errors. Outputs count alike; one without an error before says nothing.
+/// The relative fall of squared errors. Outputs have equal weight; an output without an error before is left out.
 pub(crate) fn fall(before: &[f64], after: &[f64]) -> f64 {
     let pairs = before.iter().zip(after);
     let ratios: Vec<f64> = pairs

@@ -9,7 +9,7 @@ use greybox::{ModelSetup, PriorValue};
 
 use crate::{Error, Kept, Problem};
 
-/// Makes a [`Problem`]: what it needs was given to [`Problem::builder`], the rest has a method each.
+/// Builds a [`Problem`]: required parts were given to [`Problem::builder`], the other parts have one method each.
 #[derive(Debug, Clone)]
 #[must_use]
 pub struct ProblemBuilder {
@@ -67,19 +67,19 @@ impl Problem {
 }
 
 impl ProblemBuilder {
-    /// Effects that the model has already, by their identifiers ([`Problem::effects`]).
+    /// Effects in the model, by their identifiers ([`Problem::effects`]).
     pub fn effects<S: Into<String>>(mut self, effects: impl IntoIterator<Item = S>) -> Self {
         self.problem.effects = effects.into_iter().map(Into::into).collect();
         self
     }
 
-    /// What is kept of one of these effects from an earlier record ([`Problem::kept`]).
+    /// Keeps values of one of these effects from an earlier record ([`Problem::kept`]).
     pub fn kept(mut self, effect: impl Into<String>, kept: Kept) -> Self {
         self.problem.kept.insert(effect.into(), kept);
         self
     }
 
-    /// Records that take part in no fit and no choice; the errors on them are said.
+    /// Held-out records: they are not used for fits or for selection; the errors on them are reported.
     pub fn test(mut self, records: impl Into<Vec<Record>>) -> Self {
         self.problem.test = records.into();
         self
@@ -91,19 +91,19 @@ impl ProblemBuilder {
         self
     }
 
-    /// What is known of a parameter beside the records.
+    /// Prior knowledge of a parameter.
     pub fn prior(mut self, parameter: impl Into<String>, prior: PriorValue) -> Self {
         self.problem.priors.insert(parameter.into(), prior);
         self
     }
 
-    /// A candidate of the user's own, beside those of the catalogue.
+    /// Adds a user's own candidate to those of the catalogue.
     pub fn candidate(mut self, name: impl Into<String>, candidate: OwnCandidate) -> Self {
         self.problem.candidates.insert(name.into(), candidate);
         self
     }
 
-    /// The unit of the model's time: how many seconds it has, above 0, and how it is written. Without this it is the second.
+    /// The unit of the model's time: its length in seconds, above 0, and its symbol. The default is the second.
     pub fn time_unit(mut self, seconds: f64, name: impl Into<String>) -> Self {
         (self.problem.time_unit, self.problem.time_unit_name) = (seconds, name.into());
         self
@@ -113,8 +113,8 @@ impl ProblemBuilder {
     ///
     /// # Errors
     /// [`Error::TimeUnit`]; [`Error::Fit`] where there is no record, a record is not sound or has not the channels of the model, or where
-    /// the model has no parameter of a name, or a prior is no number with an error. Of a model with effects the names are looked at when these
-    /// are in it, by [`diagnose`](crate::diagnose).
+    /// the model has no parameter of a name, or a prior is no number with an error. Of a model with effects the names are looked at when
+    /// these are in it, by [`diagnose`](crate::diagnose).
     pub fn build(self) -> Result<Problem, Error> {
         let problem = self.problem;
         let seconds = problem.time_unit;

@@ -1,4 +1,4 @@
-//! What a search found: plain values, written as JSON as they stand.
+//! Result of a search: plain values, written to JSON unchanged.
 
 use std::collections::BTreeMap;
 
@@ -13,45 +13,45 @@ use crate::unknown::Unknown;
 pub enum Verdict {
     /// Every added effect is singled out by the data.
     Effect,
-    /// Something is missing, and at least one added effect has a stand-in that fits as well.
+    /// An effect is missing, and another candidate fits as well as at least one added effect.
     Undecided,
-    /// The added effects explain the larger part of the error, and something else remains that is not noise.
+    /// The added effects explain the larger part of the error, and the residual is not noise.
     Partial,
-    /// What the model leaves is not noise, and no candidate explains it.
+    /// The residual is not noise, and no candidate explains it.
     Unexplained,
-    /// Nothing is missing that these data would show.
+    /// No missing effect is detectable in these data.
     Adequate,
 }
 
-/// A parameter or an initial state as it was fitted.
+/// A fitted parameter or initial state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Its name.
     pub name: String,
-    /// Its value \[unit\].
+    /// Value \[unit\].
     pub value: f64,
-    /// Its standard error; `None` where it is known, at a bound or not determined.
+    /// Standard error; `None` if the value is known, at a bound or not determined.
     pub std_error: Option<f64>,
-    /// Its unit as the text has it.
+    /// Unit as in the text.
     pub unit: String,
-    /// It is not fitted.
+    /// The value is not fitted.
     pub known: bool,
-    /// The effect whose parameter it is; `None` of the believed model's own.
+    /// The effect of the parameter; `None` for the believed model's own parameters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub effect: Option<String>,
 }
 
-/// A model on the way: the believed one, then with one effect more each.
+/// One of the reported models: the believed one, or a model with one more effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
-    /// The effect that was added; `None` of the believed model.
+    /// The added effect; `None` for the believed model.
     pub added: Option<String>,
-    /// Simulation error of an only output on the fitted records \[its unit\].
+    /// Simulation error of a single output on the fitted records \[its unit\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rmse: Option<f64>,
     /// Simulation error by output, on the fitted records \[unit of the output\].
     pub rmse_per_output: BTreeMap<String, f64>,
-    /// The same on the held-out records.
+    /// Simulation error of each output on the held-out records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rmse_test_per_output: Option<BTreeMap<String, f64>>,
     /// First rows of each held-out record, to which its initial states were fitted and which are not scored.
@@ -59,25 +59,25 @@ pub struct Step {
     pub state_rows: Option<Vec<usize>>,
     /// Simulation error, each output divided by its noise: 1 is the noise.
     pub weighted_rmse: f64,
-    /// Bayesian information criterion, in the metric in which the effects were confirmed.
+    /// Bayesian information criterion, with the weighting of the confirmation.
     pub bic: f64,
-    /// All parameters, then the initial states.
+    /// All parameters, followed by the initial states.
     pub parameters: Vec<Estimate>,
     /// Starts of the fit.
     pub starts: usize,
-    /// How many of them ended in the best minimum.
+    /// Number of starts that ended in the best minimum.
     pub starts_agree: usize,
-    /// What the model gives: a series for each fitted record and output, then those of the held-out records.
+    /// Simulated output: a series for each fitted record and output, then those of the held-out records.
     #[serde(skip)]
     pub simulated: Vec<Vec<f64>>,
 }
 
-/// A single effect beside the believed model.
+/// A single effect added to the believed model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Single {
     /// The effect.
     pub effect: String,
-    /// Its parameters, from a first fit.
+    /// Parameters of the effect from a first fit.
     pub sizes: Vec<Estimate>,
     /// Fall of the criterion; larger is better.
     pub bic_gain: f64,
@@ -92,7 +92,7 @@ pub struct NoiseFloor {
     pub output: String,
     /// Standard deviation \[unit of the output\].
     pub level: f64,
-    /// Standard deviation of what its past does not predict.
+    /// Standard deviation of the innovations.
     pub innovation: f64,
     /// Autoregressive coefficients; empty for white noise.
     pub coefficients: Vec<f64>,
@@ -109,29 +109,29 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// The effects that were added, in order.
     pub effects: Vec<String>,
-    /// For each of them itself, then all that cannot be told from it on these data, best first.
+    /// For each added effect: the effect and all candidates that these data cannot distinguish from it, best first.
     pub groups: Vec<Vec<String>>,
     /// The single effects, best first; `none` first where the model is adequate.
     pub ranked: Vec<String>,
-    /// The believed model, and every model after it.
+    /// The believed model, and every later model.
     pub steps: Vec<Step>,
     /// The share of the squared error above the noise that the effects explain; `None` without effects.
     pub share: Option<f64>,
-    /// What the last model leaves that is not noise.
+    /// Structure in the residual of the last model that is not noise.
     pub left: Option<Left>,
-    /// The shape of what no candidate explains, beside the last model; `None` where nothing is left to explain.
+    /// The unexplained error of the last model; `None` if its residual is noise.
     pub unknown: Option<Unknown>,
     /// The noise of each output, of the last model's residual.
     pub noise: Vec<NoiseFloor>,
     /// Single effects that were fitted, best first.
     pub singles: Vec<Single>,
-    /// What of the records the named effects are written in ([`ct_model::effects::Candidate::record_numbers`]), by their identifiers: with
-    /// these numbers an effect means the same beside another record.
+    /// For each named effect, the numbers of the records that its equations contain ([`ct_model::effects::Candidate::record_numbers`]), by
+    /// identifiers: with these numbers an effect means the same for another record.
     pub record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
-    /// How many candidates were scored.
+    /// Number of scored candidates.
     pub candidates: usize,
-    /// What the time limit left out of the search; empty where it is complete.
+    /// Steps that the time limit left out of the search; empty if the search is complete.
     pub left_out: Vec<String>,
-    /// How long it took \[s\].
+    /// Computing time \[s\].
     pub seconds: f64,
 }

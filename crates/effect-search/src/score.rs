@@ -1,11 +1,11 @@
-//! What each candidate would do to a set of effects: its predicted fall of the cost, in one step of Gauss-Newton from its best start.
+//! Score of each candidate for a set of effects: the predicted fall of the cost in one Gauss-Newton step from its best start.
 //!
-//! An effect whose outputs have a derivative where it is absent is linearised there, for each start of its shapes; a threshold at each
-//! of its starts. One linearisation in the metric of the noise gives the cost after the step, all parameters free: the score test, and its
+//! An effect whose outputs have a derivative where it is absent is linearised there, for each start of its shapes; a threshold at each of
+//! its starts. One linearisation weighted by the noise model gives the cost after the step, all parameters free: the score test, and its
 //! extension to thresholds.
 //!
-//! **Reference**: C. R. Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50-57 (score test); S. A. Billings, M. Korenberg, S. Chen, Int. J. Systems
-//! Science 19 (1988) 1559-1568 (orthogonal forward regression).
+//! **Reference**: C. R. Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50-57 (score test); S. A. Billings, M. Korenberg, S. Chen, Int. J.
+//! Systems Science 19 (1988) 1559-1568 (orthogonal forward regression).
 
 use std::sync::Arc;
 
@@ -19,24 +19,24 @@ use crate::joined::Joined;
 use crate::node::{Context, Node};
 use crate::spectral_line::strongest_line;
 
-/// Damping of the predicted step, against what the data do not determine.
+/// Damping of the predicted step, for directions that the data do not determine.
 pub(crate) const DAMPING: f64 = 1e-9;
 /// Parts of the predicted step from which a fit may begin, as shares of it.
 const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
 
-/// A candidate beside a set of effects, before it is fitted.
+/// A candidate for addition to a set of effects, before it is fitted.
 #[derive(Debug, Clone)]
 pub(crate) struct Trial {
     /// Position among the candidates.
     pub candidate: usize,
     pub model: Arc<Model>,
-    /// Starts of its fit, best first: where it was linearised, or one step from there where that is better.
+    /// Starts of its fit, best first: the points of linearisation, or one step from there if that is better.
     pub starts: Vec<Vec<f64>>,
     /// Predicted fall of the deviance.
     pub fall: f64,
 }
 
-/// The starts, or so many of them.
+/// The starts, or the given number of them.
 pub(crate) fn thinned(starts: Vec<Vec<f64>>, most: usize) -> Vec<Vec<f64>> {
     if starts.len() <= most {
         return starts;
@@ -56,11 +56,11 @@ struct Place {
     stepped: Vec<f64>,
 }
 
-/// The effect whose starts follow from the spectrum of the residual.
+/// The effect whose starts come from the spectrum of the residual.
 const PERIODIC: &str = "periodic";
-/// The effect whose time is looked for between its starts.
+/// The effect whose instant is refined between its starts.
 const STEP: &str = "step";
-/// So far from the best starts of a time others are scored, round by round, as shares of the longest record.
+/// Distances from the best instants at which further starts are scored, round by round, as shares of the longest record.
 const BETWEEN: [f64; 2] = [0.05, 0.025];
 
 impl Context<'_> {
@@ -99,7 +99,7 @@ impl Context<'_> {
         self.trials_among(node, &all, noise)
     }
 
-    /// The same of some candidates, by their positions.
+    /// Trials of some candidates, by their positions.
     pub fn trials_among(&self, node: &Node, among: &[usize], noise: &Noise) -> Vec<Trial> {
         let others: Vec<usize> = among
             .iter()
@@ -130,12 +130,12 @@ impl Context<'_> {
         }
     }
 
-    /// Derivatives and residuals of a set where its fit ended.
+    /// Derivatives and residuals of a set at the end of its fit.
     fn rows_of(&self, node: &Node) -> Option<Rows> {
         estimation::rows(&self.setup(&node.model).ok()?, &node.fit.x)
     }
 
-    /// The same beside a set whose rows are known.
+    /// Trial of a candidate for a set with known Jacobian.
     fn trial_beside(
         &self,
         node: &Node,
@@ -195,7 +195,8 @@ impl Context<'_> {
         let count = self.samples();
         let set = self.setup(&node.model)?;
         let columns = self.columns_beside(node, &set, &setup);
-        // Where an effect is absent its shapes change nothing: their columns hold rounding errors, and no step follows from these.
+        // While an effect is absent, its shape parameters have no influence: their columns contain rounding errors, and no step is computed
+        // from them.
         let silent: Vec<usize> = candidate
             .parameters
             .iter()
@@ -217,7 +218,7 @@ impl Context<'_> {
             for (d, &at) in step.iter().zip(setup.free()) {
                 stepped[at] = within(stepped[at] + d, setup.bounds()[at]);
             }
-            // A size that its bound forbids explains nothing.
+            // A size outside its bound explains nothing.
             let forbidden = smooth
                 && candidate
                     .parameters
@@ -263,14 +264,14 @@ impl Context<'_> {
                 scored.extend(others.into_iter().filter_map(scored_at));
                 scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
             }
-            // A fit from a neighbour of the best time ends where that from the best one does.
+            // A fit from a neighbour of the best instant ends in the same minimum.
             let best = scored.first().map_or(0.0, |place| place.x[at]);
             let near = 2.0 * BETWEEN[0] * duration;
             let mut first = true;
             scored.retain(|place| std::mem::take(&mut first) || (place.x[at] - best).abs() >= near);
         }
         if !smooth {
-            // Where the effect acts the set's own derivatives are others.
+            // The presence of the effect changes the derivatives of the other parameters.
             scored.truncate(self.thresholds.linearised_starts);
             scored = scored
                 .into_iter()
@@ -288,7 +289,7 @@ impl Context<'_> {
             return Ok(None);
         };
         let fall = count * (node.fit.cost / best.max(f64::MIN_POSITIVE)).ln();
-        // A simulation without derivatives tells which of the starts is better.
+        // A simulation without derivatives shows which of the starts is better.
         let kept = if smooth && scored.len() == 1 {
             1
         } else {
@@ -307,7 +308,8 @@ impl Context<'_> {
                     let both = place.x.iter().zip(&place.stepped);
                     both.map(|(x, stepped)| x + share * (stepped - x)).collect()
                 };
-                // Where the whole step raises the cost the fit begins with a part of it: at an absent effect no shape can be fitted.
+                // If the whole step raises the cost, the fit begins with a part of the step: shape parameters cannot be fitted while the
+                // effect is absent.
                 let parts = SHARES.iter().map(|&share| to(share));
                 parts
                     .map(|x| (cost(&x), x))

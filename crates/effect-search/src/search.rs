@@ -1,7 +1,7 @@
 //! The search of sets of effects in the metric of one noise model: all single effects, pairs by their joint scores, and a beam of sets that
 //! grow by one effect at a time.
 //!
-//! Effects act together: a pair may explain what neither of its members does. So every set of the beam is scored anew with all candidates,
+//! Effects act together: a pair may explain what neither of its members does. So every set of the beam is scored again with all candidates,
 //! and pairs are looked at before any single effect is chosen.
 
 use estimation::Noise;
@@ -13,29 +13,29 @@ use crate::node::{Context, FINE, Node, ROUGH};
 use crate::pairs::joint_scores;
 use crate::score::Trial;
 
-/// What is left out where the time has passed.
+/// Step that is left out if the time is over.
 const LARGER: &str = "larger sets of effects";
 
-/// What a search in one metric found.
+/// Result of a search with one noise model.
 pub(crate) struct Grown {
-    /// The model that the search began with.
+    /// The first model of the search.
     pub base: Node,
     /// Single effects, best first.
     pub singles: Vec<Node>,
     /// The set with the least criterion.
     pub best: Node,
-    /// Candidates that are scored beside sets of several: what does next to nothing beside the believed model is not.
+    /// Candidates that are scored for sets of several effects: candidates with almost no influence on the believed model are left out.
     among: Vec<usize>,
-    /// Sets that may grow, best first.
+    /// Sets that may be extended, best first.
     beam: Vec<Node>,
-    /// All sets that were fitted.
+    /// All fitted sets.
     pub fitted: Vec<Node>,
-    /// The time ended the search.
+    /// Whether the time limit ended the search.
     pub cut_short: bool,
 }
 
 impl Context<'_> {
-    /// Fits of candidates beside a set.
+    /// Fits of candidates added to a set.
     pub fn refits(&self, node: &Node, trials: &[Trial], noise: &Noise) -> Vec<Node> {
         let fits = trials.par_iter().filter_map(|trial| {
             if self.limit.passed() {
@@ -62,8 +62,8 @@ impl Context<'_> {
         free.is_ok_and(|free| free.iter().any(|&i| errors[i].is_none()))
     }
 
-    /// The best single effects fitted again from starts of their own: where the believed model has no minimum within its bounds, an effect
-    /// beside it begins there, and that may be a place that it has no part in. `known`: fits of single effects in another metric.
+    /// The best single effects fitted again from their own starts. If the believed model has no minimum within its bounds, the fits of
+    /// single effects start at its end point, which may be unfavourable. `known`: fits of single effects with another weighting.
     fn refit_from_own_starts(&self, nodes: &mut [Node], known: &[Node], noise: &Noise) {
         nodes
             .par_iter_mut()
@@ -88,7 +88,7 @@ impl Context<'_> {
         sort_by_criterion(nodes);
     }
 
-    /// Where a set ends that is fitted from starts of its own, in white noise.
+    /// Minimum of a set that is fitted from its own starts with white noise.
     fn own_minimum(&self, node: &Node) -> Result<Vec<f64>, Error> {
         let options = FitOptions {
             starts: self.thresholds.own_starts,
@@ -98,7 +98,8 @@ impl Context<'_> {
         Ok(self.setup(&node.model)?.fit(&options)?.x)
     }
 
-    /// The search of sets of up to so many effects. `of`: positions of the candidates; `known`: fits of single effects in another metric.
+    /// The search of sets up to a given number of effects. `of`: positions of the candidates; `known`: fits of single effects with another
+    /// weighting.
     pub fn grow(
         &self,
         base: Node,
@@ -130,7 +131,7 @@ impl Context<'_> {
             .max(self.thresholds.kept_candidates)
             .min(trials.len());
         let mut among: Vec<usize> = trials[..many].iter().map(|t| t.candidate).collect();
-        // What repeats one of them has no score before that is there.
+        // A candidate that repeats another one is scored only if the other one is in the set.
         for i in 0..self.candidates.len() {
             if self.candidates[i].repeats.is_some()
                 && !among.contains(&i)
@@ -151,7 +152,7 @@ impl Context<'_> {
         self.grow_on(grown, noise, max_effects)
     }
 
-    /// The search goes on, to sets of up to so many effects.
+    /// Continues the search to larger sets.
     pub fn grow_on(&self, grown: Grown, noise: &Noise, max_effects: usize) -> Result<Grown, Error> {
         let Grown {
             base,
@@ -229,7 +230,7 @@ impl Context<'_> {
             > fitted * self.samples().ln()
     }
 
-    /// A pair of candidates beside a set, from the best starts of each.
+    /// A pair of candidates added to a set, from the best starts of each.
     fn pair(
         &self,
         base: &Node,
@@ -262,12 +263,12 @@ impl Context<'_> {
     }
 }
 
-/// The same effects in any order.
+/// Whether two sets contain the same effects in any order.
 pub(crate) fn same_set(a: &Node, b: &Node) -> bool {
     a.added.len() == b.added.len() && a.added.iter().all(|i| b.added.contains(i))
 }
 
-/// By the criterion.
+/// Sorted by the criterion.
 pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     sort_by_criterion(&mut nodes);
     nodes

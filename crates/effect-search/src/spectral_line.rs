@@ -13,30 +13,31 @@ use realfft::RealFftPlanner;
 
 use ct_signals::Error;
 
-/// Neighbours of a line, from where its taper ends to where a smooth spectrum may have changed, and the fewest that do.
+/// Neighbours of a line: the first one outside its taper, the last one for which a smooth spectrum is nearly constant, and the least number
+/// of them.
 const NEAREST: usize = 3;
 const FARTHEST: usize = 12;
 const FEWEST: f64 = 4.0;
 
-/// Cycles that a period has in the series at least: what comes back less often is no period but a wander.
+/// Least number of cycles in the series: a slower oscillation counts as a drift.
 const CYCLES: usize = 3;
 
-/// The line that stands out most.
+/// The largest spectral line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     /// Periods in the series.
     pub cycles: usize,
-    /// Probability that the most outstanding of all lines of a noise stands out as far; above one where none does.
+    /// Probability that the largest line of a noise exceeds this one; above one without a line.
     pub chance: f64,
 }
 
-/// The strongest line of a series; `None` where it is too short, or does not move.
+/// The strongest line of a series; `None` if it is too short, or constant.
 pub fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
     let n = series.len();
-    // Flat enough for neighbours to be compared, by a filter that has no room for a line.
+    // Made nearly flat for a comparison of neighbours, by a filter whose order is too low to model a line.
     let mut flat = ArModel::fit(&[series], 1)?.whiten(series);
     for (k, value) in flat.iter_mut().enumerate() {
-        // A missing sample shows no line.
+        // A missing sample contributes nothing.
         if value.is_nan() {
             *value = 0.0;
         }
@@ -47,7 +48,7 @@ pub fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
     if transform.process(&mut flat, &mut spectrum).is_err() {
         return Ok(None);
     }
-    // Without the mean, and without the line at half the sampling rate, which has one degree of freedom.
+    // Without frequency zero, and without the Nyquist frequency, whose line has one degree of freedom.
     let lines: Vec<f64> = spectrum[1..n.div_ceil(2)]
         .iter()
         .map(|line| line.norm_sqr())
@@ -59,7 +60,7 @@ pub fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
                 .filter(|j| j.abs_diff(at) >= NEAREST)
                 .map(|j| lines[j])
                 .collect();
-            // The taper ties neighbours to each other: of two lines one counts.
+            // The taper correlates neighbouring lines: two lines count as one.
             let count = 0.5 * around.len() as f64;
             let mean = around.iter().sum::<f64>() / (2.0 * count);
             (count >= FEWEST && mean > 0.0)

@@ -4,8 +4,8 @@
 //! which an autoregressive model takes for a broad resonance, is in another band in each part. The power of each band is compared over the
 //! parts (Bartlett's test of equal variances); each part is scaled to its own variance, so that noise whose size alone changes is the same.
 //!
-//! **References**: M. B. Priestley, T. Subba Rao, J. Royal Statistical Society B 31 (1969) 140-149 (the test of an evolving spectrum by time
-//! and frequency); M. S. Bartlett, Proc. Royal Society A 160 (1937) 268-282.
+//! **References**: M. B. Priestley, T. Subba Rao, J. Royal Statistical Society B 31 (1969) 140-149 (the test of an evolving spectrum by
+//! time and frequency); M. S. Bartlett, Proc. Royal Society A 160 (1937) 268-282.
 
 use ct_signals::ArModel;
 use realfft::RealFftPlanner;
@@ -23,7 +23,7 @@ pub fn stationary_p(noise: &ArModel, residual: &[f64], thresholds: &Thresholds) 
     let white: Vec<f64> = noise
         .whiten(residual)
         .into_iter()
-        // A missing sample has no power.
+        // A missing sample contributes no power.
         .map(|w| if w.is_nan() { 0.0 } else { w })
         .collect();
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(size);
@@ -35,7 +35,7 @@ pub fn stationary_p(noise: &ArModel, residual: &[f64], thresholds: &Thresholds) 
         if transform.process(&mut part, &mut spectrum).is_err() {
             return 1.0;
         }
-        // Without the mean, and without the line at half the sampling rate, which has one degree of freedom.
+        // Without frequency zero, and without the Nyquist frequency, whose line has one degree of freedom.
         let power: Vec<f64> = spectrum[1..size.div_ceil(2)]
             .iter()
             .map(|line| line.norm_sqr())
@@ -48,7 +48,7 @@ pub fn stationary_p(noise: &ArModel, residual: &[f64], thresholds: &Thresholds) 
         lines.clear();
         let (mut from, mut to) = (0, thresholds.stationary_lines);
         while to <= power.len() {
-            // What does not fill another band belongs to the last one.
+            // Lines that do not fill another band belong to the last band.
             let end = if 2 * to > power.len() {
                 power.len()
             } else {
@@ -96,13 +96,13 @@ mod tests {
         for run in 0..400 {
             let mut e = noise::ar1(SAMPLES, 0.1, [0.0, 0.5, 0.9, 0.97][run % 4], &mut rng);
             if run % 8 < 4 {
-                // Three times as large from the middle on: its colour is the same.
+                // Three times as large from the middle on, with the same spectrum.
                 e[SAMPLES / 2..].iter_mut().for_each(|e| *e *= 3.0);
             }
             let model = ArModel::fit(&[&e], 6).unwrap();
             chance += usize::from(stationary_p(&model, &e, &Thresholds::DEFAULT) < 0.01);
         }
-        // One in a hundred is asked for, of 400.
+        // The nominal level is one in a hundred, of 400 records.
         assert!(chance <= 10, "{chance}");
     }
 
@@ -120,7 +120,7 @@ mod tests {
             let model = ArModel::fit(&[&e], 6).unwrap();
             seen += usize::from(stationary_p(&model, &e, &Thresholds::DEFAULT) < 1e-4);
         }
-        // An autoregressive model explains most of it: the test has what is left.
+        // An autoregressive model explains most of the change: the test uses the rest.
         assert!(seen >= RUNS / 2, "{seen} of {RUNS}");
     }
 }

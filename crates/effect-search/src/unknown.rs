@@ -1,9 +1,9 @@
-//! The shape of what no candidate explains: where a missing term acts, what it depends on, and how.
+//! The unexplained error as a function: place, variable and shape.
 //!
-//! At every port a smooth function ([`ct_model::effects::shapes_keeping`]) of every state and input is added to the model and fitted with all
-//! other parameters. A function bends to whatever there is, so ports and variables are compared by the error that each leaves on quarters of
-//! the records that it was not fitted to, against that of the model without it on all it was fitted to. Where none lowers that error, functions
-//! of time take part too, and the criterion decides.
+//! At every port a smooth function ([`ct_model::effects::shapes_keeping`]) of every state and input is added to the model and fitted with
+//! all other parameters. A function bends to whatever there is, so ports and variables are compared by the error that each leaves on
+//! quarters of the records that it was not fitted to, against that of the model without it on all it was fitted to. Where none lowers that
+//! error, functions of time take part too, and the criterion decides.
 
 use std::collections::BTreeMap;
 
@@ -23,52 +23,52 @@ use crate::search::best_first;
 /// A smooth function at a port.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PortScore {
-    /// Its identifier: `shape(T,u)`, `course(T)`.
+    /// Identifier of the function: `shape(T,u)`, `course(T)`.
     pub effect: String,
-    /// Fall of the criterion against the last model, in white noise.
+    /// Fall of the criterion against the last model, with white noise.
     pub bic_gain: f64,
-    /// By how much the mean squared error falls on parts of the records that it was not fitted to; negative where it rises, `None` where that
-    /// was not computed.
+    /// Fall of the mean squared error on parts of the records that the function was not fitted to; negative for a rise, `None` if it was
+    /// not computed.
     pub share_left_out: Option<f64>,
 }
 
 /// A missing term.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unknown {
-    /// The smooth function that stands for it: `ctid add` takes it as it takes an effect.
+    /// Smooth function that describes the unexplained error; `ctid add` accepts it like an effect.
     pub effect: String,
-    /// What it depends on: a state or an input, or `time`.
+    /// Variable of the function: a state or an input, or `time`.
     pub variable: String,
     /// Unit of the variable.
     pub variable_unit: String,
     /// Unit of the term.
     pub unit: String,
-    /// Share of the mean squared error above the noise that it explains beside the last model.
+    /// Share of the mean squared error above the noise that the function explains in addition to the last model.
     pub share: f64,
-    /// By how much the mean squared error falls on parts of the records that it was not fitted to; `None` where that was not computed.
+    /// Fall of the mean squared error on parts of the records that the function was not fitted to; `None` if it was not computed.
     pub share_left_out: Option<f64>,
     /// Simulation error with it, by output \[unit of the output\].
     pub rmse_per_output: BTreeMap<String, f64>,
-    /// Where the shape is given, over the visited range \[unit of the variable\].
+    /// Arguments of the function, over the visited range \[unit of the variable\].
     pub at: Vec<f64>,
-    /// The term there: what is added or, at a parameter, its relative change against its mean \[unit\].
+    /// Value of the function: an added term or, at a parameter, its relative change from the mean \[unit\].
     pub value: Vec<f64>,
-    /// Its standard error; `None` where it is not determined.
+    /// Standard errors; `None` if not determined.
     pub std_error: Vec<Option<f64>>,
-    /// The heights of its bells, as `ctid add NAME --from` keeps them.
+    /// Heights of the Gaussian basis functions, as `ctid add NAME --from` keeps them.
     pub parameters: Vec<Estimate>,
     /// Ports and variables, the best first.
     pub places: Vec<PortScore>,
 }
 
 impl Context<'_> {
-    /// The missing term beside a set; `None` where no function lowers the criterion.
+    /// The missing term for a set; `None` if no function lowers the criterion.
     pub fn unknown(&self, node: &Node, floors: &[f64]) -> Result<Option<Unknown>, Error> {
         let (with_shapes, of) = self.with_shapes();
         with_shapes.unknown_among(node, &of, floors)
     }
 
-    /// The same search with the smooth functions behind its candidates, and their positions.
+    /// The search with the smooth functions appended to its candidates, and their positions.
     pub fn with_shapes(&self) -> (Self, Vec<usize>) {
         let mut with_shapes = self.clone();
         with_shapes.candidates.extend(self.shapes.iter().cloned());
@@ -160,7 +160,7 @@ impl Context<'_> {
         Some(&self.candidates[*set.added.last()?])
     }
 
-    /// What a function depends on, and its unit.
+    /// Variable of a function, and its unit.
     pub fn variable_of(&self, candidate: &Candidate) -> (String, String) {
         let spec: &ModelSpec = &self.problem.spec;
         let variable = match candidate.port {
@@ -208,7 +208,7 @@ fn curve(
         unit[j] = 1.0;
         bells(&unit, share(k))
     };
-    // The parameter itself imitates a relative change of its mean.
+    // The parameter itself compensates for a constant relative change.
     let of_parameter = matches!(candidate.port, Port::Value(_) | Port::Dependence(..));
     let means: Vec<f64> = (0..heights.len())
         .map(|j| {
@@ -227,7 +227,7 @@ fn curve(
         curve
             .1
             .push(parts.iter().zip(&heights).map(|(a, b)| a * b).sum());
-        // Each bell's part, times its standard error.
+        // Contribution of each Gaussian basis function, times its standard error.
         let parts: Option<Vec<f64>> = parts
             .iter()
             .zip(&positions)

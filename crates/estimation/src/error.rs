@@ -1,18 +1,18 @@
-//! What can go wrong in a fit.
+//! Errors of a fit.
 
-/// What can go wrong in a fit.
+/// Error of a fit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A series cannot be used.
     #[error(transparent)]
     Series(#[from] ct_signals::Error),
-    /// No start led anywhere.
+    /// No start gave a finite simulation.
     #[error(
         "none of {starts} starts gave a finite simulation: check the units of the data and the constants under [known]"
     )]
     NoFiniteStart {
-        /// How many were tried.
+        /// Number of starts.
         starts: usize,
     },
 }

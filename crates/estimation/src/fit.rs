@@ -1,4 +1,4 @@
-//! Fits from many starts in the metric of a noise, the noise's colour, and the uncertainty of what was fitted.
+//! Fits from many starts with a noise model as weighting, estimation of the noise model, and the uncertainty of the parameters.
 
 mod prewhitened;
 
@@ -12,7 +12,7 @@ use crate::{
     linearise_below, prior::begin_near_priors, prior::free_priors, squares,
 };
 
-/// Two ends are one minimum where twice the logarithm of their likelihood ratio is below this.
+/// Two results are the same minimum if twice the logarithm of their likelihood ratio is below this.
 const SAME_MINIMUM: f64 = 0.1;
 
 /// A fit.
@@ -20,37 +20,37 @@ const SAME_MINIMUM: f64 = 0.1;
 pub struct Fit {
     /// The fitted vector.
     pub x: Vec<f64>,
-    /// Cost of the whitened residual: its sum of squares or, of several outputs, [`crate::Squares::cost`] \[output unit squared\].
+    /// Cost of the whitened residual: its sum of squares or, for several outputs, [`crate::Squares::cost`] \[output unit squared\].
     pub cost: f64,
     /// Root mean square of the residual at each output, not whitened \[output unit\].
     pub rmse: Vec<f64>,
-    /// The noise in whose metric it was fitted. After [`coloured`] its innovations are those of the residual; in a
-    /// metric that was given they are as they were given.
+    /// The noise model used as weighting in the fit. After [`coloured`] its innovations are those of the residual; otherwise those of the
+    /// given model.
     pub noise: Noise,
-    /// What the rows of each output were multiplied by, beside whitening ([`crate::Squares::weights`]).
+    /// Weights of the rows of each output, in addition to whitening ([`crate::Squares::weights`]).
     pub weights: Vec<f64>,
-    /// Minus twice the logarithm of the Gaussian likelihood, the innovations' variance of each output at its best; priors are part of it, but
-    /// for what does not change.
+    /// Minus twice the logarithm of the Gaussian likelihood, maximised over the innovations' variance of each output; priors are included
+    /// up to a constant.
     pub deviance: f64,
-    /// Fitted numbers, those of the noise included.
+    /// Number of fitted parameters, including those of the noise.
     pub parameters: usize,
-    /// What they cost in [`Fit::bic`].
+    /// BIC penalty of the parameters, in [`Fit::bic`].
     pub price: f64,
     /// Samples of all outputs.
     pub samples: usize,
     /// Samples of each output.
     pub samples_per_output: Vec<usize>,
-    /// Priors of fitted entries, which count as a sample each.
+    /// Number of priors of fitted entries, each of which counts as a sample.
     pub priors: usize,
-    /// How many starts were tried.
+    /// Number of starts.
     pub starts: usize,
-    /// How many of them ended in the best minimum.
+    /// Number of starts that ended in the best minimum.
     pub agree: usize,
-    /// Why the best one stopped.
+    /// Reason why the best fit stopped.
     pub stop: Stop,
-    /// The folded rows at the minimum.
+    /// The R factor at the minimum.
     pub triangle: Triangle,
-    /// Positions (among the fitted entries) that the gradient does not hold at a bound.
+    /// Positions (among the fitted entries) of the parameters that are not held at a bound.
     interior: Vec<usize>,
     free: Vec<usize>,
     /// Degrees of freedom of the variance of every interior entry.
@@ -61,15 +61,15 @@ pub struct Fit {
     of_samples: f64,
 }
 impl Fit {
-    /// Whether two fits of one model in one metric ended in the same minimum.
+    /// Whether two fits of one model with the same weighting ended in the same minimum.
     #[must_use]
     pub fn same_minimum(&self, other: &Self) -> bool {
         self.samples as f64 * (self.cost / other.cost).ln().abs() <= SAME_MINIMUM
             || self.cost == other.cost
     }
 
-    /// The better of this fit and one of the same model in the same metric from other starts. Starts are counted
-    /// together; those of both count as agreed where both ended in the same minimum.
+    /// The better of this fit and another one of the same model with the same weighting from other starts. The numbers of starts are added;
+    /// starts of both count as agreed if both ended in the same minimum.
     #[must_use]
     pub fn or_better(self, other: Self) -> Self {
         let starts = self.starts + other.starts;
@@ -82,7 +82,7 @@ impl Fit {
         best
     }
 
-    /// The same fit, with the starts counted of the one it continues.
+    /// The same fit; its number of starts includes those of the fit that it continues.
     #[must_use]
     pub fn continuing(mut self, first: &Self) -> Self {
         self.starts = first.starts;
@@ -90,7 +90,7 @@ impl Fit {
         self
     }
 
-    /// [`Fit::rmse`] of an only output; of several their geometric mean, by samples, on which no choice of units has an influence.
+    /// [`Fit::rmse`] of a single output; for several their geometric mean, weighted by samples, which does not depend on units.
     #[must_use]
     pub fn mean_rmse(&self) -> f64 {
         if let [only] = self.rmse[..] {
@@ -109,7 +109,7 @@ impl Fit {
         self.deviance + self.price
     }
 
-    /// Variance of the innovations, with the degrees of freedom that are left.
+    /// Variance of the innovations, with the degrees of freedom of the residual.
     #[must_use]
     pub fn variance(&self) -> f64 {
         self.of_samples / self.degrees_left()
@@ -154,21 +154,20 @@ impl Fit {
         all
     }
 
-    /// Columns of the triangle whose entries are not at a bound.
+    /// Columns of the R factor whose parameters are not at a bound.
     #[must_use]
     pub fn interior(&self) -> &[usize] {
         &self.interior
     }
 
-    /// Degrees of freedom of every standard error: the quantile of Student's distribution with as many makes an
-    /// interval of it. A noise model that was estimated with the fit leaves fewer than the samples do.
+    /// Degrees of freedom of every standard error, for the quantile of Student's distribution. An estimated noise model reduces them.
     #[must_use]
     pub fn freedom(&self) -> Vec<Option<f64>> {
         self.spread(self.freedom.iter().copied())
     }
 
-    /// Half the width of the interval that holds the truth with probability `level` (0.95, say), for every entry that
-    /// has a standard error.
+    /// Half the width of the interval that contains the true value with probability `level` (0.95, say), for every entry that has a
+    /// standard error.
     #[must_use]
     pub fn half_widths(&self, level: f64) -> Vec<Option<f64>> {
         self.std_errors()
@@ -202,12 +201,12 @@ impl Fit {
     }
 }
 
-/// Where a fit begins.
+/// Start of a fit.
 #[derive(Debug, Clone)]
 pub struct Start {
     /// The vector.
     pub x: Vec<f64>,
-    /// What [`crate::linearise`] gives there in the metric of the fit, where it is known: it is not computed again.
+    /// R factor from [`crate::linearise`] at the start, weighted as in the fit, if known: it is not computed again.
     pub triangle: Option<Triangle>,
 }
 
@@ -218,7 +217,7 @@ impl From<Vec<f64>> for Start {
 }
 
 impl Start {
-    /// Where a fit of the same model ended, for one in the metric of a given noise.
+    /// Start at the result of a fit of the same model, for a fit with a given noise model.
     #[must_use]
     pub fn at_end(fit: &Fit, noise: &Noise) -> Self {
         Self {
@@ -228,7 +227,7 @@ impl Start {
     }
 }
 
-/// Where a fit begins: within the bounds, and near the priors unless it is better where it was given, as the end of another fit is.
+/// Start of a fit: within the bounds, and near the priors unless the given start has a lower cost, as the result of another fit can have.
 fn begun(model: &impl Residuals, given: &[f64], noise: &Noise) -> Vec<f64> {
     let inside = |mut x: Vec<f64>| {
         for &i in model.free() {
@@ -250,8 +249,8 @@ fn begun(model: &impl Residuals, given: &[f64], noise: &Noise) -> Vec<f64> {
     }
 }
 
-/// Fits from the given starts, in parallel, in the metric of a given noise, of which the colour counts alone. The best one is given, and how
-/// many agree with it.
+/// Fits from the given starts, in parallel, with the AR coefficients of a given noise model as weighting. Returns the best fit, and the
+/// number of starts that agree with it.
 ///
 /// # Errors
 /// Where the model is not finite at any start.
@@ -268,7 +267,7 @@ pub fn fit_from(
         .into_par_iter()
         .enumerate()
         .filter_map(|(k, Start { x: given, triangle })| {
-            // Out of time a fit still needs one start.
+            // After the time limit a fit still uses one start.
             if k > 0 && model.out_of_time() {
                 return None;
             }
@@ -299,7 +298,7 @@ pub fn fit_from(
         .iter()
         .map(|(_, minimum)| minimum.triangle.cost())
         .fold(f64::INFINITY, f64::min);
-    // Ends that the likelihood can hardly tell apart are one minimum.
+    // Results with nearly equal likelihood count as one minimum.
     let samples: usize = model.samples().iter().sum();
     let same = best * (SAME_MINIMUM / samples as f64).exp();
     let agree = minima
@@ -312,7 +311,8 @@ pub fn fit_from(
         .ok_or(Error::NoFiniteStart { starts: count })?;
     let interior: Vec<usize> = (0..free.len())
         .filter(|&j| {
-            // What no sample speaks of has no error: the state behind a lag that is zero.
+            // A parameter without influence on any sample has no standard error, such as the initial state of a lag with time constant
+            // zero.
             minimum.triangle.column_norm(j) > 0.0
                 && !held(minimum.x[j], bounds[j], minimum.triangle.descent(j))
         })
@@ -344,19 +344,19 @@ pub fn fit_from(
         free: free.to_vec(),
     };
     fit.freedom = vec![fit.degrees_left(); fit.interior.len()];
-    // Covariances multiply by this variance: with its root as their weight, rows of priors keep the standard errors that were given.
+    // Covariances are multiplied by this variance: weighting the priors by its root preserves their standard errors.
     let sigma = fit.variance().sqrt();
     fit.triangle = fit.triangle.with_prior_weight(sigma);
     Ok(fit)
 }
 
-/// What one pass over the residuals at the end of a fit says.
+/// Results of one pass over the residuals at the end of a fit.
 struct End {
     rmse: Vec<f64>,
     weights: Vec<f64>,
     prior_weight: f64,
     of_samples: f64,
-    /// Logarithm of the determinant of the noise's covariance, of unit innovations.
+    /// Logarithm of the determinant of the noise's covariance, for innovations of variance 1.
     log_det: f64,
 }
 
@@ -378,7 +378,7 @@ impl End {
             }
             sums[sample.output] += row[0] * row[0];
             let variance = whitener.push_with_variance(row);
-            // Most rows have seen all that matters to them.
+            // Late rows hardly change with the memory.
             if variance != 1.0 {
                 log_det += variance.ln();
             }

@@ -9,25 +9,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::Triangle;
 
-/// When to stop.
+/// Stopping criteria.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stopping {
-    /// Most evaluations.
+    /// Largest number of evaluations.
     pub evaluations: usize,
-    /// Relative fall of the cost that is not worth a step: a fit ends where an undamped step promises no more, or two in a row
-    /// brought no more.
+    /// Least relative fall of the cost: a fit ends if an undamped step has a smaller predicted reduction, or if two successive steps
+    /// reached a smaller reduction.
     pub cost: f64,
 }
 
-/// Why the iteration stopped.
+/// Reason why the iteration stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Stop {
-    /// The cost falls no more, and a step of Gauss and Newton promises nothing.
+    /// The cost does not fall any more, and the predicted reduction of a Gauss-Newton step is negligible.
     Converged,
-    /// The cost falls no more although its slope is not zero: the simulation is not smooth here.
+    /// The cost does not fall any more although its slope is not zero: the simulation is not smooth here.
     Stuck,
-    /// The evaluations were used up, or the time.
+    /// The largest number of evaluations, or the time limit, was reached.
     Evaluations,
     /// The simulation is not finite at the start.
     NotFinite,
@@ -39,7 +39,7 @@ pub(crate) struct Minimum {
     pub stop: Stop,
 }
 
-/// The nearest value between two bounds. Unlike `clamp` it takes bounds of any order; what is not a number stays so.
+/// The nearest value between two bounds. Unlike `clamp` it accepts bounds in any order; NaN stays NaN.
 pub fn within(x: f64, (lower, upper): (f64, f64)) -> f64 {
     if x < lower {
         lower
@@ -50,9 +50,9 @@ pub fn within(x: f64, (lower, upper): (f64, f64)) -> f64 {
     }
 }
 
-/// Whether the gradient holds a parameter at its bound.
+/// Whether a parameter is at a bound and its gradient points outwards.
 pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
-    // Of a parameter with one bound the width is infinite, and every value would lie within a share of it.
+    // With only one bound, the width is infinite, and every value would be within a share of the width.
     let width = upper - lower;
     let room = if width.is_finite() {
         1e-12 * width
@@ -62,10 +62,9 @@ pub(crate) fn held(x: f64, (lower, upper): (f64, f64), descent: f64) -> bool {
     (x <= lower + room && descent <= 0.0) || (x >= upper - room && descent >= 0.0)
 }
 
-/// From `x`, which lies in the box, and its rows `at`, where they are known. `evaluate` gives the folded rows `[J, r]`, `r` =
-/// measured minus model, and may give nothing where the cost is above its second argument; `worse` says, without derivatives
-/// and so much sooner, that it is. No step is taken once it is
-/// `out_of_time`.
+/// Minimises from `x`, which is within the bounds, and its Jacobian `at`, if known. `evaluate` gives the R factor of `[J, r]`, `r` =
+/// measured minus model, and may return nothing if the cost is above its second argument; `worse` tests this condition without derivatives,
+/// and so much faster. After `out_of_time` no step is taken.
 pub(crate) fn minimise(
     mut x: Vec<f64>,
     at: Option<Triangle>,
@@ -84,7 +83,7 @@ pub(crate) fn minimise(
             stop: Stop::NotFinite,
         };
     };
-    // What an undamped step promises says whether it is a minimum; small steps alone may be the damping's doing.
+    // The predicted reduction of an undamped step shows whether this is a minimum; a small step alone can be caused by the damping.
     let promised = |at: &Triangle, free: &[usize]| {
         let step = at.solve(free, &vec![1.0; p], 0.0);
         (at.cost() - at.predicted(&step)) / at.cost()
@@ -121,7 +120,7 @@ pub(crate) fn minimise(
             .zip(&step)
             .zip(bounds)
             .map(|((x, d), &(lower, upper))| {
-                // A parameter that must be positive does not lose more than four fifths at once.
+                // A positive parameter is reduced by at most four fifths in one step.
                 let lower = if lower > 0.0 {
                     lower.max(0.2 * x)
                 } else {
@@ -140,7 +139,7 @@ pub(crate) fn minimise(
             };
         }
         evaluations += 1;
-        // A trial that follows one that failed fails as often as not; any other one hardly ever does.
+        // A trial after a failed one fails in half of the cases; other trials rarely fail.
         let doubtful = growth > 2.0;
         let next = (!(doubtful && worse(&trial, cost)))
             .then(|| evaluate(&trial, cost))

@@ -1,9 +1,8 @@
-//! The noise's colour from a fit's residual, by marginal (restricted) likelihood.
+//! The noise model from a fit's residual, by marginal (restricted) likelihood, REML.
 //!
 //! **Why**: a fit with `p` free entries takes from its residual the part that its sensitivities span. Slow noise and
-//! slow sensitivities look alike, so an autoregressive model of the residual is too fast and too small, and the
-//! standard errors that follow from it are too small: at a correlation of 0.8 and 400 samples, intervals of 95 %
-//! hold the truth in 92 %.
+//! slow sensitivities look alike, so an autoregressive model of the residual is too fast and too small, and the standard errors that follow
+//! from it are too small: at a correlation of 0.8 and 400 samples, intervals of 95 % contain the true value in 92 %.
 //!
 //! **Criterion**: with the rows `[J, r]` whitened by the model and folded to the triangle `R`, the likelihood of what
 //! `J` cannot explain,
@@ -28,7 +27,7 @@ use rayon::prelude::*;
 
 use crate::{Error, Noise, Rows};
 
-/// The noise of a residual that was fitted, the model of each output of order zero to `most`.
+/// The noise model of a fit's residual, for each output of order zero to `most`.
 ///
 /// `columns` are the columns of `rows` that were free to follow the noise: those of entries at a bound are not.
 ///
@@ -110,7 +109,7 @@ pub(crate) fn freedom(
         .collect::<Option<Vec<_>>>()?
         .into_iter()
         .unzip();
-    // The lower triangle is all that the factorisation reads.
+    // The factorisation reads only the lower triangle.
     let hessian = DMatrix::from_fn(q, q, |i, j| hessian[i.max(j)][i.min(j)]);
     let factor = hessian.cholesky()?;
     let count = variances(&model(&z, &orders).ok()?, centre.variance)?.len();
@@ -160,7 +159,7 @@ struct Criterion {
     value: f64,
     /// Variance of the innovations.
     variance: f64,
-    /// Degrees of freedom that the residual keeps.
+    /// Degrees of freedom of the residual.
     left: f64,
 }
 
@@ -183,7 +182,7 @@ impl Criterion {
         let mut volume = 0.0;
         for j in 0..p {
             let diagonal = triangle.at(j, j).abs();
-            // A direction that the record does not show takes nothing from the residual.
+            // A direction that the record does not determine removes nothing from the residual.
             if diagonal > 1e-10 * triangle.column_norm(j) {
                 rank += 1.0;
                 volume += 2.0 * diagonal.ln();
@@ -217,7 +216,7 @@ fn bfgs(mut x: Vec<f64>, f: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut value = f(&x);
     let mut slope = gradient(&x);
-    // The curvature of -2 log l in z is about 2 N (1 - k^2): a first step of 1/|slope| at most does no harm.
+    // The curvature of -2 log l in z is about 2 N (1 - k^2): a first step of at most 1/|slope| is safe.
     let first = 0.1 / dot(&slope, &slope).sqrt().max(1.0);
     let mut inverse = vec![vec![0.0; n]; n];
     for (i, row) in inverse.iter_mut().enumerate() {
@@ -257,7 +256,7 @@ fn bfgs(mut x: Vec<f64>, f: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
         }
         let fall = value - to_value;
         (x, value, slope) = (to, to_value, to_slope);
-        // A thousandth of a unit of -2 log l is far below what a record can tell.
+        // A thousandth of a unit of -2 log l is far below the significance level of a record.
         if fall < 1e-4 {
             break;
         }
@@ -272,7 +271,7 @@ pub(crate) mod tests {
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
 
-    /// Covariance of the rows that are there, one block for each series.
+    /// Covariance of the present rows, one block for each series.
     pub(crate) fn covariance(noise: &Noise, lengths: &[usize], there: &[usize]) -> DMatrix<f64> {
         let n = lengths.iter().sum();
         let mut all = DMatrix::zeros(n, n);
@@ -355,14 +354,14 @@ pub(crate) mod tests {
                 assert_relative_eq!(ours.variance, squares / freedom, max_relative = 1e-9);
                 assert_relative_eq!(ours.left, freedom);
             }
-            // The search starts from the model of the samples that are there, and lowers the criterion.
+            // The search starts from the model of the present samples, and lowers the criterion.
             let most = noise(&rows, &[0, 1], 3).unwrap();
             let (relative, variance) = most.relative();
             let at = Criterion::of(&rows, &[0, 1], &relative);
             let white = Criterion::of(&rows, &[0, 1], &Noise::white(outputs));
             assert!(most.order() > 0 && at.value < white.value);
             assert_relative_eq!(variance, at.variance, max_relative = 1e-9);
-            // The scale of the second output is at its best.
+            // The scale of the second output maximises the likelihood.
             for factor in [0.97, 1.03] {
                 let moved = |(o, model): (usize, &ArModel)| {
                     model.with_sigma(model.sigma() * if o > 0 { factor } else { 1.0 })

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// One noise model for each output.
+/// Noise model of each output. Its scales are the standard deviations of the innovations, in the outputs' units. A fit estimates the scales
+/// itself and uses only the AR coefficients of the given noise model.
 ///
 /// Its scales (the innovations' standard deviations) are those of the outputs, in their units. A fit estimates the scales itself and
 /// takes from the noise that it is given the colour alone.
@@ -15,7 +16,7 @@ pub struct Noise {
     outputs: Vec<ArModel>,
 }
 
-/// The partial correlations of a process and the standard deviation of its innovations: what it is made of again, to the last digit.
+/// Saved form of a process: its partial correlations and the standard deviation of its innovations, from which it is restored exactly.
 type Reflections = (Vec<f64>, f64);
 
 impl From<Noise> for Vec<Reflections> {
@@ -37,7 +38,7 @@ impl TryFrom<Vec<Reflections>> for Noise {
 }
 
 impl Noise {
-    /// White noise of unit variance at so many outputs.
+    /// White noise of unit variance at this number of outputs.
     #[must_use]
     pub fn white(outputs: usize) -> Self {
         Self {
@@ -71,7 +72,7 @@ impl Noise {
         })
     }
 
-    /// How many outputs there are.
+    /// Number of outputs.
     #[must_use]
     pub fn outputs(&self) -> usize {
         self.outputs.len()
@@ -100,7 +101,7 @@ impl Noise {
         self.outputs.iter().map(ArModel::order).sum()
     }
 
-    /// The colour alone is the same: models may differ in their scales.
+    /// Whether the AR coefficients are equal: the scales may differ.
     #[must_use]
     pub fn same_colour(&self, other: &Self) -> bool {
         self.outputs.len() == other.outputs.len()
@@ -124,7 +125,7 @@ impl Noise {
         })
     }
 
-    /// The same with the memory of each at most so many samples ([`ArModel::with_memory_at_most`]).
+    /// The noise model with the memory of each output limited to this number of samples ([`ArModel::with_memory_at_most`]).
     #[must_use]
     pub fn with_memory_at_most(&self, samples: f64) -> Self {
         Self {
@@ -152,7 +153,8 @@ impl Noise {
         outputs.map(|model| model.whitener(lanes)).collect()
     }
 
-    /// With scales relative to that of the first output, and the square of that: of one output the relative scale is one.
+    /// Noise model with scales relative to that of the first output, and the square of the first scale. With one output the relative scale
+    /// is one.
     pub(crate) fn relative(&self) -> (Self, f64) {
         let first = self.outputs[0].sigma();
         let relative = |model: &ArModel| {
@@ -163,7 +165,7 @@ impl Noise {
         (Self { outputs }, first * first)
     }
 
-    /// One over the scale of each output.
+    /// Inverse scale of each output.
     pub(crate) fn inverse_scales(&self) -> Vec<f64> {
         let outputs = self.outputs.iter();
         outputs.map(|model| 1.0 / model.sigma()).collect()

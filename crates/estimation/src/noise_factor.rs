@@ -4,22 +4,21 @@ use ct_signals::ArModel;
 
 /// A noise model's factor `L`, of unit innovations, of the covariance `L L'` of the samples of one record that are there.
 ///
-/// With the predictors `a^(m)`, `m = min(k, q)`, of the sample `k` and `s_m` their error over the innovations',
-/// `v[k] = sum_i a^(m)_i v[k-i] + s_m e[k]`: `L = A^-1 S`, `A` a unit lower band and `S` diagonal. Rows of `lanes`
-/// values run along the time.
+/// With the predictors `a^(m)`, `m = min(k, q)`, of the sample `k` and `s_m` their error over the innovations', `v[k] = sum_i a^(m)_i
+/// v[k-i] + s_m e[k]`: `L = A^-1 S`, `A` a unit lower band and `S` diagonal. Rows of `lanes` values run along the time.
 ///
 /// Where rows are missing, the last q values are the filter's state, the missing ones by their estimates, and both
 /// transposes run the adjoint of that filter ([`ct_signals::Whitener`]) backwards. Missing rows are zero then, whatever they were.
 pub(crate) struct Factor {
     predictors: Vec<Vec<f64>>,
     scales: Vec<f64>,
-    /// Row by row from the first that is there; `None` where none is missing.
+    /// Gains row by row from the first present one; `None` if no row is missing.
     gains: Option<Gains>,
 }
 
 /// The filter of one record, row by row.
 struct Gains {
-    /// Missing rows before the first that is there.
+    /// Number of missing rows before the first present one.
     before: usize,
     rows: Vec<Row>,
 }
@@ -29,7 +28,7 @@ enum Row {
     There {
         /// Standard deviation of its prediction error over the innovations'.
         scale: f64,
-        /// How many rows before it a missing one is, and the share of the prediction error that corrects its estimate.
+        /// Distance to each missing row before this one, and the gain that corrects its estimate by the prediction error.
         gains: Vec<(usize, f64)>,
     },
 }
@@ -60,7 +59,7 @@ impl Gains {
 }
 
 impl Factor {
-    /// Of a record with one entry for each row: false where it is missing.
+    /// For a record with one entry per row: false if the reading is missing.
     pub(crate) fn new(noise: &ArModel, observed: &[bool]) -> Self {
         let reflections = noise.reflections();
         let mut scales = vec![1.0; reflections.len() + 1];
@@ -78,7 +77,7 @@ impl Factor {
         self.scales.len() - 1
     }
 
-    /// `L' x` in place: the rows that follow are known when a row's turn comes, backwards in time.
+    /// `L' x` in place, backwards in time: later rows are processed first.
     pub(crate) fn colour_transposed(&self, rows: &mut [f64], lanes: usize) {
         if let Some(gains) = &self.gains {
             self.adjoint(gains, rows, lanes, true);
@@ -127,8 +126,7 @@ impl Factor {
             }
         }
     }
-    /// The adjoint of the filter that colours, or of the one that whitens: the sensitivity to each row of `sum x y`, `y`
-    /// what the filter makes of the rows.
+    /// The adjoint of the colouring or the whitening filter: the sensitivity to each row of `sum x y`, with `y` the filtered rows.
     fn adjoint(&self, filter: &Gains, rows: &mut [f64], lanes: usize, colour: bool) {
         let q = self.order();
         let (before, rows) = rows.split_at_mut(filter.before * lanes);
@@ -141,11 +139,11 @@ impl Factor {
             let out = &mut rows[k * lanes..][..lanes];
             let predictor = &self.predictors[q.min(k)];
             input.copy_from_slice(own);
-            // `own`: to the prediction of this row, on which the state before acts.
+            // `own`: sensitivity to the prediction of this row, which the preceding state affects.
             match row {
                 Row::Missing => out.fill(0.0),
                 Row::There { scale, gains } => {
-                    // To the prediction error.
+                    // Converts to the prediction error.
                     let error = &mut input;
                     for (error, x) in error.iter_mut().zip(&*out) {
                         *error = if colour { *error + x } else { x / scale };
@@ -234,7 +232,7 @@ mod tests {
             ] {
                 let observed: Vec<bool> = (0..n).map(|k| !missing.contains(&k)).collect();
                 let there: Vec<usize> = (0..n).filter(|&k| observed[k]).collect();
-                // The covariance without the rows and columns of what is missing.
+                // The covariance without the rows and columns of missing samples.
                 let covariance = (&full * full.transpose())
                     .select_rows(&there)
                     .select_columns(&there);

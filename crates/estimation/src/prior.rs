@@ -1,22 +1,22 @@
-//! What is known of an entry beside the records: a reading of it, with a standard error.
+//! Prior knowledge of a parameter: a measured value with a standard error.
 //!
 //! A prior is one more row of the least squares: it is added to the logarithm of the likelihood as a Gaussian reading of the entry with a
 //! known variance, independent of the records ([`crate::Squares`] has the cost).
 
 use crate::Residuals;
 
-/// A reading of an entry of the vector that does not come from the records.
+/// A measured value of a parameter that does not come from the records.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Position of the entry in the vector.
     pub entry: usize,
-    /// What was read \[unit of the entry\].
+    /// Measured value \[unit of the entry\].
     pub value: f64,
-    /// Its standard error, above zero \[unit of the entry\].
+    /// Standard error of the value, above zero \[unit of the entry\].
     pub std_error: f64,
 }
 
-/// A start that is further than so many standard errors from a prior begins there: the cost of a prior grows exponentially.
+/// A start further than this number of standard errors from a prior is moved to this distance: the cost of a prior grows exponentially.
 const FARTHEST_START: f64 = 5.0;
 
 impl Prior {
@@ -40,7 +40,7 @@ impl Prior {
     }
 }
 
-/// Moves the fitted entries of a start that are far from their priors near these.
+/// Moves fitted entries of a start that are far from their priors to near the priors.
 pub fn begin_near_priors(model: &impl Residuals, x: &mut [f64]) {
     for (_, prior) in free_priors(model) {
         x[prior.entry] = prior.near(x[prior.entry]);

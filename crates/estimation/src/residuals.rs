@@ -1,22 +1,22 @@
-//! What is fitted: residuals with their Jacobian, and what a fit folds them to.
+//! Least-squares problem: residuals with their Jacobian, and the R factor that a fit computes from them.
 
 use ct_signals::Whitener;
 
 use crate::{Noise, Prior, Rows, Squares, Triangle, prior::prior_rows};
 
-/// More than sums of squares over a record differ by where they are taken in another order.
+/// Larger than the differences of sums of squares over a record in another order of summation.
 const ROUNDING: f64 = 1e-9;
-/// Of several outputs the cost is looked at after so many samples.
+/// With several outputs, the cost is checked after this number of samples.
 const LOOK: usize = 64;
 
-/// What is known of a row's sample before it is simulated.
+/// Properties of a sample that are known before the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sample {
-    /// Its output, counted from zero.
+    /// Number of the output, from zero.
     pub output: usize,
-    /// It is the first one of its series.
+    /// The sample is the first one of its series.
     pub first: bool,
-    /// It is missing: the row has no residual.
+    /// The sample is missing: the row has no residual.
     pub missing: bool,
 }
 
@@ -31,40 +31,40 @@ pub trait Residuals: Sync {
     /// Bounds of all entries.
     fn bounds(&self) -> &[(f64, f64)];
 
-    /// How many samples of each output there are, missing ones aside.
+    /// Number of samples of each output without missing ones.
     fn samples(&self) -> &[usize];
 
-    /// Shows every row `[d model/d x_free, measured - model]` with what is known of its sample, until `each` says that it has seen enough;
-    /// `None` then, and where the model is not finite.
+    /// Passes every row `[d model/d x_free, measured - model]` with the properties of its sample to `each`, until `each` returns false;
+    /// then the result is `None`, as for a model that is not finite.
     fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()>;
 
-    /// The same without derivatives: rows of the residual alone.
+    /// Rows of the residual alone, without derivatives.
     fn each_residual(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()>;
 
-    /// What the fitted numbers cost in [`crate::Fit::bic`] with so many coefficients of the noise: the logarithm of the samples each, scales of
-    /// the outputs' noise included.
+    /// BIC penalty of the fitted parameters, with this number of noise coefficients: the logarithm of the number of samples for each
+    /// parameter, including the scales of the outputs' noise.
     fn price(&self, noise_order: usize) -> f64 {
         let samples: usize = self.samples().iter().sum();
         let fitted = self.free().len() + self.samples().len() + noise_order;
         fitted as f64 * (samples as f64).ln()
     }
 
-    /// Standard deviation below which no noise of this output is believed where there are several \[output unit\].
+    /// Lower bound for the noise standard deviation of this output if there are several outputs \[output unit\].
     fn floor(&self, _output: usize) -> f64 {
         0.0
     }
 
-    /// Standard deviations of the outputs' noise where these are known: outputs then count by them, and not by their residuals.
+    /// Standard deviations of the outputs' noise, if known: outputs are weighted by these, and not by their residuals.
     fn known_scales(&self) -> Option<&[f64]> {
         None
     }
 
-    /// What is known of entries beside the records. Those of entries that are not fitted play no part.
+    /// Priors of parameters. Priors of parameters that are not fitted have no influence.
     fn priors(&self) -> &[Prior] {
         &[]
     }
 
-    /// No time is left: no further step is taken.
+    /// The time is over: no further step is taken.
     fn out_of_time(&self) -> bool {
         false
     }
@@ -83,7 +83,7 @@ impl Filter {
         Self {
             whiteners: noise.whiteners(columns),
             squares: Squares::of(model, x),
-            // The triangle's cost is a sum in another order.
+            // The cost of the R factor is a sum in another order.
             limit: limit * (1.0 + ROUNDING),
             seen: 0,
         }
@@ -114,14 +114,14 @@ impl Filter {
     }
 }
 
-/// The folded rows, whitened by the noise model and weighted by outputs as the residuals there have it ([`Squares::weights`]), so that
-/// the triangle's cost is [`Squares::cost`]; `None` where the model is not finite.
+/// The R factor of the rows, whitened by the noise model and weighted by outputs according to their residuals ([`Squares::weights`]), so
+/// that its cost is [`Squares::cost`]; `None` if the model is not finite.
 #[must_use]
 pub fn linearise(model: &impl Residuals, x: &[f64], noise: &Noise) -> Option<Triangle> {
     linearise_below(model, x, noise, f64::INFINITY)
 }
 
-/// The same; `None` too where the cost is above a limit, which is known long before the last sample as a rule.
+/// As `linearise`; also `None` if the cost exceeds a limit, which is usually known long before the last sample.
 #[must_use]
 pub fn linearise_below(
     model: &impl Residuals,
@@ -155,7 +155,7 @@ pub fn costs_more(model: &impl Residuals, x: &[f64], noise: &Noise, limit: f64) 
     let within = model.each_residual(x, |sample, row| {
         !filter.push(sample, row) || filter.within()
     });
-    // A cost that is no number is above every limit.
+    // A NaN cost is above every limit.
     let cost = filter.squares.cost();
     within.is_none() || cost.is_nan() || cost > filter.limit
 }
@@ -171,7 +171,7 @@ pub fn squares(model: &impl Residuals, x: &[f64], noise: &Noise) -> Option<Squar
     Some(filter.squares)
 }
 
-/// The rows of all samples as they are, one output's samples of a record after the other; `None` where the model is not finite.
+/// The rows of all samples without weighting, for one output of a record after the other; `None` if the model is not finite.
 #[must_use]
 pub fn rows(model: &impl Residuals, x: &[f64]) -> Option<Rows> {
     let columns = model.free().len() + 1;
@@ -182,7 +182,7 @@ pub fn rows(model: &impl Residuals, x: &[f64]) -> Option<Rows> {
     Some(rows)
 }
 
-/// The residuals, measured minus model, series by series, NaN where the sample is missing; `None` where the model is not finite.
+/// The residuals, measured minus model, series by series, NaN if the sample is missing; `None` if the model is not finite.
 #[must_use]
 pub fn residuals(model: &impl Residuals, x: &[f64]) -> Option<Vec<Vec<f64>>> {
     let mut collected = Collected::new(model, 1);
@@ -193,7 +193,7 @@ pub fn residuals(model: &impl Residuals, x: &[f64]) -> Option<Vec<Vec<f64>>> {
 /// Rows that come in any order of outputs, sorted by series.
 struct Collected {
     rows: Rows,
-    /// Of each output what has come of the present record.
+    /// Results of the present record for each output.
     own: Vec<Vec<f64>>,
 }
 

@@ -6,9 +6,9 @@ use crate::{Noise, Triangle};
 /// and, within one, by output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rows {
-    /// Entries of a row: the free entries of the vector, then the residual, NaN where the sample is missing.
+    /// Entries of a row: the derivatives with respect to the free entries, then the residual, NaN if the sample is missing.
     pub columns: usize,
-    /// How many outputs there are.
+    /// Number of outputs.
     pub outputs: usize,
     /// Samples of each series.
     pub lengths: Vec<usize>,
@@ -39,7 +39,7 @@ impl Rows {
             .collect()
     }
 
-    /// Series by series, whether each row's sample is there.
+    /// Whether each row's sample is present, series by series.
     pub(crate) fn present(&self) -> impl Iterator<Item = (usize, Vec<bool>)> {
         let columns = self.columns;
         let there = move |row: &[f64]| !row[columns - 1].is_nan();
@@ -48,7 +48,7 @@ impl Rows {
         })
     }
 
-    /// The rows whose sample is there, record by record in the order of time, times the weight of their output.
+    /// The present rows, record by record in the order of time, times the weight of their output.
     #[must_use]
     pub fn in_time(&self, weights: &[f64]) -> Vec<f64> {
         let mut all = Vec::with_capacity(self.values.len());
@@ -67,8 +67,8 @@ impl Rows {
         all
     }
 
-    /// Every row whose sample is there, whitened by the noise model of its output and times the output's weight, with columns chosen and
-    /// put in this order. What is missing is passed over as the noise model has it.
+    /// Every present row, whitened by the noise model of its output and times the output's weight, with selected columns in this order. The
+    /// noise model accounts for missing samples.
     pub fn each_whitened(
         &self,
         order: &[usize],
@@ -100,8 +100,7 @@ impl Rows {
         }
     }
 
-    /// The rows of the priors with columns chosen and put in this order, times the standard deviation `sigma` of the rows that they stand
-    /// beside.
+    /// Rows of the priors with selected columns in this order, scaled by the standard deviation `sigma` of the data rows.
     pub fn each_prior(&self, order: &[usize], sigma: f64, mut each: impl FnMut(&[f64])) {
         let mut chosen = vec![0.0; order.len()];
         for row in &self.priors {
@@ -112,7 +111,7 @@ impl Rows {
         }
     }
 
-    /// The folded rows of the samples, whitened and weighted, with columns chosen and put in this order.
+    /// The R factor of the samples, whitened and weighted, with selected columns in this order.
     #[must_use]
     pub fn fold(&self, order: &[usize], noise: &Noise, weights: &[f64]) -> Triangle {
         let mut triangle = Triangle::new(order.len());

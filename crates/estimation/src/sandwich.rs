@@ -1,4 +1,4 @@
-//! Standard errors of a fit whose residual has another colour than the metric it was fitted in.
+//! Robust (sandwich) standard errors of a fit whose residual has another spectrum than the noise model in its weighting.
 //!
 //! **Model**: the fit solves `J' M r = 0`, `M = W^-1` the inverse covariance of the noise that it took for granted
 //! (`M = I` for a fit by simulation error); the noise in truth has the covariance `sigma^2 V`. Then
@@ -15,7 +15,7 @@
 
 use crate::{Error, Fit, Noise, Residuals, Rows, Triangle, marginal, noise_factor::Factor, rows};
 
-/// The uncertainty of a fit whose residual has another colour than its metric.
+/// Robust uncertainty of a fit whose residual has another spectrum than its weighting.
 #[derive(Debug, Clone)]
 pub struct Robust {
     /// Standard error of every entry of the vector; `None` for one that is fixed, at a bound, or not determined.
@@ -29,7 +29,7 @@ pub struct Robust {
 }
 
 impl Robust {
-    /// Half the width of the interval that holds the truth with probability `level` (0.95, say).
+    /// Half the width of the interval that contains the true value with probability `level` (0.95, say).
     #[must_use]
     pub fn half_widths(&self, level: f64) -> Vec<Option<f64>> {
         self.std_errors
@@ -42,7 +42,7 @@ impl Robust {
     }
 }
 
-/// The uncertainty of a fit under the colour of its own residual, an autoregressive model of order zero to `order` for each output.
+/// The uncertainty of a fit under the noise model of its own residual, an autoregressive model of order zero to `order` for each output.
 ///
 /// # Errors
 /// Where the model is not finite at the fit.
@@ -50,8 +50,8 @@ pub fn robust(model: &impl Residuals, fit: &Fit, order: usize) -> Result<Robust,
     robust_with_memory(model, fit, order, f64::INFINITY)
 }
 
-/// The same, the memory of the noise model at most so many samples ([`ct_signals::ArModel::with_memory_at_most`]): where a residual holds slow
-/// physics, no record says how large a noise with a root near one is.
+/// As [`robust`], with the memory of the noise model limited to this number of samples ([`ct_signals::ArModel::with_memory_at_most`]): if a
+/// residual contains slow model error, the record does not determine the variance of an AR noise with a root near one.
 ///
 /// # Errors
 /// As [`robust`].
@@ -89,18 +89,18 @@ fn diagonal(matrix: &[Vec<f64>]) -> Vec<f64> {
     matrix.iter().enumerate().map(|(i, row)| row[i]).collect()
 }
 
-/// `C` and the rows `M J` of the entries that are not at a bound. Rows whose reading is missing have no part in either.
+/// `C` and the rows `M J` of the parameters that are not at a bound. Rows with a missing reading are not used.
 struct Sandwich {
     bread: Option<Vec<Vec<f64>>>,
     lanes: usize,
-    /// For each series its output, its rows, zero where missing, and whether each is there.
+    /// For each series its output, its rows (zero if missing), and whether each row is present.
     series: Vec<(usize, Vec<f64>, Vec<bool>)>,
     /// The rows `M J` of the priors, of variance one.
     priors: Vec<Vec<f64>>,
 }
 
 impl Sandwich {
-    /// From the rows' columns of these entries, the metric of the fit, `W` (noise and weights), and `C` over them.
+    /// From the Jacobian's columns of these parameters, the weighting of the fit, `W` (noise and weights), and `C` over them.
     fn new(
         rows: &Rows,
         columns: &[usize],
@@ -142,7 +142,7 @@ impl Sandwich {
         }
     }
 
-    /// Under noise of scales relative to that of the first output, and the variance of that.
+    /// For noise with scales relative to that of the first output, and the variance of the first one.
     fn covariance(&self, noise: &Noise, variance: f64) -> Option<Vec<Vec<f64>>> {
         let bread = self.bread.as_ref()?;
         if self.lanes == 0 {
@@ -158,7 +158,7 @@ impl Sandwich {
                 filling.push(row);
             }
         }
-        // In units of the variance, as the rest.
+        // In units of the variance, like the other terms.
         let scale = 1.0 / variance.sqrt();
         for row in &self.priors {
             filling.push(&row.iter().map(|value| scale * value).collect::<Vec<f64>>());

@@ -1,4 +1,4 @@
-//! Least squares on the fly: an upper triangle that rows are folded into, in `O(p^2)` memory.
+//! Recursive least squares by QR factorisation: an upper triangle R that is updated with rows, in `O(p^2)` memory.
 
 mod outputs;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use self::outputs::{Outputs, ROUNDS, SAME_WEIGHTS};
 use crate::Squares;
 
-/// Rows are collected in blocks and folded in by Householder reflections.
+/// Rows are collected in blocks and processed by Householder reflections.
 const BLOCK: usize = 128;
 
 /// The triangular factor `R` of all rows pushed so far: `R'R = sum row row'`. Each row is `[j_1 .. j_p, r]`, so the
@@ -20,18 +20,18 @@ pub struct Triangle {
     columns: usize,
     /// Upper triangle, row by row.
     r: Vec<f64>,
-    /// Rows not yet folded in, column by column.
+    /// Rows that are not processed yet, column by column.
     block: Vec<f64>,
     filled: usize,
-    /// For folding: the product of each column of the block with the pivot's.
+    /// Work memory: the product of each column of the block with the pivot's column.
     products: Vec<f64>,
     rows: usize,
-    /// Of several outputs, or with priors, the triangle of each: their weights follow from the residuals.
+    /// With several outputs, or with priors: the R factor of each, because their weights depend on the residuals.
     outputs: Option<Box<Outputs>>,
 }
 
 impl Triangle {
-    /// `columns` counts the residual's column too.
+    /// `columns` includes the residual's column.
     #[must_use]
     pub fn new(columns: usize) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl Triangle {
         self.rows
     }
 
-    /// Folds one row in; it has [`Triangle::columns`] entries.
+    /// Adds one row; it has [`Triangle::columns`] entries.
     pub fn push(&mut self, row: &[f64]) {
         for (column, value) in self.block.chunks_exact_mut(BLOCK).zip(row) {
             column[self.filled] = *value;
@@ -69,7 +69,7 @@ impl Triangle {
         }
     }
 
-    /// Folds in rows that are given column by column: each of [`Triangle::columns`] slices, the residual's last, holds one entry for every row.
+    /// Adds rows that are given column by column: each of [`Triangle::columns`] slices, the residual's last, has one entry per row.
     pub fn push_columns(&mut self, columns: &[&[f64]]) {
         let rows = columns.first().map_or(0, |column| column.len());
         let mut from = 0;
@@ -93,7 +93,7 @@ impl Triangle {
         let Some((mut pivot, mut rest)) = self.block.split_at_mut_checked(BLOCK) else {
             return;
         };
-        // A pass over a column applies one reflection and takes the product for the next.
+        // One pass over a column applies one reflection and computes the product for the next one.
         let products = &mut self.products;
         products[0] = dot(&pivot[..filled], &pivot[..filled]);
         for (product, column) in products[1..].iter_mut().zip(rest.chunks_exact(BLOCK)) {
@@ -128,7 +128,7 @@ impl Triangle {
         }
     }
 
-    /// Folds in what is left; call it before reading.
+    /// Processes the remaining rows; call it before reading the factor.
     pub fn finish(&mut self) {
         if self.filled > 0 {
             self.fold();
@@ -151,7 +151,7 @@ impl Triangle {
         (0..=j).map(|i| self.at(i, j).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// The cost: the sum of squares of the last column or, of several outputs, [`Squares::cost`].
+    /// The cost: the sum of squares of the last column or, for several outputs, [`Squares::cost`].
     #[must_use]
     pub fn cost(&self) -> f64 {
         if let Some(outputs) = &self.outputs {
@@ -168,7 +168,7 @@ impl Triangle {
             .sum()
     }
 
-    /// The triangle of the same rows with columns chosen and put in this order; the residual may be among them.
+    /// The R factor of the same rows with selected columns in this order; the residual may be among them.
     #[must_use]
     pub fn select(&self, order: &[usize]) -> Self {
         let mut chosen = Self::new(order.len());
@@ -185,8 +185,8 @@ impl Triangle {
     }
 
     /// Minimises `|J x - r|^2 + damping sum_j (scale_j x_j)^2` over the `free` parameters; the others stay zero.
-    /// Directions that no row speaks of stay zero too. Outputs count by what is left of their residuals there, not here
-    /// (iteratively reweighted least squares).
+    /// Directions without influence on any row stay zero too. The weights of the outputs come from
+    /// their residuals there, not here (iteratively reweighted least squares).
     #[must_use]
     pub fn solve(&self, free: &[usize], scale: &[f64], damping: f64) -> Vec<f64> {
         let mut step = self.solve_weighted(free, scale, damping);
@@ -213,7 +213,7 @@ impl Triangle {
         step
     }
 
-    /// `|J x - r|^2`; of several outputs the cost of what is left of each ([`Squares::cost`]).
+    /// `|J x - r|^2`; for several outputs the cost of the residual of each ([`Squares::cost`]).
     #[must_use]
     pub fn predicted(&self, x: &[f64]) -> f64 {
         match &self.outputs {
@@ -247,13 +247,13 @@ impl Triangle {
         (0..last).map(|i| 2.0 * self.at(i, i).abs().ln()).sum()
     }
 
-    /// No entry is infinite or NaN.
+    /// Whether all entries are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.r.iter().all(|value| value.is_finite())
     }
 
-    /// No column of J is a combination of those before it to within `1e-10` of its length: the rows determine all parameters.
+    /// Whether no column of J is a combination of earlier columns to within `1e-10` of its length: the rows determine all parameters.
     #[must_use]
     pub fn determined(&self) -> bool {
         (0..self.columns - 1).all(|j| self.independent(j))
@@ -264,7 +264,7 @@ impl Triangle {
         own.abs() > 1e-10 * self.column_norm(j) && own.is_finite()
     }
 
-    /// The triangle of the same rows and those of a damping: `J'J + damping diag(scale_j^2)` in place of `J'J`.
+    /// The R factor of the same rows plus damping: `J'J + damping diag(scale_j^2)` instead of `J'J`.
     #[must_use]
     pub fn damped(&self, scale: &[f64], damping: f64) -> Self {
         let mut damped = self.clone();
@@ -283,7 +283,7 @@ impl Triangle {
         self.finish();
     }
 
-    /// Folds in the rows of a finished triangle, its column j to column `places[j]`; the others count as zero.
+    /// Adds the rows of another finished R factor, with its column j as column `places[j]`; the other columns are zero.
     pub fn append(&mut self, other: &Self, places: &[usize]) {
         let rows = self.rows + other.rows;
         let mut row = vec![0.0; self.columns];

@@ -1,16 +1,16 @@
-//! What outputs of unknown noise count against each other.
+//! Weights of outputs with unknown noise variances.
 //!
-//! **Model**: the whitened residuals of output `o`, `N_o` of them, have the unknown variance `s_o^2`. At its best for a sum of squares `C_o`
-//! it is `C_o/N_o`, and minus twice the logarithm of the likelihood is, but for constants,
+//! **Model**: the whitened residuals of output `o`, `N_o` of them, have the unknown variance `s_o^2`. At its best for a sum of squares
+//! `C_o` it is `C_o/N_o`, and minus twice the logarithm of the likelihood is, but for constants,
 //! ```text
 //! sum_o N_o log(C_o/N_o) = N log(C/N),   C = N prod_o (C_o/N_o)^(N_o/N),   N = sum_o N_o
 //! ```
 //! So `C`, N times the weighted geometric mean of the variances, is to several outputs what the sum of squares is to one: the smaller the
 //! more likely, and `N log(C_a/C_b)` compares two models. Of one output it is the sum of squares.
 //!
-//! **Weights**: `dC = sum_o w_o^2 dC_o` with `w_o^2 = (C/N)/(C_o/N_o)`, so rows of output `o` times `w_o` have the gradient of `C`; and since a
-//! geometric mean is at most the arithmetic one, a step that lowers the weighted sum of squares lowers `C` by at least as much. The weights
-//! are those of iteratively reweighted least squares.
+//! **Weights**: `dC = sum_o w_o^2 dC_o` with `w_o^2 = (C/N)/(C_o/N_o)`, so rows of output `o` times `w_o` have the gradient of `C`; and
+//! since a geometric mean is at most the arithmetic one, a step that lowers the weighted sum of squares lowers `C` by at least as much. The
+//! weights are those of iteratively reweighted least squares.
 //!
 //! **Known variances** leave the plain weighted sum of squares, in units of that of the first output.
 //!
@@ -28,14 +28,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Residuals, prior::free_priors};
 
-/// Sums of squares of each output, and how many samples they are of.
+/// Sums of squares of each output, and the number of their samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Squares {
     /// Sum of squares of each output's whitened residual \[its unit squared\].
     pub sums: Vec<f64>,
     /// Samples of each output.
     pub samples: Vec<usize>,
-    /// Standard deviation of each output below which no noise is believed: it keeps one that is met exactly from counting alone.
+    /// Lower bound of each output's noise standard deviation: it prevents an output that is fitted exactly from dominating.
     floors: Vec<f64>,
     /// Standard deviation of each output where it is known.
     known: Option<Vec<f64>>,
@@ -44,7 +44,7 @@ pub struct Squares {
 }
 
 impl Squares {
-    /// None so far, of outputs with so many samples each and these floors.
+    /// Zero sums, for outputs with these numbers of samples and these floors.
     #[must_use]
     pub(crate) fn new(samples: &[usize], floor: impl Fn(usize) -> f64) -> Self {
         Self {
@@ -56,7 +56,7 @@ impl Squares {
         }
     }
 
-    /// None so far, of a model's outputs; its priors at `x`.
+    /// Zero sums for a model's outputs; its priors at `x`.
     pub(crate) fn of(model: &impl Residuals, x: &[f64]) -> Self {
         let prior = free_priors(model).map(|(_, prior)| prior.residual(x).powi(2));
         Self {
@@ -66,7 +66,7 @@ impl Squares {
         }
     }
 
-    /// The same sums with the priors' squares replaced.
+    /// The sums with the priors' part replaced.
     pub(crate) fn with_prior(mut self, squares: f64) -> Self {
         self.prior = squares;
         self
@@ -80,7 +80,7 @@ impl Squares {
             .max(f64::MIN_POSITIVE)
     }
 
-    /// All samples.
+    /// Number of all samples.
     fn count(&self) -> f64 {
         self.samples.iter().sum::<usize>() as f64
     }
@@ -146,7 +146,7 @@ impl Squares {
     }
 }
 
-/// A scale over another, none of them nothing.
+/// Ratio of two scales, both above zero.
 fn relative(first: f64, scale: f64) -> f64 {
     first.max(f64::MIN_POSITIVE) / scale.max(f64::MIN_POSITIVE)
 }
@@ -194,7 +194,7 @@ mod tests {
             assert_relative_eq!(weights[o].powi(2), slope, max_relative = 1e-8);
             weighted += weights[o].powi(2) * sums[o];
         }
-        // The weighted sum of squares is the cost here, and nowhere less.
+        // The weighted sum of squares equals the cost here, and is never smaller.
         assert_relative_eq!(weighted, at(&sums), max_relative = 1e-12);
         for other in [[1.0, 900.0, 0.02], [30.0, 1.0, 5.0], [0.1, 0.1, 0.1]] {
             let sum: f64 = weights.iter().zip(other).map(|(w, c)| w * w * c).sum();

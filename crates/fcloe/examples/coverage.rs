@@ -1,5 +1,5 @@
-//! Do 95 % intervals hold the truth in 95 % of the runs, with noise in the loop and on the record? 4000 runs of each, or
-//! as many as are asked for; a share of 400 is uncertain by 0.011, one of 4000 by 0.003.
+//! Coverage of 95 % intervals, with noise in the loop and output noise. 4000 runs of each, or the given number; a share of 400 is uncertain
+//! by 0.011, one of 4000 by 0.003.
 //!
 //! `cargo run --release -p fcloe --example coverage [-- RUNS]`
 #![allow(clippy::unwrap_used, clippy::expect_used)]

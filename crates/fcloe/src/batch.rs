@@ -25,21 +25,21 @@ use crate::{
     ClosedLoop, Coordinates, Damping, Error, Levels, Method, PlantModel, Problem, Settings,
 };
 
-/// Where no step lowers J, a minimum this near counts as reached: J itself tells no more.
+/// If no step lowers J, a minimum within this distance counts as reached: J cannot be computed more accurately.
 const AT_ROUNDING: f64 = 1e-5;
 
-/// Why a fit has ended.
+/// Reason why a fit has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stop {
     /// The last step was within the tolerance.
     Converged,
-    /// No step lowers J by more than its rounding.
+    /// No step lowers J by more than its rounding error.
     Rounding,
-    /// All steps that were left to try lose the stability of the loop: the data ask for a plant that this controller
-    /// does not stabilise. Check the controller, or the orders.
+    /// All remaining steps make the loop unstable: the best fit is a plant that this controller does not stabilise. Check the controller,
+    /// or the orders.
     StabilityBorder,
-    /// No step lowers J, though the gradient says so.
+    /// No step lowers J, although the gradient is not zero.
     NoProgress,
     /// J'' is singular at a step of Gauss-Newton: the data do not determine all parameters. Lower the orders, or use
     /// Levenberg-Marquardt.
@@ -55,12 +55,12 @@ impl Stop {
     }
 }
 
-/// One point of the way.
+/// One iterate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Iterate {
     /// The parameters.
     pub theta: Vec<f64>,
-    /// J there.
+    /// Value of J.
     pub cost: f64,
 }
 
@@ -75,7 +75,7 @@ pub struct Fit {
     pub cost: f64,
     /// Samples in all records.
     pub samples: usize,
-    /// Why it ended.
+    /// Reason for the end.
     pub stop: Stop,
     /// Steps that were taken.
     pub iterations: usize,
@@ -163,7 +163,7 @@ impl Problem {
         })
     }
 
-    /// What one unit of each coordinate is.
+    /// Scale of each coordinate.
     fn scale(&self, start: &PlantModel, coordinates: Coordinates) -> Result<Vec<f64>, Error> {
         if coordinates == Coordinates::Theta {
             return Ok(vec![1.0; self.columns()]);
@@ -189,8 +189,8 @@ impl Problem {
     }
 }
 
-/// Whether the lowest point of the linearised model is nearer than this share of the residual, root mean squares of y^.
-/// The step itself is no measure: damping makes it small far from any minimum too.
+/// Whether the distance to the minimum of the linearised model is below this share of the residual, as root mean squares of y^. The step
+/// itself is no measure, because damping makes it small far from any minimum too.
 fn at_minimum(at: &Triangle, tolerance: f64) -> bool {
     let last = at.columns() - 1;
     // The residual's coordinates along the columns.
@@ -208,10 +208,10 @@ struct Run {
     refused: usize,
 }
 
-/// What became of a step that was tried.
+/// Result of a trial step.
 enum Tried {
     Lower(Triangle),
-    /// By no more than rounding can explain.
+    /// J changes by no more than its rounding error.
     Level,
     Higher,
     Unstable,
@@ -229,7 +229,7 @@ impl Run {
     ) -> Result<Taken, Stop> {
         match method {
             Method::Gradient => {
-                // J' in the coordinates, back in x: scale^2 J'. The lowest point of the linearised model along it.
+                // J' in the coordinates, back in x: scale^2 J'. The minimum of the linearised model along it.
                 let along: Vec<f64> = scale
                     .iter()
                     .enumerate()
@@ -322,7 +322,7 @@ impl Run {
 
     fn try_step(&mut self, problem: &Problem, x: &[f64], at: &Triangle, step: &[f64]) -> Tried {
         let to: Vec<f64> = x.iter().zip(step).map(|(x, d)| x + d).collect();
-        // After the last step no derivatives are needed.
+        // The last step needs no derivatives.
         let last = problem.is_small(x, step, at, self.tolerance);
         match problem.evaluate(&to, at.cost(), !last) {
             Ok(next) if next.cost() < at.cost() => {
@@ -331,7 +331,7 @@ impl Run {
             }
             Ok(_) | Err(Refused::Higher) => {
                 self.evaluations += 1;
-                // What the linearised model promises.
+                // Reduction of J that the linearised model predicts.
                 let slope: f64 = step
                     .iter()
                     .enumerate()

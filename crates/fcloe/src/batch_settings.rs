@@ -1,10 +1,10 @@
-//! How a batch fit goes about it.
+//! Settings of a batch fit.
 
 use serde::Serialize;
 
 use crate::Error;
 
-/// What is added to J''.
+/// Matrix that is added to J''.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Damping {
@@ -14,43 +14,43 @@ pub enum Damping {
     Diagonal,
 }
 
-/// How a step is made.
+/// Step rule.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Along the gradient, the first length tried being the one to the lowest point of the linearised model. Slow in
-    /// a narrow valley: iterate in delta, and allow many iterations.
+    /// Along the gradient; the first trial length leads to the minimum of the linearised model. Slow in a narrow valley: iterate in delta,
+    /// and allow many iterations.
     Gradient,
-    /// To the lowest point of the linearised model, halved until J falls.
+    /// Step to the minimum of the linearised model, halved until J falls.
     GaussNewton,
     /// Damped.
     LevenbergMarquardt {
-        /// The first mu, above 0. The paper takes 0.1, and 1 after a poor start.
+        /// The first mu, above 0. The paper uses 0.1, and 1 after a poor start.
         mu: f64,
-        /// What it multiplies.
+        /// Matrix of the damping.
         damping: Damping,
     },
 }
 
-/// What is iterated.
+/// Coordinates of the iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
     /// The parameters.
     Theta,
-    /// `theta = theta0 (1 + delta)`; estimated levels are scaled by the spread of their signal.
+    /// `theta = theta0 (1 + delta)`; estimated levels are scaled by the standard deviation of their signal.
     Delta,
 }
 
-/// How to fit.
+/// Settings of the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Settings {
-    /// How a step is made.
+    /// Step rule.
     pub method: Method,
-    /// What is iterated.
+    /// Coordinates of the iteration.
     pub coordinates: Coordinates,
-    /// The fit ends with a step that changes no parameter by more than this share of itself, or from a point whose
-    /// minimum of the linearised model changes y^ by no more than this share of the residual (root mean square both).
+    /// The fit ends with a step that changes every parameter by at most this share of its value, or at a point where the minimum of the
+    /// linearised model changes y^ by at most this share of the residual (root mean square both).
     pub tolerance: f64,
     /// Most steps that are taken.
     pub max_iterations: usize,

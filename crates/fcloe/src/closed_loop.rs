@@ -17,7 +17,7 @@ pub struct ClosedLoop {
 }
 
 impl ClosedLoop {
-    /// Of this plant and that controller.
+    /// Loop of this plant and this controller.
     ///
     /// # Errors
     /// [`Error::Lti`] where the direct terms of plant and controller leave the loop without a solution, or where
@@ -50,7 +50,7 @@ impl ClosedLoop {
             disturbance: &a * s,
             characteristic,
         };
-        // Refuses what overflowed.
+        // Rejects polynomials that overflowed.
         this.output()?;
         this.input()?;
         this.disturbance()?;

@@ -1,4 +1,4 @@
-//! Whether the measured u is what the controller makes of r and y.
+//! Checks whether the measured u is the output of the controller for r and y.
 //!
 //! Method. The controller is run on the recorded r and y, and compared with u; both sides go through `H = (p/(p +
 //! lambda))^q`, q the number of integrators in S and 1/lambda a twentieth of the record, or else noise on y that the controller
@@ -7,10 +7,12 @@
 //! explains, filtered by a ladder of lags `1/(1 + T p)`, less what noise of that colour would show. A wrong gain, sign
 //! or unit of time shows there; noise does not, because r knows nothing of it.
 //!
-//! Assumptions: r does what its hold says; y runs in straight lines between samples, or is held, whichever fits better. Where readings of y are missing it runs in lines between
-//! those that are there: what the controller did with the readings that the record lacks adds to the mismatch, and is little beside 10 % of u unless gaps are long and many.
+//! Assumptions: r does what its hold says; y runs in straight lines between samples, or is held, whichever fits better. Where readings of y
+//! are missing it runs in lines between those that are there: what the controller did with the readings that the record lacks adds to the
+//! mismatch, and is little beside 10 % of u unless gaps are long and many.
 //!
-//! Limits: what is wrong only at frequencies below lambda is not seen; a controller that is sampled much more slowly than the record's dynamics is not the continuous one, and shows.
+//! Limits: what is wrong only at frequencies below lambda is not seen; a controller that is sampled much more slowly than the record's
+//! dynamics is not the continuous one, and shows.
 
 use ct_lti::{Hold, Polynomial, Simulator, StateSpace, TransferFunction};
 use ct_signals::ArModel;
@@ -25,20 +27,20 @@ const SLOWEST: f64 = 20.0;
 /// Added to the diagonal, as a share of it, so that dependent columns do no harm.
 const RIDGE: f64 = 1e-9;
 
-/// How far a controller is from the u that was measured, unit of u.
+/// Difference between the controller's output and the measured u, unit of u.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mismatch {
-    /// Root mean square of what the controller does not explain.
+    /// Added to the diagonal, as a share of it, to regularise dependent columns.
     pub rms: f64,
     /// Root mean square of that part of it which follows r.
     pub systematic: f64,
-    /// Root mean square of what noise alone would show of that; it is taken off.
+    /// Root mean square of the part of it that is correlated with r.
     pub by_chance: f64,
-    /// Root mean square of u, its slowest moves left out where the controller integrates.
+    /// Root mean square of u, without its slowest changes if the controller integrates.
     pub size: f64,
 }
 
-/// Compares the controller with a record's u; none in open loop, and where u is not recorded or does not move.
+/// The controller acts on raw signals; a known operating point may contain an offset of the scaling.
 ///
 /// # Errors
 /// [`Error::Lti`] where the controller cannot be simulated at this step; a record that is not valid.
@@ -63,12 +65,12 @@ pub fn controller_mismatch(
     let law = StateSpace::controllable(&law)?;
     let high = TransferFunction::new(Polynomial::p().pow(integrators), slow)?;
     let high = StateSpace::controllable(&high)?;
-    // u jumps with r by the direct term, and is smooth beside that.
+    // u has steps with r because of the direct term; the remaining part of u is smooth.
     let direct = law.d();
     let smooth = u.iter().zip(r).map(|(u, r)| u - direct * r);
     let mean = smooth.clone().sum::<f64>() / n;
     let smooth = response(&high, Hold::First, smooth.map(|u| u - mean), record.step)?;
-    // About its mean too, as the smooth part: else raw levels count as a jump at the beginning.
+    // Also subtract the mean, as for the smooth part: otherwise raw levels count as a step at the beginning.
     let level = r.iter().sum::<f64>() / n;
     let moves = r.iter().map(|r| r - level);
     let jumps = response(&high, record.r_hold, moves, record.step)?;
@@ -112,8 +114,8 @@ pub fn controller_mismatch(
     Ok(best)
 }
 
-/// The square of that part of what is missed which follows the ladder, and what noise of the same colour would show of
-/// it, by generalised least squares.
+/// The square of the part of the command's error that follows the controller's polynomial terms, and its expected value for noise of the
+/// same spectrum, by generalised least squares.
 fn following(free: &[Vec<f64>], ladder: &[Vec<f64>], missed: &[f64]) -> Result<(f64, f64), Error> {
     let plain = Projection::new(ladder, missed);
     let noise = ArModel::fit(&[&plain.left(ladder, missed)], 4)?;
@@ -126,7 +128,7 @@ fn following(free: &[Vec<f64>], ladder: &[Vec<f64>], missed: &[f64]) -> Result<(
     x.truncate(ladder.len());
     let plain = plain.triangle;
     let variance = noise.sigma() * noise.sigma();
-    // The trace of the covariance times J'J = R'R, J the ladder.
+    // The trace of the covariance times J'J = R'R, J the columns of the filtered references.
     let columns = 0..ladder.len();
     let by_row = |k: usize| -> f64 {
         let times = |i: usize| -> f64 {
@@ -184,16 +186,16 @@ fn ladder(r: &[f64], record: &LoopRecord) -> Result<Vec<Vec<f64>>, Error> {
     Ok(columns)
 }
 
-/// What is left of a signal beside its projection on the columns.
+/// Residual of a signal after projection on the columns.
 fn residual(columns: &[Vec<f64>], signal: &[f64]) -> Vec<f64> {
     Projection::new(columns, signal).left(columns, signal)
 }
 
-/// Least squares of a signal on columns, dependent ones weighed down.
+/// Least squares of a signal on columns, with a ridge for dependent ones.
 struct Projection {
-    /// Of the columns and the signal.
+    /// R factor of the columns and the signal.
     triangle: Triangle,
-    /// The same with the ridge.
+    /// The same R factor with the ridge.
     damped: Triangle,
     all: Vec<usize>,
 }

@@ -37,7 +37,7 @@ impl Controller {
                 s: degree_s,
             });
         }
-        // Refuses what is no transfer function.
+        // Rejects what is no transfer function.
         TransferFunction::new(r.clone(), s.clone())?;
         Ok(Self {
             law: (r.clone(), s.clone()),
@@ -77,7 +77,7 @@ impl Controller {
         )
     }
 
-    /// The same controller behind a sensor filter `zeta/(p + zeta)`, zeta in \[1/time\]; y is the filtered signal.
+    /// The same controller after a sensor filter `zeta/(p + zeta)`, zeta in \[1/time\]; y is the filtered signal.
     ///
     /// # Errors
     /// [`Error::Setting`]; [`Error::FilterWithoutLoop`] in open loop.
@@ -89,7 +89,7 @@ impl Controller {
         let pole = Polynomial::new([zeta, 1.0])?;
         self.r = &self.r * zeta;
         self.s = &self.s * &pole;
-        // The command before the filter: u = (p + zeta)/zeta of what enters the product above.
+        // The command before the filter: u = (p + zeta)/zeta times the signal that enters the product above.
         self.filter = &self.filter * &(&pole * (1.0 / zeta));
         Ok(self)
     }

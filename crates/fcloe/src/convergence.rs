@@ -1,7 +1,7 @@
 //! Whether the recursive estimator converges: the condition on its filter, decided exactly.
 //!
-//! Condition (Baysse, Carrillo, Habbadi, (14)): with `P = A S + B R` of the true plant and `P^ = A^ S + B^ R` of the
-//! filter `S/P^` behind the sensitivities,
+//! Condition (Baysse, Carrillo, Habbadi, (14)): with `P = A S + B R` of the true plant and `P^ = A^ S + B^ R` of the filter `S/P^` after
+//! the sensitivities,
 //! ```text
 //! Re (P^/P)(jw) > 1/2   for all w, infinity included;   P Hurwitz.
 //! ```
@@ -17,29 +17,28 @@ use serde::{Deserialize, Serialize};
 
 use crate::{ClosedLoop, Controller, Error, PlantModel};
 
-/// What is known of condition (14) for one filter and one plant.
+/// Result of condition (14) for one filter and one plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
-    /// The answer.
+    /// Result of the condition.
     pub verdict: Verdict,
     /// The smallest `Re (P^/P)(jw)` over all frequencies; NaN where P is not Hurwitz.
     pub least: f64,
-    /// Where that is \[rad/time\]; infinite where it is the limit at high frequencies, NaN where P is not Hurwitz.
+    /// Frequency of the minimum \[rad/time\]; infinite if it is the limit at high frequencies, NaN if P is not Hurwitz.
     pub frequency: f64,
 }
 
-/// The answer of condition (14), and how bad it is where it fails; the worse, the greater.
+/// Result of condition (14), and its severity if it fails; a greater value is worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// `Re (P^/P) > 1/2` at every frequency: the recursion converges with this filter.
     Holds,
-    /// `Re (P^/P)` falls to 1/2 or below, but stays above 0: convergence is not guaranteed, and usual.
+    /// `Re (P^/P)` falls to 1/2 or below, but stays above 0: the recursion usually converges, without guarantee.
     Positive,
-    /// `Re (P^/P)` is 0 or below at some frequency: what the data say at that frequency moves the estimates the wrong
-    /// way.
+    /// `Re (P^/P)` is 0 or negative at some frequency: data at that frequency move the estimates in the wrong direction.
     Negative,
-    /// P itself is not Hurwitz, so there is no such loop.
+    /// P itself is not Hurwitz, so the loop is unstable.
     Unstable,
 }
 
@@ -58,7 +57,7 @@ impl Condition {
                     frequency: f64::NAN,
                 });
             }
-            // At infinity the condition has to hold with something to spare, too.
+            // At infinite frequency the condition needs a positive margin too.
             Positivity::Strict => Verdict::Holds,
             _ if ratio.exceeds(0.0)?.is_strict() => Verdict::Positive,
             _ => Verdict::Negative,
@@ -86,14 +85,14 @@ impl Condition {
         )
     }
 
-    /// Whether it holds.
+    /// Whether the condition is satisfied.
     pub fn holds(&self) -> bool {
         self.verdict == Verdict::Holds
     }
 }
 
-/// `P^/P - 1/2` along a logarithmic grid of frequencies, for a picture: `(w, real part, imaginary part)`. The condition
-/// holds where all of the curve is right of 0. The grid covers the roots of both polynomials and two decades beyond.
+/// `P^/P - 1/2` on a logarithmic grid of frequencies, for a plot: `(w, real part, imaginary part)`. The condition is satisfied if the whole
+/// curve is to the right of 0. The grid covers the roots of both polynomials and two decades beyond.
 ///
 /// # Errors
 /// [`Error::Lti`], as [`Condition::new`].

@@ -1,20 +1,20 @@
-//! What can be wrong with a model, a controller, a record or a fit: each message names what it is about, the numbers
-//! that disagree and the mend, in one line.
+//! Errors of models, controllers, records and fits: each message names the object, the numbers that disagree and the correction, in one
+//! line.
 
 /// Everything this crate can refuse.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A polynomial, a transfer function or a sampling step that is no such thing.
+    /// An invalid polynomial, transfer function or sampling step.
     #[error(transparent)]
     Lti(#[from] ct_lti::Error),
-    /// What the recursive least squares refuse.
+    /// Error of the recursive least squares.
     #[error(transparent)]
     Rls(#[from] ct_rls::Error),
     /// A series or a setting that `ct-signals` refuses.
     #[error(transparent)]
     Signals(#[from] ct_signals::Error),
-    /// A plant that differentiates.
+    /// A plant with more zeros than poles.
     #[error("the plant has B of degree {m} over A of degree {n}; choose m of at most {n}")]
     Improper {
         /// Degree of A.
@@ -22,7 +22,7 @@ pub enum Error {
         /// Degree of B.
         m: usize,
     },
-    /// A plant without dynamics.
+    /// A plant without dynamics (order 0).
     #[error("the plant has order n = 0; a plant needs at least one pole, n >= 1")]
     OrderZero,
     /// A vector that does not fit the orders.
@@ -41,7 +41,7 @@ pub enum Error {
         /// The order asked for.
         n: usize,
     },
-    /// A controller that differentiates.
+    /// A controller with more zeros than poles.
     #[error(
         "the controller has R of degree {r} over S of degree {s}; filter its derivative, so that R's degree is at most {s}"
     )]
@@ -53,10 +53,10 @@ pub enum Error {
     },
     /// A sensor's filter without a loop around it.
     #[error(
-        "a sensor filter of {zeta} belongs to a loop, but there is no controller; filter u alike and leave it out here"
+        "a sensor filter of {zeta} belongs to a loop, but there is no controller; apply the same filter to u and leave it out here"
     )]
     FilterWithoutLoop {
-        /// Its bandwidth \[1/time\].
+        /// Bandwidth of the filter \[1/time\].
         zeta: f64,
     },
     /// The loop's polynomial is not Hurwitz.
@@ -75,16 +75,16 @@ pub enum Error {
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What is allowed.
+        /// Allowed range.
         range: &'static str,
     },
-    /// No record at all.
+    /// No record is given.
     #[error("there is no record; give at least one")]
     NoRecord,
     /// A record of a loop without its reference.
     #[error(
         "{record}: there is no reference r, which drives the model in closed loop; give it, or fit in open loop from u, \
-         which coloured noise in the loop biases"
+         in open loop, coloured noise fed back by the controller biases the estimates"
     )]
     MissingReference {
         /// The record's name.
@@ -96,7 +96,7 @@ pub enum Error {
         /// The record's name.
         record: String,
     },
-    /// A record without u where signals are regressed on one another.
+    /// A record without u for a regression.
     #[error(
         "{record}: there is no input u, which a regression needs in closed loop too; give it, or start from a plant of your own"
     )]
@@ -139,12 +139,12 @@ pub enum Error {
         record: String,
         /// Index of the later time.
         index: usize,
-        /// The step there \[s\].
+        /// The irregular step \[s\].
         step: f64,
         /// The median step \[s\].
         expected: f64,
     },
-    /// An output without readings, or without those that say its level.
+    /// An output without readings, or without readings that determine its level.
     #[error(
         "{record}: no reading of y is there{}; give a part of the record that has some",
         match all {
@@ -160,7 +160,7 @@ pub enum Error {
         /// Whether these are all.
         all: bool,
     },
-    /// Gaps in y that the filters of a regression do not forget.
+    /// Gaps in y that are too long for the filters of a regression.
     #[error(
         "{record}: {:.0} % of the readings of y are missing, and only {left} of the {rows} rows are far enough behind long gaps for filters on y; output error needs no such filters",
         100.0 * missing
@@ -175,7 +175,7 @@ pub enum Error {
         /// Rows in the record.
         rows: usize,
     },
-    /// Instruments with a filter that is not the plant's own, and readings that are missing.
+    /// Instruments with a filter that is not the plant's own denominator, and missing readings.
     #[error(
         "readings of y are missing, and the filter of the instruments did not come to rest at A^: their errors are not known then"
     )]
@@ -198,17 +198,17 @@ pub enum Error {
         /// Parameters, estimated offsets included.
         parameters: usize,
     },
-    /// The signal that drives the model never moves.
+    /// The signal that drives the model is constant.
     #[error(
         "{signal} is {value} throughout, in all records, so nothing can be learnt about the dynamics; record an experiment in which it moves"
     )]
     ConstantDrive {
         /// `r` or `u`.
         signal: &'static str,
-        /// Its value in the first record.
+        /// Value in the first record.
         value: f64,
     },
-    /// The measured u is not what the controller makes of r - y.
+    /// The measured u is not the controller's output for r - y.
     #[error(
         "{record}: the measured u is not R/S (r - y): they differ by {mismatch:.3} rms where u moves by {size:.3} rms ({percent:.0} %); \
          check the controller's coefficients, their units of time, the sign, and that u is the command as it was recorded",
@@ -227,12 +227,12 @@ pub enum Error {
         "theta[{index}] starts at 0, so theta0 (1 + delta) cannot move it; start it elsewhere, or iterate in theta"
     )]
     ZeroStart {
-        /// Its index.
+        /// Index of the parameter.
         index: usize,
     },
-    /// Parameters that the data do not tell apart.
+    /// The data do not determine all parameters.
     #[error(
-        "{samples} samples do not determine {parameters} parameters: a combination of them leaves the output as it is; lower the orders, or excite the loop more"
+        "{samples} samples do not determine {parameters} parameters: the output does not depend on some combination of them; lower the orders, or excite the loop more"
     )]
     NotDetermined {
         /// Parameters, estimated levels included.
@@ -256,7 +256,7 @@ pub enum Error {
         /// The controller's period \[time\].
         period: f64,
     },
-    /// No regression gave a plant whose loop is stable.
+    /// No regression gave a plant with a stable loop.
     #[error(
         "none of the plants from {tried} filter bandwidths has a stable loop; check the controller's sign and units, or give bandwidths lambda of 2 to 10 times the loop's poles"
     )]
@@ -264,7 +264,7 @@ pub enum Error {
         /// Bandwidths that were tried.
         tried: usize,
     },
-    /// The simulation left the range of numbers.
+    /// The simulation overflowed.
     #[error(
         "the loop simulated at the start is not finite; check the units of the signals and the start"
     )]

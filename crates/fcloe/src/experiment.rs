@@ -10,14 +10,14 @@ use rand::Rng;
 
 use crate::{ClosedLoop, Controller, Error, LoopSimulator, PlantModel};
 
-/// Where noise enters. One value for each sample, unit of y, held until the next.
+/// Point where noise enters the loop. One value for each sample, unit of y, held until the next.
 #[derive(Debug, Clone, Copy)]
 pub enum Noise<'a> {
-    /// There is none.
+    /// No noise.
     None,
-    /// Added to the output that the controller sees: it circulates, and the record holds `A S/P w`.
+    /// Noise is added to the output that the controller reads: it is fed back, and the record contains `A S/P w`.
     InLoop(&'a [f64]),
-    /// Added to the recorded y alone: the controller never sees it.
+    /// Noise is added to the recorded y alone: the controller does not read it.
     OnRecord(&'a [f64]),
 }
 
@@ -30,7 +30,7 @@ pub struct LoopData {
     pub u: Vec<f64>,
 }
 
-/// A loop with a continuous controller, from rest; `r` does what `hold` says.
+/// A loop with a continuous controller, from rest; `hold` is the hold of `r`.
 ///
 /// In open loop (R = 0) r is the input itself.
 ///
@@ -71,9 +71,8 @@ pub fn continuous_loop(
     Ok(LoopData { y, u })
 }
 
-/// A loop whose controller is sampled: it runs `periods` times in each sampling interval of the record, on the output at
-/// that instant; r and w are held over the interval. From rest. The continuous loop may be stable where this one is not:
-/// then the signals grow.
+/// A loop with a sampled controller: it runs `periods` times in each sampling interval of the record, on the output at that instant; r and
+/// w are held over the interval. From rest. The loop may be unstable although the continuous loop is stable: then the signals grow.
 ///
 /// A direct term of the plant passes on the command of the period before: the controller cannot act on what its own
 /// command does at once.
@@ -100,7 +99,7 @@ pub fn sampled_loop(
         check_length(w, r)?;
     }
     let period = step / periods as f64;
-    // The sensor's filter stays continuous, between plant and sampler.
+    // The sensor's filter is continuous, between plant and sampler.
     let sensor = TransferFunction::new(Polynomial::one(), controller.filter().clone())?;
     let mut process = Held::new(&plant.transfer_function()?.series(&sensor)?, period)?;
     let mut law = Held::new(&controller.law()?, period)?;
@@ -195,7 +194,7 @@ fn check_length(w: &[f64], r: &[f64]) -> Result<(), Error> {
     })
 }
 
-/// A converter: `2^bits` levels from `low` to `high`, and nothing beyond.
+/// A converter: `2^bits` levels from `low` to `high`, with saturation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantiser {
     low: f64,

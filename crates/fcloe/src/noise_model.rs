@@ -1,9 +1,9 @@
-//! What the residual is made of, and what its colour does to the standard errors.
+//! Noise model of the residual, and its influence on the standard errors.
 //!
-//! Model: `v = H e`, e white of variance sigma^2, where H is an autoregression, and behind it, for noise that
-//! circulates in the loop, `F = A S/P` sampled under a hold: in the loop the residual is `A S/P w` (Baysse, Carrillo,
-//! Habbadi, (13)). No autoregression of modest order stands for F: with an integrator in S it has a zero at frequency 0,
-//! just where the sensitivities of a slow experiment live, and standard errors without it are too large.
+//! Model: `v = H e`, e white of variance sigma^2, where H is an autoregression, and after it, for noise that circulates in the loop, `F = A
+//! S/P` sampled under a hold: in the loop the residual is `A S/P w` (Baysse, Carrillo, Habbadi, (13)). No autoregression of modest order
+//! stands for F: with an integrator in S it has a zero at frequency 0, just where the sensitivities of a slow experiment live, and standard
+//! errors without it are too large.
 //!
 //! Method: the residual is whitened with both, F inverted exactly from sample to sample, `w = F^-1 v`, and an
 //! autoregression fitted to what is left; the one with the larger marginal likelihood stays, less the penalty of
@@ -18,9 +18,9 @@
 //! so that the double sum is one filter of the sensitivities, `f_k = sum_{l<k} R(k-l) s_l`, and J'VJ = sum
 //! `R(0) s s' + s f' + f s'`: no more memory for a longer record.
 //!
-//! Missing readings: the residual is NaN there, and F cannot be inverted from sample to sample. The autoregression of either path is then the one whose
-//! process, behind F or not, has the largest likelihood of the residuals that are there ([`ArModel::fit_behind`], [`ct_signals::StationaryWhitener`]), and the paths are compared by the
-//! marginal likelihood of these.
+//! Missing readings: the residual is NaN there, and F cannot be inverted from sample to sample. The autoregression of either path is then
+//! the one whose process, after F or not, has the largest likelihood of the residuals that are there ([`ArModel::fit_behind`],
+//! [`ct_signals::StationaryWhitener`]), and the paths are compared by the marginal likelihood of these.
 //!
 //! Cost: `q nu^2` products a sample, for q columns and nu states of H.
 //!
@@ -37,11 +37,11 @@ use serde::Serialize;
 use self::series::{Series, autoregression};
 use crate::{ClosedLoop, Error};
 
-/// Where the noise enters.
+/// Point where the noise enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePath {
-    /// On the record: the controller does not see it.
+    /// Output noise: the controller does not read it.
     Record,
     /// In the loop: the residual is `A S/P w`.
     Loop,
@@ -59,15 +59,15 @@ pub(crate) struct Residual {
 /// A model of the residual.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseModel {
-    /// Where the noise enters.
+    /// Point where the noise enters.
     pub path: NoisePath,
-    /// The noise there.
+    /// Noise model of the path.
     pub ar: ArModel,
 }
 
 impl NoiseModel {
-    /// The better of the two paths for the residuals of all records, or `path`. The loop's is out of the question where its
-    /// inverse grows without bound: a plant that is unstable without its controller.
+    /// The better of the two paths for the residuals of all records, or `path`. The loop's path is excluded if its inverse grows without
+    /// bound: for a plant that is unstable without its controller.
     pub(crate) fn of_residuals(
         residuals: &[Residual],
         closed: &ClosedLoop,
@@ -89,7 +89,7 @@ impl NoiseModel {
             let sampled = system.sampled(Hold::Zero, residual.step)?;
             let (v, ones) = (&residual.values, vec![1.0; residual.values.len()]);
             let unfilter = |v: &[f64]| unfiltered(&system, &sampled, v);
-            // What the residual may hold beside the noise, as it looks on each path.
+            // Deterministic signals that the residual may contain besides the noise, for each path.
             let (mut here, mut there) = (Vec::new(), Vec::new());
             if blind {
                 here.push(filtered(&system, &sampled, &ones));
@@ -143,7 +143,7 @@ impl NoiseModel {
 }
 
 impl NoiseModel {
-    /// The same where readings are missing: residuals are NaN there.
+    /// As before with missing readings: their residuals are NaN.
     fn of_some(
         residuals: &[Residual],
         closed: &ClosedLoop,
@@ -179,7 +179,7 @@ impl NoiseModel {
         let segments: Vec<&[f64]> = all.iter().map(|s| &s.values[..]).collect();
         let none = StateSpace::new(vec![], vec![], vec![], 1.0)?;
         let of = |system: &StateSpace| -> Result<(f64, ArModel), Error> {
-            // What cannot be sampled is refused here once.
+            // Errors of sampling are found here once.
             let known: Vec<Sampled> = residuals
                 .iter()
                 .map(|residual| system.sampled(Hold::Zero, residual.step))
@@ -260,7 +260,7 @@ impl NoiseModel {
     }
 }
 
-/// An autoregression behind a system that it is held for.
+/// An autoregression followed by a given system.
 pub(crate) fn behind(
     ar: &ArModel,
     system: &StateSpace,

@@ -1,4 +1,4 @@
-//! The plant as it is estimated.
+//! The estimated plant.
 //!
 //! Model: `A(p) y = B(p) u`, `A = 1 + a1 p + .. + an p^n`, `B = b0 + b1 p + .. + bm p^m`, `m <= n` (Baysse, Carrillo,
 //! Habbadi, (1)). Parameters, in this order everywhere: `theta = [a1, .., an, b0, .., bm]`. A starts with 1, so a
@@ -34,7 +34,7 @@ impl Orders {
     }
 }
 
-/// A plant with numbers.
+/// A plant with numerical coefficients.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlantModel {
     orders: Orders,
@@ -131,7 +131,7 @@ impl PlantModel {
     }
 }
 
-/// A polynomial from numbers that were found finite when the model was made.
+/// A polynomial of coefficients that were checked when the model was built.
 fn polynomial(c: Vec<f64>) -> Polynomial {
     Polynomial::new(c).unwrap_or_default()
 }

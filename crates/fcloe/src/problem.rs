@@ -5,8 +5,8 @@
 //! a record's offsets are estimated, `y^ = c_y + T(p) (r - c_r)` with `T = B R/P`, and its two levels join the
 //! parameters, with the sensitivities `1` and `-T 1`.
 //!
-//! The sums are held as the triangle R of [`estimation::Triangle`]: `J'' = 2 R'R`, `J' = -2 R'z`, z its last column, so that the condition of
-//! the sensitivities is not squared; [`Problem`] is one of [`estimation::Residuals`].
+//! The sums are held as the triangle R of [`estimation::Triangle`]: `J'' = 2 R'R`, `J' = -2 R'z`, z its last column, so that the condition
+//! of the sensitivities is not squared; [`Problem`] is one of [`estimation::Residuals`].
 //!
 //! Readings of y may be missing: the simulation runs on, and their rows have no residual and do not count.
 //!
@@ -19,11 +19,11 @@ use ct_lti::Hold;
 use crate::control_check::{Mismatch, controller_mismatch};
 use crate::{Controller, Error, LoopRecord, Offsets, Orders, PlantModel};
 
-/// A fit of parameters to fewer samples than this, or than 5 for each of them, is refused.
+/// A fit with fewer samples than this, or than 5 for each parameter, is rejected.
 const MIN_SAMPLES: usize = 20;
 const SAMPLES_PER_PARAMETER: usize = 5;
 
-/// A controller that misses more of u than this share is refused.
+/// A controller whose output differs from u by more than this share is rejected.
 const LARGEST_MISMATCH: f64 = 0.1;
 
 /// The levels of a record that were estimated.
@@ -31,11 +31,11 @@ const LARGEST_MISMATCH: f64 = 0.1;
 pub struct Levels {
     /// Level of r, or of u in open loop, at which the loop rested before the record.
     pub drive: f64,
-    /// Level of y there.
+    /// Level of y.
     pub y: f64,
 }
 
-/// One record, ready to be fitted.
+/// One record with the data for a fit.
 #[derive(Debug, Clone)]
 struct Prepared {
     name: String,
@@ -47,27 +47,27 @@ struct Prepared {
     lacks_readings: bool,
     /// The operating point of the two.
     levels: Levels,
-    /// Where its two columns begin, if its offsets are estimated.
+    /// First of the record's two columns, if its offsets are estimated.
     column: Option<usize>,
     /// Spread of drive and y.
     spread: [f64; 2],
 }
 
-/// What is fitted to what.
+/// The least-squares problem.
 #[derive(Debug, Clone)]
 pub struct Problem {
     controller: Controller,
     orders: Orders,
     records: Vec<Prepared>,
     mismatches: Vec<Option<Mismatch>>,
-    /// All columns: the parameters of the plant, then the estimated levels.
+    /// All columns: the parameters of the plant, followed by the estimated levels.
     free: Vec<usize>,
     bounds: Vec<(f64, f64)>,
-    /// Of the one output.
+    /// Number of samples of the single output.
     samples: [usize; 1],
 }
 
-/// Why parameters have no criterion.
+/// Reason why the criterion is undefined for these parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Refused {
     /// P^ is not Hurwitz.
@@ -78,7 +78,7 @@ pub(crate) enum Refused {
     Higher,
 }
 
-/// J may be above its limit by this part: sums in another order differ by less.
+/// Tolerance of the limit of J, for differences by the order of summation.
 const ROUNDING: f64 = 1e-9;
 
 impl Problem {
@@ -184,7 +184,7 @@ impl Problem {
         self.samples[0]
     }
 
-    /// How far the controller is from each record's u; none for a record without u, and in open loop.
+    /// Difference between the controller's output and each record's u; none for a record without u, and in open loop.
     pub fn mismatches(&self) -> &[Option<Mismatch>] {
         &self.mismatches
     }
@@ -235,7 +235,7 @@ fn constant(values: &[f64]) -> bool {
     values.iter().all(|v| Some(v) == values.first())
 }
 
-/// Standard deviation of the values that are there.
+/// Standard deviation of the present values.
 fn spread(values: &[f64]) -> f64 {
     let there = values.iter().filter(|v| !v.is_nan());
     let n = there.clone().count().max(1) as f64;

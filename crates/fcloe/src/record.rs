@@ -1,4 +1,4 @@
-//! A record of a loop: r, u and y on an even grid, what r and u do between samples, and where zero is.
+//! A record of a loop: r, u and y on an even grid, the hold of r and u, and the operating point.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Controller, Error};
 
-/// The levels about which the linear model holds, units of r, u and y.
+/// The levels around which the linear model is valid, units of r, u and y.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct OperatingPoint {
     /// Reference.
@@ -25,22 +25,22 @@ pub struct OperatingPoint {
 pub enum Offsets {
     /// The signals are deviations already, and the loop is at rest at 0 when the record begins.
     Deviations,
-    /// Known, to be subtracted: the loop rests there when the record begins.
+    /// Known levels, which are subtracted: the loop is at rest there when the record begins.
     Known(OperatingPoint),
     /// The mean of the first rows, in which the loop rests: at least 1.
     FirstRows(usize),
-    /// The means of the record: right where nothing better is known and the record is long; the model still starts at
-    /// rest, so a transient at the beginning is in error.
+    /// The means of the record: a choice for long records without better knowledge; the model starts at rest, so a transient at the
+    /// beginning causes an error.
     Means,
-    /// Unknown. The batch fit estimates the level of the drive (r, or u in open loop) at which the loop rested and
-    /// the output's level there, beside the parameters. They start from the first row.
+    /// Unknown. The batch fit estimates the level of the drive (r, or u in open loop) at rest and the corresponding output level together
+    /// with the parameters, starting from the first row.
     Estimated,
 }
 
 /// r, u and y of one experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoopRecord {
-    /// For messages.
+    /// Name in messages.
     pub name: String,
     /// Sampling interval \[time\], above 0.
     pub step: f64,
@@ -48,13 +48,13 @@ pub struct LoopRecord {
     pub r: Option<Vec<f64>>,
     /// Input of the plant, the controller's output; needed in open loop.
     pub u: Option<Vec<f64>>,
-    /// Output as the controller sees it, at the sampling instants; NaN where the reading is missing.
+    /// Output as the controller reads it, at the sampling instants; NaN if the reading is missing.
     pub y: Vec<f64>,
-    /// What r does between samples.
+    /// Hold of r between samples.
     pub r_hold: Hold,
     /// What u does between samples. In a loop with a continuous controller it is not quite either of the two.
     pub u_hold: Hold,
-    /// Where zero is.
+    /// Operating point.
     pub offsets: Offsets,
 }
 
@@ -133,12 +133,12 @@ impl LoopRecord {
         self.y.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.y.is_empty()
     }
 
-    /// Number of readings of the output that are there.
+    /// Number of present readings of the output.
     pub fn readings(&self) -> usize {
         self.y.iter().filter(|y| !y.is_nan()).count()
     }
@@ -148,7 +148,7 @@ impl LoopRecord {
         self.readings() < self.len()
     }
 
-    /// y on straight lines where readings are missing.
+    /// y with linear interpolation of missing readings.
     pub(crate) fn y_on_lines(&self) -> Cow<'_, [f64]> {
         match self.lacks_readings() {
             true => Cow::Owned(ct_signals::interpolated(&self.y)),
@@ -156,8 +156,8 @@ impl LoopRecord {
         }
     }
 
-    /// Checks the step, the lengths and that all numbers are finite; readings of y may be missing (NaN), but not all of them, nor all of those that say where
-    /// zero is.
+    /// Checks the step, the lengths and that all numbers are finite; readings of y may be missing (NaN), but not all of them, nor all of
+    /// those that say where zero is.
     ///
     /// # Errors
     /// [`Error::Setting`], [`Error::SignalLength`], [`Error::NotFinite`], [`Error::NoReading`].
@@ -228,8 +228,8 @@ impl LoopRecord {
         Ok((r, self.r_hold))
     }
 
-    /// The levels that are subtracted: where [`Offsets::Estimated`], those of the first row (of y of the first reading), as a start. 0 for a
-    /// signal that is not there. Missing readings are left out of means.
+    /// The levels that are subtracted: where [`Offsets::Estimated`], those of the first row (of y of the first reading), as a start. 0 for
+    /// a signal that is not there. Missing readings are left out of means.
     pub fn operating_point(&self) -> OperatingPoint {
         let level = |signal: Option<&[f64]>| {
             let signal = signal.unwrap_or_default();

@@ -23,7 +23,7 @@ use ct_lti::{Hold, Polynomial, StateSpace, TransferFunction};
 
 use crate::{ClosedLoop, Controller, Error, PlantModel};
 
-/// Samples that are computed at a time.
+/// Number of samples that are computed at a time.
 pub const BLOCK: usize = 64;
 
 /// The simulated signals at up to [`BLOCK`] successive samples.
@@ -64,11 +64,11 @@ impl Block {
 #[derive(Debug, Clone)]
 pub struct LoopSimulator {
     transition: Transition,
-    /// y^ in x, and what of the drive reaches it at once.
+    /// y^ as a function of x, and the direct term from the drive.
     output: (Vec<f64>, f64),
     /// u^ likewise.
     input: (Vec<f64>, f64),
-    /// P over its leading coefficient, which is left out.
+    /// P divided by its leading coefficient, which is not stored.
     monic: Vec<f64>,
     /// R and S over P's leading coefficient; R is empty in open loop.
     r: Vec<f64>,
@@ -200,7 +200,7 @@ impl LoopSimulator {
         &self.block
     }
 
-    /// y^ at all samples of the drive, from where the loop is.
+    /// y^ at all samples of the drive, from the present state of the loop.
     pub fn outputs(&mut self, drive: &[f64]) -> Vec<f64> {
         let mut y = Vec::with_capacity(drive.len());
         for drive in drive.chunks(BLOCK) {
@@ -210,8 +210,7 @@ impl LoopSimulator {
         y
     }
 
-    /// y^ and u^ at all samples of the drive, from where the loop is; u^ is the command itself, whose sensor's filter
-    /// is not in it.
+    /// y^ and u^ at all samples of the drive, from the present state of the loop; u^ is the command without the sensor's filter.
     pub fn outputs_and_inputs(&mut self, drive: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut y = Vec::with_capacity(drive.len());
         let mut u = Vec::with_capacity(drive.len());
@@ -225,7 +224,7 @@ impl LoopSimulator {
         (y, u)
     }
 
-    /// Moves the chains over at most [`BLOCK`] samples and computes y^ there.
+    /// Advances the filter chains by at most [`BLOCK`] samples and computes y^.
     fn chains(&mut self, drive: &[f64]) {
         let Self {
             transition,
@@ -320,7 +319,7 @@ impl Transition {
         }
     }
 
-    /// A number of states that the compiler knows: the states stay in registers.
+    /// A number of states that is known at compile time: the states stay in processor registers.
     fn fixed<const N: usize>(
         &self,
         state: &mut State,

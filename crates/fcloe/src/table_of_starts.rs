@@ -1,4 +1,4 @@
-//! From which starts the recursive estimator converges, beside what condition (14) says of them.
+//! Table of starts from which the recursive estimator converges, compared with condition (14).
 //!
 //! A start is the true plant with its gain times one factor and its time scale times another, `B -> k B(t p)`,
 //! `A -> A(t p)`; for `K/(1 + tau p)` these are `K0/K` and `tau0/tau`.
@@ -21,11 +21,11 @@ pub struct StartRun {
     pub time_factor: f64,
     /// Condition (14) with the filter of the start.
     pub condition: Condition,
-    /// The estimates at the end; none where the start's loop is not stable, so that there is no run.
+    /// The final estimates; none if the start's loop is not stable, so that there is no run.
     pub end: Option<Vec<f64>>,
-    /// The largest relative error of a parameter there; infinite without a run.
+    /// The largest relative error of a parameter at the end; infinite without a run.
     pub error: f64,
-    /// Steps that were refused to keep the loop stable.
+    /// Number of steps that were rejected to keep the loop stable.
     pub refused: u64,
 }
 
@@ -41,8 +41,8 @@ pub struct TableOfStarts {
 }
 
 impl TableOfStarts {
-    /// Runs the estimator over r and y, `step` apart, from each start, in parallel. The truth is that of the simulation,
-    /// or an estimate that is trusted. No parameter of it may be 0.
+    /// Runs the estimator over r and y, `step` apart, from each start, in parallel. The truth is that of the simulation, or a reliable
+    /// estimate. None of its parameters may be 0.
     ///
     /// # Errors
     /// [`Error::SignalLength`]; [`Error::Setting`] for a factor that is not above 0; [`Error::UnstableLoop`] for the
@@ -78,8 +78,8 @@ impl TableOfStarts {
         })
     }
 
-    /// `(converged, all)` of the starts for which the condition is as asked: converged where no parameter is off by
-    /// more than `tolerance` of itself at the end.
+    /// `(converged, all)` of the starts with this result of the condition: converged if every parameter is within `tolerance` (relative) at
+    /// the end.
     pub fn converged(&self, verdict: Verdict, tolerance: f64) -> (usize, usize) {
         let such = || {
             self.runs

@@ -3,15 +3,16 @@
 //! Equations: see the head of `noise_model.rs`. The innovations' variance counts the fitted parameters and the
 //! noise model's coefficients as degrees of freedom that are spent.
 //!
-//! Rows whose reading is missing are 0 in both sums: the covariance is that of the readings that are there, and so is the likelihood behind the noise model.
+//! Rows whose reading is missing are 0 in both sums: the covariance is that of the readings that are there, and so is the likelihood after
+//! the noise model.
 //!
 //! Assumptions: the minimum was reached; the noise is stationary and independent of r, and, counted in samples, of one
 //! colour in all records; the model's structure is right.
 //!
-//! Figures, 4000 runs for each of eleven settings at 20 dB, n = 1 and 2, noise in the loop and on the record, white and
-//! coloured, levels known and estimated: 95 % intervals hold the truth in 94.2 to 96.0 % for every parameter, where those
-//! of a white residual hold it in 47 to 100 % (`cargo run --release -p fcloe --example coverage`). Where 30 % of the
-//! readings are missing at random, and a block of 10, of n = 2, noise in the loop, on the record, and coloured in open loop: in 93.5 to 96.2 % of 400 (`RUNS=400 cargo test
+//! Figures, 4000 runs for each of eleven settings at 20 dB, n = 1 and 2, noise in the loop and on the record, white and coloured, levels
+//! known and estimated: 95 % intervals contain the true value in 94.2 to 96.0 % for every parameter, where those of a white residual hold
+//! it in 47 to 100 % (`cargo run --release -p fcloe --example coverage`). Where 30 % of the readings are missing at random, and a block of
+//! 10, of n = 2, noise in the loop, on the record, and coloured in open loop: in 93.5 to 96.2 % of 400 (`RUNS=400 cargo test
 //! -p fcloe --test all coverage::missing -- --nocapture`).
 
 use ct_signals::student_half_width;
@@ -24,23 +25,23 @@ use crate::{ClosedLoop, Error, Fit, Problem};
 /// Orders of autoregressive noise that are tried: 0 to this.
 const MAX_ORDER: usize = 8;
 
-/// How well a fit is known.
+/// Uncertainty of a fit.
 #[derive(Debug, Clone, Serialize)]
 pub struct Uncertainty {
-    /// Covariance of theta, and of the estimated levels behind it (drive, then y, record by record).
+    /// Covariance of theta, and of the estimated levels after it (drive, then y, record by record).
     pub covariance: Vec<Vec<f64>>,
     /// Roots of its diagonal for theta.
     pub std_errors: Vec<f64>,
-    /// What the residual was found to be.
+    /// Noise model of the residual.
     pub noise: NoiseModel,
-    /// Standard errors of a white residual, for comparison: what is usually printed.
+    /// Standard errors for a white residual, for comparison with usual software.
     pub white_std_errors: Vec<f64>,
     /// Degrees of freedom.
     pub freedom: f64,
 }
 
 impl Uncertainty {
-    /// Half the width of the interval that holds the truth with probability `level` (0.95, say), for each of theta.
+    /// Half the width of the interval that contains the true value with probability `level` (0.95, say), for each of theta.
     ///
     /// # Errors
     /// [`Error::Setting`] unless the level is between 0 and 1.
@@ -87,7 +88,7 @@ impl Problem {
             .collect();
         let noise = NoiseModel::of_residuals(&residuals, &closed, path, MAX_ORDER)?;
 
-        // Each record has its own filter, from rest; from the process of the noise at its sampling interval.
+        // Each record has a separate filter that starts at rest, for the noise process at its sampling interval.
         let mut meat = vec![0.0; q * q];
         let processes = residuals
             .iter()
@@ -112,7 +113,7 @@ impl Problem {
 
         let n = self.samples() as f64;
         let freedom = (n - (q + noise.ar.order()) as f64).max(1.0);
-        // The model's sigma^2 is over n less its order.
+        // The model's sigma^2 is divided by n minus its order.
         let variance = noise.ar.sigma().powi(2) * (n - noise.ar.order() as f64) / freedom;
         let times = |i: usize, j: usize| -> f64 {
             (0..q)

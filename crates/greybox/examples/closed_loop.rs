@@ -19,7 +19,7 @@ mod support;
 const SAMPLES: usize = 800;
 const INTERVAL: f64 = 2.0;
 
-/// How the noise comes about: `v = a v + e + c e_before`.
+/// Noise model: `v = a v + e + c e_before`.
 #[derive(Clone, Copy)]
 struct Colour {
     name: &'static str,

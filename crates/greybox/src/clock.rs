@@ -6,18 +6,18 @@
 
 use ct_signals::Record;
 
-/// Where records stand on their clock.
+/// Common clock of the records.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Clock {
     /// Time stamp at which it begins \[s\].
     origin: f64,
     /// Time stamp at which the fitted records end \[s\]; infinite where they share no clock.
     end: f64,
-    /// When each record begins \[s\].
+    /// Start of each record \[s\].
     pub begins: Vec<f64>,
 }
 
-/// When each record begins on the clock that they share \[s\], the first at zero; `None` where they share none, and of one record.
+/// Start of each record on the common clock \[s\], the first at zero; `None` without a common clock, and for a single record.
 #[must_use]
 pub fn common_clock(records: &[Record]) -> Option<Vec<f64>> {
     let continues = |pair: &[Record]| match (pair[0].time.last(), pair[1].time.first()) {
@@ -34,8 +34,7 @@ pub fn common_clock(records: &[Record]) -> Option<Vec<f64>> {
     })
 }
 
-/// When each record begins on its own clock \[s\]: at zero, but for the parts into which one record was cut, which keep its name
-/// and go on with its clock.
+/// Start of each record on its own clock \[s\]: zero, except for parts of a cut record, which keep its name and its clock.
 fn of_each(records: &[Record]) -> Vec<f64> {
     let mut begins: Vec<f64> = Vec::with_capacity(records.len());
     for (k, record) in records.iter().enumerate() {
@@ -49,7 +48,7 @@ fn of_each(records: &[Record]) -> Vec<f64> {
     begins
 }
 
-/// What the clock shows in all records together \[s\]: their whole span, or the longest of them.
+/// Total time span of the records \[s\]: from the first start to the last end on a common clock, or the longest record.
 pub(crate) fn span(records: &[Record]) -> f64 {
     let begins = common_clock(records).unwrap_or_else(|| of_each(records));
     let ends = begins.iter().zip(records);
@@ -77,7 +76,7 @@ impl Clock {
         }
     }
 
-    /// The same clock for other records: those that begin after its end continue it.
+    /// The same clock for other records: records that begin after its end continue it.
     pub fn with_records(&self, records: &[Record]) -> Self {
         let own = Self::of(records).begins;
         let begins = records.iter().zip(own).map(|(record, own)| {
@@ -123,7 +122,7 @@ mod tests {
         assert_eq!(common_clock(&parts), Some(vec![0.0, 110.0, 400.0]));
         assert_eq!(span(&parts), 500.0);
         let clock = Clock::of(&parts);
-        // A held-out record later, one in between, one from its own zero.
+        // Held-out records: a later one, one in between, one with its own zero.
         let test = [
             record(700.0, 800.0),
             record(400.0, 450.0),
@@ -131,7 +130,7 @@ mod tests {
         ];
         assert_eq!(clock.with_records(&test).begins, [600.0, 0.0, 0.0]);
         assert_eq!(clock.with_records(&parts), clock);
-        // A single record has a clock of its own, which a later one continues.
+        // A single record has a separate clock, which a later record continues.
         let alone = Clock::of(&parts[..1]);
         assert_eq!(alone.begins, [0.0]);
         assert_eq!(alone.with_records(&parts[1..2]).begins, [110.0]);
@@ -141,7 +140,7 @@ mod tests {
     fn records_from_their_own_zero_share_none() {
         for records in [
             vec![record(0.0, 100.0), record(0.0, 300.0)],
-            // Out of order, overlapping, and begun at the instant at which the other ends.
+            // Out of order, overlapping, and with the same instant as end and start.
             vec![record(200.0, 300.0), record(0.0, 100.0)],
             vec![record(0.0, 100.0), record(50.0, 350.0)],
             vec![record(0.0, 100.0), record(100.0, 300.0)],

@@ -1,4 +1,4 @@
-//! What can go wrong in a fit.
+//! Errors of a fit.
 
 /// What can go wrong in a fit.
 #[derive(Debug, thiserror::Error)]
@@ -13,15 +13,15 @@ pub enum Error {
     /// No record was given.
     #[error("no record to fit: give at least one")]
     NoRecord,
-    /// A parameter is named that the structure does not have.
+    /// A parameter that the structure does not have.
     #[error("no parameter `{name}` in this model: it has {known}")]
     UnknownParameter {
         /// The name that was given.
         name: String,
-        /// The names that there are.
+        /// Names of the parameters.
         known: String,
     },
-    /// What is known of a parameter beside the records is no number with an error.
+    /// A prior is not a finite number with a positive standard error within the bounds.
     #[error(
         "[prior] {name} = [{value}, {std_error}]: the parameter lies between {lower:.4e} and {upper:.4e}; give a value there and a standard error above zero, in its unit"
     )]
@@ -30,9 +30,9 @@ pub enum Error {
         name: String,
         /// The value.
         value: f64,
-        /// Its standard error.
+        /// Standard error of the prior.
         std_error: f64,
-        /// The smallest value that a fit takes.
+        /// Smallest value of the fit.
         lower: f64,
         /// The largest.
         upper: f64,
@@ -44,9 +44,9 @@ pub enum Error {
     Outputs {
         /// The record.
         record: String,
-        /// How many it has.
+        /// Number in the record.
         given: usize,
-        /// How many the structure has.
+        /// Number in the model.
         needed: usize,
     },
     /// A record has another number of inputs than the model.
@@ -56,18 +56,18 @@ pub enum Error {
     Inputs {
         /// The record.
         record: String,
-        /// How many it has.
+        /// Number in the record.
         given: usize,
-        /// How many the model has.
+        /// Number in the model.
         needed: usize,
     },
-    /// The least squares have no answer.
+    /// The least-squares problem has no solution.
     #[error(transparent)]
     Estimation(#[from] estimation::Error),
-    /// Somebody said so by [`Setup::stop`](crate::Setup::stop).
+    /// Cancelled by [`Setup::stop`](crate::Setup::stop).
     #[error("stopped before it was done")]
     Stopped,
-    /// The loop cannot be simulated without what it was to follow.
+    /// The loop cannot be simulated without its reference.
     #[error(
         "{record}: the record holds no reference, which a controller follows: name its column as reference under [columns]"
     )]
@@ -75,14 +75,14 @@ pub enum Error {
         /// The record.
         record: String,
     },
-    /// The reference never moves.
+    /// The reference is constant.
     #[error(
         "{record}: the reference stays at {value}, so that nothing but noise moves the loop: take a record in which the set point changes"
     )]
     ConstantReference {
         /// The record.
         record: String,
-        /// Where it stays.
+        /// Constant value of the reference.
         value: f64,
     },
     /// A controller's command is held from sample to sample.

@@ -7,11 +7,11 @@
 //! ```text
 //! y - ym = v / (1 + P C),   v = (1 + P C) (y - ym)
 //! ```
-//! An integral in `C` takes the slow part out of `y - ym`, and the information on static parameters with it. So what the loop did
-//! is undone: `y - ym + P0 (um - u)`, at every output, `P0` the plant linearised once at a first fit, is `v` itself, limits or not, of which a noise
-//! model is then made. Without limits this is the filter `1 + P0 C` of `y - ym`. The derivatives are filtered alike, and hold no
-//! noise: the estimate is the one of an instrumental variable, unbiased whatever the colour of `v` and whatever `P0`, which
-//! only the variance hangs on. The determinant of what makes `v` of `y` is one, so likelihoods compare.
+//! An integral in `C` takes the slow part out of `y - ym`, and the information on static parameters with it. So what the loop did is
+//! undone: `y - ym + P0 (um - u)`, at every output, `P0` the plant linearised once at a first fit, is `v` itself, limits or not, of which a
+//! noise model is then made. Without limits this is the filter `1 + P0 C` of `y - ym`. The derivatives are filtered alike, and hold no
+//! noise: the estimate is the one of an instrumental variable, unbiased whatever the colour of `v` and whatever `P0`, which only the
+//! variance hangs on. The determinant of what makes `v` of `y` is one, so likelihoods compare.
 //!
 //! **Assumptions**: `y[k]` is read before `u[k]` acts; the command is held; the reference is not constant; nothing of `v`
 //! is in `r`.
@@ -32,20 +32,20 @@ use estimation::Triangle;
 
 use crate::Error;
 
-/// The controller on what was measured.
+/// The controller simulated on the measured signals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Replay {
     /// The controller's states when the record begins, those that fit the measured command best.
     pub states: Vec<f64>,
     /// The measured command less the controller's \[input unit\].
     pub beside: Vec<f64>,
-    /// Root mean square of `beside` \[input unit\].
+    /// Root mean square of the additional input \[input unit\].
     pub rms: f64,
     /// Standard deviation of the measured command \[input unit\].
     pub moves: f64,
 }
 
-/// Rounds in which the initial states are fitted: without limits the first one is exact.
+/// Rounds of the fit of initial states: without limits the first one is exact.
 const ROUNDS: usize = 6;
 
 /// Runs a controller on the measured reference and reading of a record, and compares the measured command with its own.
@@ -64,7 +64,7 @@ pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error>
         });
     }
     record.validate()?;
-    // The controller saw readings that the record lacks; a line between their neighbours stands for them.
+    // The controller used readings that the record lacks; they are interpolated linearly.
     let Some(read) = record.outputs.get(controller.output()) else {
         return Err(Error::Outputs {
             record: record.name.clone(),
@@ -97,7 +97,7 @@ pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error>
         (triangle, beside, rms)
     };
     let free: Vec<usize> = (0..n).collect();
-    // What it would be at no error, in the state that the command sees.
+    // Command at zero control error, for the state before saturation.
     let seen = controller.linear(1.0).c;
     let mut states: Vec<f64> = seen
         .iter()
@@ -143,7 +143,7 @@ pub struct LinearPlant {
     pub a: Vec<Vec<f64>>,
     /// b.
     pub b: Vec<f64>,
-    /// Of each output, which level it is.
+    /// Level of each output.
     pub outputs: Vec<usize>,
 }
 
@@ -218,7 +218,7 @@ impl Feedback {
         })
     }
 
-    /// Names and bounds of the controller's states in a record: within ten times what the command moves over.
+    /// Names and bounds of the controller's states in a record: within ten times the range of the command.
     pub(crate) fn entries(&self, record: usize, input: (f64, f64)) -> Vec<(String, (f64, f64))> {
         let room = 10.0 * (input.1 - input.0);
         let several = self.controller.states() > 1;
@@ -237,7 +237,7 @@ impl Feedback {
             .collect()
     }
 
-    /// What the commands of rows of so many columns do to the plant.
+    /// Response of the plant to the controller's commands, for rows with this number of columns.
     pub(crate) fn response(&self, columns: usize) -> Response {
         Response {
             plant: self.plant.clone(),
@@ -254,12 +254,12 @@ pub(crate) struct Response {
 }
 
 impl Response {
-    /// A record begins: initial states have columns of their own.
+    /// A record begins: its initial states have separate columns.
     pub(crate) fn reset(&mut self) {
         self.levels.fill(0.0);
     }
 
-    /// Adds to a row of an output what its commands so far did.
+    /// Adds the effect of earlier commands to a row of an output.
     pub(crate) fn add_to(&self, output: usize, row: &mut [f64]) {
         let read = self.plant.outputs[output] * row.len();
         for (value, level) in row.iter_mut().zip(&self.levels[read..]) {
@@ -270,7 +270,7 @@ impl Response {
     /// A step under the commands of a row.
     pub(crate) fn advance(&mut self, commands: &[f64]) {
         let (a, b) = (&self.plant.a, &self.plant.b);
-        // One pass over the columns: a row is short, and every loop over it would cost more than its sums.
+        // A single loop over the columns: rows are short, and the overhead of a loop exceeds the cost of its sums.
         if let [b0, b1] = b[..] {
             let [[a00, a01], [a10, a11]] = [[a[0][0], a[0][1]], [a[1][0], a[1][1]]];
             let (first, second) = self.levels.split_at_mut(commands.len());

@@ -6,16 +6,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Setup, random_starts, starts::extend_levels};
 
-/// How to fit.
+/// Options of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FitOptions {
-    /// How many random starts.
+    /// Number of random starts.
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
-    /// Largest order of the noise model that is tried; zero takes the noise for white.
+    /// Largest order of the noise model; zero assumes white noise.
     pub noise_order: usize,
-    /// When to stop.
+    /// Stopping criteria.
     pub stopping: Stopping,
 }
 
@@ -33,7 +33,7 @@ impl Default for FitOptions {
     }
 }
 
-/// Fits from random starts, with the noise's colour estimated.
+/// Fits from random starts, with the noise's spectrum estimated.
 ///
 /// # Errors
 /// Where no start gives a finite simulation.
@@ -57,7 +57,7 @@ pub fn fit_from(
     fit_onward(setup, starts, noise, stopping)
 }
 
-/// As [`fit_from`], from starts of which more may be known.
+/// As [`fit_from`], from starts with additional data.
 ///
 /// # Errors
 /// As [`fit_from`].
@@ -79,7 +79,7 @@ pub fn fit_onward(
     )
 }
 
-/// The fit's errors are those of a simulation on the measured command, whatever was fitted.
+/// The reported errors are always those of a simulation on the measured command.
 fn done(setup: &Setup, fit: Result<Fit, NoFit>) -> Result<Fit, Error> {
     if setup.stopped() {
         return Err(Error::Stopped);
@@ -92,7 +92,7 @@ fn done(setup: &Setup, fit: Result<Fit, NoFit>) -> Result<Fit, Error> {
     Ok(fit)
 }
 
-/// Estimates the noise's colour from a fit's residual and refits in that metric, until the two agree ([`estimation::coloured`]).
+/// Estimates the noise's spectrum from a fit's residual and refits in that metric, until the two agree ([`estimation::coloured`]).
 ///
 /// # Errors
 /// As [`fit_from`].
@@ -125,7 +125,7 @@ pub fn noise_of(setup: &Setup, fit: &Fit, order: usize) -> Result<Noise, Error> 
     Ok(estimation::noise_of(setup, fit, order)?)
 }
 
-/// The uncertainty of a fit under the colour of its own residual ([`estimation::robust`]).
+/// The uncertainty of a fit under the noise model of its own residual ([`estimation::robust`]).
 ///
 /// # Errors
 /// Where the simulation is not finite at the fit.

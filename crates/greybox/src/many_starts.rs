@@ -1,6 +1,6 @@
-//! Effects at the actuator with many starts: a plain simulation of each, and a regression, say which are worth linearising.
+//! Effects at the actuator with many starts: a plain simulation and a regression of each show which starts are linearised.
 //!
-//! The reading is linear in the pump's gain `K`, `y = K f(p) + ...`, `p` the command behind the effect. What the effect changes in a
+//! The reading is linear in the pump's gain `K`, `y = K f(p) + ...`, `p` the command after the effect. What the effect changes in a
 //! simulation with the gain `K0` is `D = K0 f(p) - K0 f(u)`, so the column of the gain at a start is `df/dK + D/K0`, with `df/dK` that of
 //! the model without the effect: a start costs one simulation in plain numbers and a regression on this one column. Of plants that are not
 //! linear this holds to first order.
@@ -11,20 +11,21 @@ use rayon::prelude::*;
 
 use crate::Setup;
 
-/// What hides much of the command from the plant, and so how quick the plant is.
+/// Effects that keep much of the command from the plant, and so affect its apparent speed.
 const STICKS: &str = "stiction_backlash";
 const SATURATES: &str = "pump_saturation";
-/// Time constants of linear plants, in samples, from which their fits begin beside the one that the model without them has, ...
+/// Time constants of linear plants, in samples, for further starts in addition to the time constant of the model without the effect, ...
 const TIME_CONSTANTS: [f64; 3] = [1.0, 12.0, 150.0];
-/// ... and one in lengths of the record: a plant that integrates.
+/// ... and one in multiples of the record's length: an integrating plant.
 const INTEGRATES: f64 = 10.0;
-/// Tanks: by how much quicker than the model without them has it.
+/// For tanks: ratios to the speed of the model without the effect.
 const QUICKER: [f64; 3] = [0.3, 3.0, 9.0];
 
 /// Plants that are quicker or slower than one, in front of which something sticks or saturates; none for other effects.
 ///
-/// A model without it answers to commands that move nothing. It imitates what the plant does then by a small gain and another time
-/// constant, a much longer one or none at all. Of tanks the gain and the outflows are taken more or less together: the levels stay.
+/// A model without the effect responds to commands that do not move the real actuator. Its fit compensates for this by a small gain and
+/// another time constant, a much longer one or none at all. For tanks the gain and the outflows are scaled together, so that the levels do
+/// not change.
 #[must_use]
 pub fn with_other_speeds(setup: &Setup, placed: Placed, x: &[f64]) -> Vec<Vec<f64>> {
     let plant = setup.structure.plant;
@@ -43,7 +44,7 @@ pub fn with_other_speeds(setup: &Setup, placed: Placed, x: &[f64]) -> Vec<Vec<f6
         let all = sampled.into_iter().chain([INTEGRATES * scales.duration]);
         return all.filter(|_| !lags.is_empty()).map(with).collect();
     }
-    // Where a valve sticks there are too many starts already.
+    // With valve stiction there are already many starts.
     let own = plant.parameters(&setup.structure.scales).len();
     let all_free = (0..own).all(|at| setup.free().contains(&at));
     if plant.joined() || effect != SATURATES || !all_free {
@@ -59,7 +60,7 @@ pub fn with_other_speeds(setup: &Setup, placed: Placed, x: &[f64]) -> Vec<Vec<f6
     QUICKER.map(with).to_vec()
 }
 
-/// Where the fitted time constants of a plant stand in the vector.
+/// Positions of the fitted time constants of a plant in the parameter vector.
 fn time_constants(setup: &Setup) -> Vec<usize> {
     let lags = ["tau", "tau1", "tau2"];
     let free = setup.free().iter().copied();
@@ -67,13 +68,13 @@ fn time_constants(setup: &Setup) -> Vec<usize> {
         .collect()
 }
 
-/// What is left out where the time limit has passed.
+/// Step that is left out if the time limit has passed.
 const STARTS: &str = "further starts of effects at the actuator";
-/// Damping of the step by the other parameters, against what the data do not determine.
+/// Damping of the step in the other parameters, for directions that the data do not determine.
 const DAMPING: f64 = 1e-9;
-/// With more starts than this an effect at the actuator is simulated from all of them, without derivatives, before it is linearised ...
+/// With more starts than this, an effect at the actuator is simulated from all of them, without derivatives, before it is linearised ...
 const MANY: usize = 20;
-/// ... at so many, the best.
+/// ... at this number of the best ones.
 const LINEARISED: usize = 12;
 
 /// Of many starts of an effect at the actuator keeps those whose simulations fit best, once the gain of the pump and, to first order,
@@ -99,7 +100,7 @@ pub fn keep_best_simulated(
         .filter(|&j| !apart.contains(&setup.free()[j]))
         .collect();
     let best = ranked.into_par_iter().map(|(simulated, mut start)| {
-        // With a gain of the wrong sign the slopes by time constants would have the wrong sign too.
+        // With the wrong sign of the gain, the derivatives with respect to time constants would have the wrong sign too.
         if let Some(gain) = simulated.gain {
             start[placed.vessel] = within(gain, setup.bounds()[placed.vessel]);
         }
@@ -108,7 +109,7 @@ pub fn keep_best_simulated(
     starts.par_extend(best);
 }
 
-/// A start with the other parameters fitted to it in one step, by those of the free ones that are named, where that is a better one.
+/// A start with the other parameters fitted in one step, with derivatives for the given free ones, if the cost falls.
 fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &Noise) -> Vec<f64> {
     let triangle = (!setup.leaves_out(STARTS)).then(|| setup.linearise(&start, noise));
     let Some(triangle) = triangle.flatten() else {
@@ -129,7 +130,7 @@ fn settled(setup: &Setup, start: Vec<f64>, linear: &[usize], noise: &Noise) -> V
     }
 }
 
-/// Where the effect's own parameters stand in the vector, and those of time constants, which are not fitted at a start.
+/// Positions of the effect's own parameters in the vector, and of time constants, which are not fitted at a start.
 fn apart(setup: &Setup, placed: Placed) -> Vec<usize> {
     let own = format!("{}.", placed.effect.id);
     let named = setup.names()[..setup.parameter_count()].iter().enumerate();
@@ -141,16 +142,16 @@ fn apart(setup: &Setup, placed: Placed) -> Vec<usize> {
     apart
 }
 
-/// What a simulation says of a start.
+/// Result of the simulation from a start.
 #[derive(Clone, Copy)]
 struct Simulated {
-    /// What is left of the sum of squares.
+    /// Sum of squares after the linear fit.
     left: f64,
-    /// The pump's gain, where it is fitted.
+    /// The pump's gain, if it is fitted.
     gain: Option<f64>,
 }
 
-/// What the simulation of each start says.
+/// Scores of the simulations from all starts.
 fn scores_of_simulations(
     setup: &Setup,
     placed: Placed,
@@ -166,7 +167,7 @@ fn scores_of_simulations(
             Some((at, info.absent))
         })
         .collect();
-    // Starts that differ in more than the effect have their own model without it.
+    // Starts that differ in more than the effect have separate models without the effect.
     let without = |start: &Vec<f64>| {
         let mut without = start.clone();
         for &(at, absent) in &own {
@@ -181,7 +182,7 @@ fn scores_of_simulations(
             models.push(without);
         }
     }
-    // Outputs count against each other as in the first model, the same for all.
+    // Outputs have the weights of the first model in all comparisons.
     let weights = match setup.outputs() {
         1 => vec![1.0],
         _ => models
@@ -189,8 +190,8 @@ fn scores_of_simulations(
             .find_map(|x| estimation::squares(setup, x, noise))?
             .weights(),
     };
-    // The effect's own columns take no part; those of time constants only where the model fits best without the effect, since elsewhere
-    // they are not near what they will be.
+    // The effect's own columns are not used; those of time constants only where the model fits best without the effect, because elsewhere
+    // the time constants are far from their final values.
     let simulated = |x: &Vec<f64>| {
         let left = (!setup.leaves_out(STARTS)).then(|| whitened(setup, x, noise, &weights));
         left.flatten()
@@ -230,12 +231,12 @@ fn scores_of_simulations(
     Some(scores.map(|score| score.unwrap_or(none)).collect())
 }
 
-/// What a model leaves of the records, whitened and weighted.
+/// Residuals of a model on the records, whitened and weighted.
 fn whitened(setup: &Setup, x: &[f64], noise: &Noise, weights: &[f64]) -> Option<Vec<f64>> {
     let series = noise.whiten(&setup.disturbance(x).ok()?);
     let weighted = series.iter().zip(weights.iter().cycle());
     let all = weighted.flat_map(|(series, weight)| series.iter().map(move |v| v * weight));
-    // Rows of missing samples take no part here as in the columns.
+    // Rows of missing samples are left out, as in the columns.
     Some(all.filter(|value| !value.is_nan()).collect())
 }
 
@@ -245,16 +246,16 @@ struct WithoutEffect {
     /// The pump's gain.
     gain: f64,
     residual: Vec<f64>,
-    /// The column of the pump's gain, times the gain; where the gain is known only the simulation itself counts.
+    /// The column of the pump's gain, times the gain; for a known gain, only the simulation itself.
     by_gain: Option<Vec<f64>>,
-    /// The residual and that column together, without what the other parameters explain of them.
+    /// The residual and that column, both without the part that the other parameters explain.
     wanted: Vec<f64>,
     /// The other parameters' columns, orthonormal.
     basis: Vec<Vec<f64>>,
 }
 
 impl WithoutEffect {
-    /// `apart`: places of parameters that do not take part; `gain`: of the pump's gain.
+    /// `apart`: positions of parameters that do not take part; `gain`: position of the pump's gain.
     fn at(
         x: Vec<f64>,
         apart: &[usize],
@@ -296,7 +297,7 @@ impl WithoutEffect {
         })
     }
 
-    /// The model with the effect, of which the simulation leaves `left`, once gain and other parameters are fitted.
+    /// The model with the effect, with the residual sum of squares `left` after a fit of the gain and the other parameters.
     fn with(&self, mut left: Vec<f64>) -> Simulated {
         let Some(by_gain) = &self.by_gain else {
             project(&mut left, &self.basis);
@@ -305,7 +306,7 @@ impl WithoutEffect {
                 gain: None,
             };
         };
-        // The column of the gain there, times the gain.
+        // The column of the gain, times the gain.
         let before = self.residual.iter().zip(by_gain);
         for (left, (residual, by_gain)) in left.iter_mut().zip(before) {
             *left = by_gain + residual - *left;
@@ -327,7 +328,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Takes out of a column what lies along an orthonormal basis.
+/// Subtracts the projection of a column on an orthonormal basis.
 fn project(column: &mut [f64], basis: &[Vec<f64>]) {
     for unit in basis {
         let along = dot(column, unit);
@@ -337,8 +338,8 @@ fn project(column: &mut [f64], basis: &[Vec<f64>]) {
     }
 }
 
-/// Makes a column one of length one that is orthogonal to a basis, and says how long it was then; `None` where it lies in the basis, but
-/// for rounding.
+/// Orthonormalises a column to a basis, and returns its length before normalisation; `None` if it is in the span of the basis, up to
+/// rounding.
 fn orthogonalise(column: &mut [f64], basis: &[Vec<f64>]) -> Option<f64> {
     const ROUNDING: f64 = 1e-7;
     let before = dot(column, column).sqrt();

@@ -1,8 +1,9 @@
-//! Starts from fits beside an observer: the readings pull the states that they read.
+//! Start values from observer fits: the readings correct the measured states.
 //!
-//! The simulation error of a model that oscillates, or that a loop drives, has many local minima: a slightly wrong frequency is out of phase
-//! after a few periods. Where each state that is read follows its reading at a rate, errors do not add up, and the criterion is nearly that of
-//! equation errors: it has few minima, and its bias does not matter for a start. The rate is lowered in steps, until the model runs freely.
+//! The simulation error of a model that oscillates, or that a loop drives, has many local minima: a slightly wrong frequency is out of
+//! phase after a few periods. Where each state that is read follows its reading at a rate, errors do not add up, and the criterion is
+//! nearly that of equation errors: it has few minima, and its bias does not matter for a start. The rate is lowered in steps, until the
+//! model runs freely.
 //!
 //! **Reference**: L. Ljung, System Identification, 2nd ed. (1999), sections 4.3 (predictors with an observer) and 10.5 (initial values);
 //! H. G. Bock, in: Modelling of Chemical Reaction Systems, Springer (1981), 102-125 (shooting that is tied to the readings).
@@ -13,9 +14,9 @@ use estimation::{Noise, Stopping, fit_from, within};
 
 use crate::ModelSetup;
 
-/// Rates at which states follow their readings, one after the other, per interval between rows.
+/// Gains with which states follow their readings, one after the other, per interval between rows.
 const RATES: [f64; 3] = [0.5, 0.1, 0.02];
-/// The fit at a rate: it is a start only.
+/// Stopping criteria of the fit with a gain: its result is only a start.
 const STOPPING: Stopping = Stopping {
     evaluations: 30,
     cost: 1e-4,
@@ -25,7 +26,7 @@ fn product(a: Expression, b: Expression) -> Expression {
     Expression::Binary(Operator::Multiply, Box::new(a), Box::new(b))
 }
 
-/// Outputs that show a state as it is, each with its state.
+/// Outputs that equal a state, each with its state.
 fn shown(spec: &ModelSpec) -> Vec<(usize, usize)> {
     let outputs = spec.outputs.iter().enumerate();
     let state = |(o, output): (usize, &Output)| {
@@ -38,7 +39,7 @@ fn shown(spec: &ModelSpec) -> Vec<(usize, usize)> {
     outputs.filter_map(state).collect()
 }
 
-/// The model in which these states follow the readings of their outputs, which are further inputs in this order.
+/// The model in which these states follow the readings of their outputs, which are additional inputs in this order.
 fn observed(spec: &ModelSpec, shown: &[(usize, usize)], rate: f64) -> ModelSpec {
     let mut observed = spec.clone();
     for &(o, i) in shown {
@@ -70,7 +71,7 @@ fn observed(spec: &ModelSpec, shown: &[(usize, usize)], rate: f64) -> ModelSpec 
 }
 
 impl ModelSetup<'_> {
-    /// Where fits beside observers of falling rates lead from a start; `None` where no output shows a state.
+    /// Result of observer fits with decreasing gain from a start; `None` if no output depends on a state.
     pub(crate) fn observed_from(&self, start: &[f64]) -> Option<Vec<f64>> {
         let rows: usize = self.records().iter().map(|record| record.len() - 1).sum();
         let duration: f64 = self.records().iter().map(Record::duration).sum();

@@ -1,4 +1,4 @@
-//! A model of its user's text against records: the vector that is fitted, its bounds, its starts.
+//! Fit of a user's own model to records: the vector of parameters, its bounds, its starts.
 //!
 //! The fitted vector holds the parameters in the order of the text, then for every record the initial values of the states. Time is that
 //! of the records, in units of the model's time: `der()` is per such a unit. Inputs are held from row to row, or run in straight lines, as
@@ -27,7 +27,7 @@ pub struct ModelSetup<'a> {
     time_unit: f64,
     clock: Clock,
     names: Vec<String>,
-    /// Where fits begin; fixed entries stay there.
+    /// Start values of fits; fixed entries keep them.
     start: Vec<f64>,
     bounds: Vec<(f64, f64)>,
     free: Vec<usize>,
@@ -39,12 +39,12 @@ pub struct ModelSetup<'a> {
     interrupt: Option<&'a AtomicBool>,
 }
 
-/// ... and an initial state within this one.
+/// ... and an initial state within this factor.
 const STATE_REACH: f64 = 300.0;
-/// Rounds in which outputs are weighted anew by their noise.
+/// Number of iterations of the output weights.
 const WEIGHTINGS: usize = 3;
 impl<'a> ModelSetup<'a> {
-    /// The same with a limit: once it has passed, or `interrupt` is set, fits take no further steps.
+    /// Adds a time limit: once it has passed, or `interrupt` is set, fits take no further steps.
     #[must_use]
     pub fn with_time_limit(self, limit: Arc<TimeLimit>, interrupt: Option<&'a AtomicBool>) -> Self {
         Self {
@@ -54,7 +54,7 @@ impl<'a> ModelSetup<'a> {
         }
     }
 
-    /// The same with what is known of parameters beside the records.
+    /// Adds priors of parameters.
     ///
     /// # Errors
     /// Where the model has no parameter of a name, or a value or its standard error cannot be.
@@ -64,7 +64,7 @@ impl<'a> ModelSetup<'a> {
         Ok(self)
     }
 
-    /// The same model and clock against other records, every parameter fixed at its value in a fitted vector: initial states are fitted.
+    /// The model and clock with other records, every parameter fixed at its value in a fitted vector: only initial states are fitted.
     ///
     /// # Errors
     /// As [`ModelSetup::new`].
@@ -80,7 +80,7 @@ impl<'a> ModelSetup<'a> {
         Ok(setup.limited_as(self))
     }
 
-    /// The same model, clock and fitted parameters against other records, without priors.
+    /// The model, clock and fitted parameters with other records, without priors.
     ///
     /// # Errors
     /// As [`ModelSetup::new`].
@@ -102,7 +102,7 @@ impl<'a> ModelSetup<'a> {
             .collect()
     }
 
-    /// The same with the limits of another one.
+    /// Uses the limits of another setup.
     pub(crate) fn limited_as(self, other: &ModelSetup<'a>) -> Self {
         Self {
             time_limit: other.time_limit.clone(),
@@ -133,13 +133,13 @@ impl<'a> ModelSetup<'a> {
         &self.names
     }
 
-    /// How many entries are parameters.
+    /// Number of entries that are parameters.
     #[must_use]
     pub fn parameter_count(&self) -> usize {
         self.model.spec().parameters.len()
     }
 
-    /// Where fits begin.
+    /// Start values of fits.
     #[must_use]
     pub fn start(&self) -> &[f64] {
         &self.start
@@ -151,7 +151,7 @@ impl<'a> ModelSetup<'a> {
         self.model
     }
 
-    /// The same of which only these of its fitted entries are fitted.
+    /// Restricts the fit to these entries of the fitted ones.
     #[must_use]
     pub fn with_free(&self, only: &[usize]) -> Self {
         let mut setup = self.clone();
@@ -159,7 +159,7 @@ impl<'a> ModelSetup<'a> {
         setup
     }
 
-    /// The same with the standard deviation of each output's noise known: outputs count by them, and not by their residuals.
+    /// Sets the known standard deviation of each output's noise: outputs are weighted by these, and not by their residuals.
     #[must_use]
     pub fn with_scales(self, scales: Vec<f64>) -> Self {
         Self {
@@ -168,8 +168,8 @@ impl<'a> ModelSetup<'a> {
         }
     }
 
-    /// Standard deviation of the noise of each output as a linear prediction from the past leaves it, which what the model lacks hardly enters;
-    /// that of the residual where there are too few samples. `None` where the simulation cannot go on.
+    /// Standard deviation of the noise of each output, from a linear prediction from the past, which is nearly independent of model errors;
+    /// that of the residual if there are too few samples. `None` if the simulation diverges.
     #[must_use]
     pub fn output_noise(&self, x: &[f64]) -> Option<Vec<f64>> {
         let simulated = self.simulate(x)?;
@@ -203,7 +203,7 @@ impl<'a> ModelSetup<'a> {
             .collect()
     }
 
-    /// How many outputs.
+    /// Number of outputs.
     #[must_use]
     pub fn outputs(&self) -> usize {
         self.samples.len()
@@ -219,7 +219,7 @@ impl<'a> ModelSetup<'a> {
         self.bounds[i]
     }
 
-    /// An entry is the initial value of a state that an output reads.
+    /// Whether an entry is the initial value of a state that an output measures.
     pub(crate) fn is_read(&self, i: usize) -> bool {
         let spec = self.model.spec();
         i.checked_sub(self.parameter_count()).is_some_and(|i| {
@@ -237,7 +237,7 @@ impl<'a> ModelSetup<'a> {
         self.records.iter().map(first).collect()
     }
 
-    /// The same model, entries and starts against other records of the same number, outputs and time.
+    /// The model, entries and starts with other records of the same number, outputs and time.
     #[must_use]
     pub fn against<'b>(&self, records: &'b [Record]) -> ModelSetup<'b>
     where
@@ -250,8 +250,8 @@ impl<'a> ModelSetup<'a> {
         }
     }
 
-    /// Fits from many starts. Of several outputs each counts by its noise, which is what the past of its residual does not explain: where the
-    /// model fails at one output, that does not make the others' readings worth more.
+    /// Fits from many starts. Outputs are weighted by their noise, estimated from the part of the residual that its past does not predict:
+    /// a model error at one output does not increase the weight of the others.
     ///
     /// # Errors
     /// Where no start gives a finite simulation.
@@ -284,8 +284,8 @@ impl<'a> ModelSetup<'a> {
         Ok(fit)
     }
 
-    /// The uncertainty of a fit under the noise of its residual, of order zero to `order` at each output ([`estimation::robust`]): [`Self::fit`]
-    /// takes the noise for white.
+    /// The uncertainty of a fit under the noise of its residual, of order zero to `order` at each output ([`estimation::robust`]):
+    /// [`Self::fit`] takes the noise for white.
     ///
     /// # Errors
     /// Where the simulation is not finite at the fit.
@@ -293,7 +293,7 @@ impl<'a> ModelSetup<'a> {
         Ok(estimation::robust(self, fit, order)?)
     }
 
-    /// The initial states that fit best with all else fixed, in white noise.
+    /// The initial states that fit best with all else fixed, with white noise.
     ///
     /// # Errors
     /// Where the simulation is not finite.

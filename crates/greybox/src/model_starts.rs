@@ -1,9 +1,9 @@
-//! Where fits of a model of its user's text begin.
+//! Start values of fits of a user's own model.
 //!
-//! What such a model is like nobody knows ahead, so starts are of four kinds: the values of the text; the best of many points around them, by
-//! a simulation of each without derivatives; what fits beside observers lead to ([`crate::model_observer`]); and what fits of growing first
-//! parts of the records lead to, as a criterion over a long record has many local minima that one over a short record has not (L. Ljung,
-//! System Identification, 2nd ed., 1999, section 10.5).
+//! What such a model is like is not known ahead, so starts are of four kinds: the values of the text; the best of many points around them,
+//! by a simulation of each without derivatives; what fits beside observers lead to ([`crate::model_observer`]); and what fits of growing
+//! first parts of the records lead to, as a criterion over a long record has many local minima that one over a short record has not (L.
+//! Ljung, System Identification, 2nd ed., 1999, section 10.5).
 //!
 //! The points are a scrambled Sobol sequence (A. B. Owen, Journal of Complexity 14 (1998) 466-489), in the logarithm of what has a sign.
 
@@ -14,21 +14,21 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::ModelSetup;
 
-/// Spread of the starts of parameters, of their logarithm: a guess is off by a factor of two as often as not ...
+/// Spread of the starts of parameters, in logarithms: half of the guesses are wrong by more than a factor of two ...
 const SPREAD: f64 = 0.8;
-/// ... and of the initial states that no output reads.
+/// ... and of the initial states that no output measures.
 const STATE_SPREAD: f64 = 0.5;
-/// So many points are simulated for every start that is fitted.
+/// Number of simulated points per fitted start.
 const POINTS: usize = 16;
-/// The first parts of the records that are fitted one after the other, as shares of each.
+/// The first parts of the records, which are fitted one after the other, as shares of each.
 const HORIZONS: [f64; 3] = [0.03, 0.1, 0.3];
 /// The least samples of a first part for every fitted number.
 const LEAST: usize = 4;
-/// From so many starts the first parts are fitted.
+/// Number of starts for the fits of growing first parts.
 const GROWING: usize = 4;
-/// From so many starts fits beside observers begin.
+/// Number of starts for the observer fits.
 const OBSERVED: usize = 2;
-/// The sequence has so many dimensions; what comes after them stays at its start.
+/// Dimensions of the sequence; later parameters keep their start values.
 const DIMENSIONS: usize = 256;
 
 impl ModelSetup<'_> {
@@ -69,7 +69,7 @@ impl ModelSetup<'_> {
         starts.into_iter().map(Start::from).collect()
     }
 
-    /// Where fits of growing first parts of the records lead from a start; `None` where these are too short.
+    /// Result of fits of growing first parts of the records from a start; `None` if these are too short.
     fn grown(&self, start: &[f64], noise: &Noise, stopping: Stopping) -> Option<Vec<f64>> {
         let mut x = None;
         for share in HORIZONS {
@@ -93,7 +93,7 @@ impl ModelSetup<'_> {
         let Ok(normal) = Normal::new(0.0, 1.0) else {
             return Vec::new();
         };
-        // Every four dimensions of a seed are scrambled alike; the seed of the fit scrambles all.
+        // Groups of four dimensions are scrambled equally; the seed of the fit scrambles all.
         let seed = (seed ^ (seed >> 32)) as u32;
         let spread: Vec<usize> = self
             .free()
@@ -113,11 +113,11 @@ impl ModelSetup<'_> {
         (0..n).map(point).collect()
     }
 
-    /// An entry so many deviations from its start.
+    /// An entry at this number of deviations from its start.
     fn moved(&self, i: usize, draw: f64) -> f64 {
         let (value, (low, high)) = (self.start()[i], self.bound(i));
         if i >= self.parameter_count() {
-            // A state may be near zero by chance: what it may reach says how far off it may be.
+            // A state may be near zero by chance: its bounds give the scale of its uncertainty.
             let reach = if value == 0.0 { 1.0 } else { value.abs() };
             return value + STATE_SPREAD * draw * reach;
         }

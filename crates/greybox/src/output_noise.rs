@@ -1,4 +1,4 @@
-//! How large the noise of each measured output is, whatever the model lacks.
+//! Noise level of each measured output, estimated independently of model errors.
 //!
 //! The residual of a model that lacks something holds more than noise, and more at one output than at another. What the noise is shows in a
 //! linear prediction of the reading from all that is known at its instant: the model's own output and its past, the readings before it,
@@ -15,7 +15,7 @@ use estimation::Triangle;
 const PAST: usize = 24;
 /// Rows of inputs and readings of other outputs before.
 const PAST_OF_OTHERS: usize = 12;
-/// So many samples for every coefficient are needed at least; with fewer the prediction takes less of the past.
+/// Least number of samples per coefficient; with fewer samples the prediction uses a shorter past.
 const SAMPLES: usize = 5;
 
 /// The standard deviation of each output's noise \[its unit\]; `None` where there are too few samples to tell.
@@ -59,8 +59,8 @@ fn slowest(records: &[Record]) -> usize {
     slowest.unwrap_or(1)
 }
 
-/// The sum of squares that the prediction of one output leaves, so many rows ahead from so many past readings; over how many samples, and
-/// its coefficients.
+/// Sum of squares of the prediction error of one output, for the given number of rows ahead and of past readings; with the number of
+/// samples, and of coefficients.
 fn prediction(
     records: &[Record],
     model: &[Vec<f64>],
@@ -78,7 +78,7 @@ fn prediction(
     let mut samples = 0;
     for (r, record) in records.iter().enumerate() {
         let series = |o: usize| &record.outputs[o].values;
-        // Outputs may be sampled at rates of their own: the past of each is its last readings that are there.
+        // Outputs may have different rates: the past of each is its last present readings.
         let there: Vec<Vec<usize>> = (0..outputs).map(|o| read_rows(series(o))).collect();
         let own = &there[output];
         for &k in own {
@@ -93,7 +93,7 @@ fn prediction(
             let simulated = &model[r * outputs + output];
             values.extend(before.iter().chain([&k]).map(|&j| simulated[j]));
             for input in &record.inputs {
-                // Before this row alone: in a loop the input of a row answers to the reading of that row.
+                // Rows before this one only: in a loop the input of a row depends on the reading of that row.
                 values.extend((1..=others).map(|lag| input.values[k.saturating_sub(lag)]));
             }
             for other in (0..outputs).filter(|o| *o != output) {
@@ -123,7 +123,8 @@ mod tests {
 
     use super::*;
 
-    /// Noise of one colour in two outputs, the second of which is read at every fifth row: they weigh as their deviations say.
+    /// Two outputs with the same noise spectrum, the second one read at every fifth row: their weights follow from their standard
+    /// deviations.
     #[test]
     fn coloured_noise_of_a_slow_output_weighs_as_its_deviation() {
         const ROWS: usize = 4000;

@@ -1,12 +1,12 @@
-//! The outputs of a fitted model on other inputs, and how well they are known.
+//! The outputs of a fitted model on other inputs, and their uncertainty.
 //!
 //! To first order the simulated output moves with the parameters and the initial states by its exact sensitivities `S_p` and `S_x`:
 //! ```text
 //! dy = S_p dp + S_x dx0,     dx0 = A dp + e,     cov(y) = (S_p + S_x A) P (S_p + S_x A)' + S_x B S_x'
 //! ```
 //! `P` is the covariance of the parameters under the noise of the residual. Initial states are fitted to the first readings of the other
-//! record, in the metric of that noise, with the parameters held at `p`: with `[J_x J_p]` the whitened sensitivities of these readings,
-//! `A = -(J_x' J_x)^-1 J_x' J_p` and `B = (J_x' J_x)^-1`. Where the record has no readings they are what the model's text says: `A` is the
+//! record, weighted by that noise model, with the parameters held at `p`: with `[J_x J_p]` the whitened sensitivities of these readings, `A
+//! = -(J_x' J_x)^-1 J_x' J_p` and `B = (J_x' J_x)^-1`. Where the record has no readings they are what the model's text says: `A` is the
 //! slope of that, `B` is zero.
 //!
 //! **Assumption**: the model is the plant, and close to linear in its parameters over their errors. What a model lacks is in no band.
@@ -21,14 +21,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// How well the parameters of a fit are known, and how large the noise of readings is.
+/// Uncertainty of the parameters of a fit, and standard deviation of the readings' noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitUncertainty {
-    /// Positions in the vector of the parameters that have an error: fitted ones that are not at a bound.
+    /// Positions in the vector of the parameters with a standard error: fitted ones that are not at a bound.
     pub entries: Vec<usize>,
-    /// Their covariance, row by row \[product of their units\].
+    /// Covariance of the parameters, row by row \[product of their units\].
     pub covariance: Vec<Vec<f64>>,
-    /// Degrees of freedom: the quantile of Student's distribution with as many makes a band of a standard error.
+    /// Degrees of freedom: the quantile of Student's distribution times the standard error gives a band.
     pub freedom: f64,
     /// The noise of the residual at each output, with the scale of its innovations \[output unit\].
     pub noise: Noise,
@@ -37,8 +37,8 @@ pub struct FitUncertainty {
 }
 
 impl FitUncertainty {
-    /// Of the first `parameters` entries of a fit's vector, under autoregressive noise of order zero to `order` at each output; `None` where
-    /// the records do not determine all that was fitted.
+    /// Uncertainty of the first `parameters` entries of a fit's vector, under autoregressive noise of order zero to `order` at each output;
+    /// `None` if the records do not determine all fitted entries.
     ///
     /// # Errors
     /// Where the model is not finite at the fit.
@@ -87,13 +87,13 @@ impl FitUncertainty {
         }))
     }
 
-    /// Half the width of the band that holds with probability `level` (0.95, say), for one standard error.
+    /// Half the width of the band with coverage `level` (0.95, say), in standard errors.
     #[must_use]
     pub fn quantile(&self, level: f64) -> f64 {
         ct_signals::student_half_width(level, self.freedom)
     }
 
-    /// Adds an error that moves all entries together, by these amounts \[unit of each entry of the vector\].
+    /// Adds an error that changes all entries together, by these amounts \[unit of each entry of the vector\].
     pub fn widen(&mut self, moved: &[f64]) {
         for (row, &i) in self.covariance.iter_mut().zip(&self.entries) {
             for (value, &j) in row.iter_mut().zip(&self.entries) {
@@ -106,11 +106,11 @@ impl FitUncertainty {
 /// Initial states of a simulation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InitialStates {
-    /// Their values \[unit of the state\].
+    /// Values of the initial states \[unit of the state\].
     pub values: Vec<f64>,
-    /// How each moves with each of [`FitUncertainty::entries`], a row for each state.
+    /// Derivatives with respect to [`FitUncertainty::entries`], a row for each state.
     by_parameters: Vec<Vec<f64>>,
-    /// Covariance of what else is not known of them, row by row.
+    /// Covariance of the remaining uncertainty of the states, row by row.
     covariance: Vec<Vec<f64>>,
 }
 
@@ -126,7 +126,7 @@ impl InitialStates {
         }
     }
 
-    /// What the text of a model says for these parameters; `entries` as [`FitUncertainty::entries`].
+    /// Initial states from the text of a model for these parameters; `entries` as [`FitUncertainty::entries`].
     #[must_use]
     pub fn of_text(model: &Model, parameters: &[f64], entries: &[usize]) -> Self {
         const LANES: usize = 4;
@@ -146,8 +146,7 @@ impl InitialStates {
         states
     }
 
-    /// A function of the parameters, whose slopes are taken by differences over a hundredth of each standard error; `None` where it has no
-    /// value.
+    /// A function of the parameters, with slopes by differences over a hundredth of each standard error; `None` if it has no value.
     #[must_use]
     pub fn of_parameters(
         values: impl Fn(&[f64]) -> Option<Vec<f64>>,
@@ -172,7 +171,7 @@ impl InitialStates {
         Some(states)
     }
 
-    /// Fitted to the readings of a record with the parameters as they are; `None` where the readings do not determine them.
+    /// Fitted to the readings of a record with constant parameters; `None` if the readings do not determine them.
     ///
     /// `frozen` and `model` are the same model against the same one record: the states alone are free in the first, all of
     /// [`FitUncertainty::entries`] too in the second. `x`: the parameters, then where the states start.
@@ -215,7 +214,7 @@ impl InitialStates {
         let Some(inverse) = triangle.covariance(&own) else {
             return Ok(None);
         };
-        // A state that no reading speaks of is neither at a bound nor known.
+        // A state without influence on any reading is neither at a bound nor known.
         let silent = |c: usize| fit.triangle.column_norm(c) <= 0.0;
         if (0..free_states).any(silent) {
             return Ok(None);
@@ -294,7 +293,7 @@ pub fn output_errors(
     Some(errors)
 }
 
-/// A model whose outputs count by a noise that is known.
+/// A model whose outputs are weighted by known noise.
 struct Weighted<'m, M> {
     model: &'m M,
     scales: &'m [f64],

@@ -1,28 +1,28 @@
-//! Whether the readings of records lie on a grid, `y = offset + k D`, as those of a converter or of a file with few digits do.
+//! Whether the readings of records are on a grid, `y = offset + k D`, as after a converter or in a file with few digits.
 //!
 //! A converter rounds what the sensor says with its noise, so the readings themselves are the grid: it is seen without any model and
 //! without any fit. Digits of a file are a grid too; whether a grid matters is a question of its step against the noise
 //! ([`ReadingGrid::coarseness`]).
 //!
 //! # Method
-//! Differences of neighbours among the sorted levels, and of readings that follow each other, are multiples of `D`. Quantiles of
-//! either, and these over small whole numbers, are candidates. A candidate is refined by least squares, `d = k D`, over
-//! differences of levels that stand 1, 2, 4, ... places apart: each doubling may trust its `k`, since the one before has made `D`
-//! as much more precise. The largest candidate on whose grid nearly all readings lie is the answer, unless as many levels lie there by chance.
+//! Differences of neighbours among the sorted levels, and of readings that follow each other, are multiples of `D`. Quantiles of either,
+//! and these over small whole numbers, are candidates. A candidate is refined by least squares, `d = k D`, over differences of levels that
+//! stand 1, 2, 4, ... places apart: each doubling may trust its `k`, since the one before has made `D` as much more precise. The largest
+//! candidate on whose grid nearly all readings lie is the answer, unless as many levels lie there by chance.
 
 use ct_signals::Record;
 
-/// A reading lies on the grid within this share of the step: of readings anywhere a fifth do.
+/// A reading is on the grid if its distance is below this share of the step: one fifth of random readings are.
 const NEAR: f64 = 0.1;
 /// Share of the readings that must lie on the grid.
 const MOST: f64 = 0.9;
-/// Fewest steps between the least and the largest reading.
+/// Least number of steps between the smallest and the largest reading.
 const FEWEST_STEPS: f64 = 3.0;
-/// Most steps that are looked for.
+/// Largest number of steps for the search.
 const MOST_STEPS: f64 = 2e4;
 /// Fewest readings.
 const FEWEST_READINGS: usize = 20;
-/// Differences whose fractions are candidates, as quantiles, and the whole numbers that they are divided by.
+/// Quantiles of the differences whose fractions are candidates, and the divisors of the differences.
 const QUANTILES: [f64; 6] = [0.0, 0.02, 0.1, 0.25, 0.5, 0.75];
 const DIVISORS: u32 = 12;
 /// Two readings are the same level within this share of the largest reading.
@@ -32,7 +32,7 @@ const PRINTED: f64 = 0.04;
 /// A grid is coarse where its step is at least this part of the median change from one reading to the next. Rounding then adds
 /// more than 1 % to the noise's variance.
 const COARSE: f64 = 0.4;
-/// The chance of a grid among levels that lie anywhere must be less.
+/// Limit of the probability of a grid among random levels.
 const CHANCE: f64 = 1e-3;
 
 /// The grid that readings lie on.
@@ -56,7 +56,7 @@ impl ReadingGrid {
         self.step / self.median_change
     }
 
-    /// The step shows beside the noise: it is no mere digit of the file.
+    /// Whether the quantisation step is large compared with the noise, and not only the last digit of the file.
     #[must_use]
     pub fn is_coarse(&self) -> bool {
         self.coarseness() >= COARSE
@@ -69,7 +69,7 @@ impl ReadingGrid {
     }
 }
 
-/// The grid that nearly all readings of an output in all records lie on, the one of the largest step; `None` where there is none.
+/// The grid of the largest step on which nearly all readings of an output are, over all records; `None` if there is none.
 #[must_use]
 pub fn reading_grid(records: &[Record], output: usize) -> Option<ReadingGrid> {
     let mut sorted: Vec<f64> = records
@@ -113,7 +113,7 @@ pub fn reading_grid(records: &[Record], output: usize) -> Option<ReadingGrid> {
         .filter(|step| span <= MOST_STEPS * step)
         .find_map(|step| {
             let (offset, share, spread) = held_against(step, &sorted)?;
-            // Two levels make a step and an offset; each further one lies so near by chance.
+            // Two levels determine a step and an offset; each further level is this close by chance with the probability below.
             let chance = tried * (2.0 * spread).powi(levels.len() as i32 - 2);
             (share >= MOST && chance < CHANCE).then_some(ReadingGrid {
                 step,
@@ -122,11 +122,11 @@ pub fn reading_grid(records: &[Record], output: usize) -> Option<ReadingGrid> {
                 median_change,
             })
         });
-    // A grid of too few steps is not known by a half of its step either. A span is that of its own grid up to rounding.
+    // A grid of too few steps is uncertain by half of its step. A span is a multiple of its own grid up to rounding.
     largest.filter(|grid| span >= (FEWEST_STEPS - NEAR) * grid.step)
 }
 
-/// The distinct readings; where most readings are among those that come again and again, these alone.
+/// The distinct readings; if most readings are repeated ones, only these.
 fn levels(sorted: &[f64], same: f64) -> Vec<f64> {
     let mut counted: Vec<(f64, usize)> = Vec::new();
     for &y in sorted {
@@ -149,7 +149,7 @@ fn levels(sorted: &[f64], same: f64) -> Vec<f64> {
 fn refined(mut step: f64, levels: &[f64]) -> Option<f64> {
     let n = levels.len();
     let mut places = 1;
-    // Up to so many steps the count of a difference is certain.
+    // Up to this number of steps, the number of steps in a difference is certain.
     let mut certain = 0.2 / PRINTED;
     while places < n {
         for _ in 0..2 {
@@ -183,7 +183,7 @@ fn refined(mut step: f64, levels: &[f64]) -> Option<f64> {
     Some(step)
 }
 
-/// Offset of the grid of that step, share of the readings on it, and how near nine tenths of these are, in steps.
+/// Offset of the grid of that step, share of the readings on it, and distance of nine tenths of these from it, in steps.
 fn held_against(step: f64, readings: &[f64]) -> Option<(f64, f64, f64)> {
     let turn = std::f64::consts::TAU / step;
     let (sin, cos) = readings.iter().fold((0.0, 0.0), |(sin, cos), y| {
@@ -192,7 +192,7 @@ fn held_against(step: f64, readings: &[f64]) -> Option<(f64, f64, f64)> {
     });
     let beside = |offset: f64| move |y: &f64| (y - offset) - ((y - offset) / step).round() * step;
     let middle = sin.atan2(cos) / turn;
-    // The mean angle leans towards what is not on the grid, the median does not.
+    // Readings outside the grid bias the mean angle, but not the median.
     let mut near: Vec<f64> = readings
         .iter()
         .map(beside(middle))
@@ -317,7 +317,7 @@ mod tests {
         assert_eq!(reading_grid(&[course(|t| (t / 50.0).sin())], 0), None);
         assert_eq!(reading_grid(&[course(|_| 3.0)], 0), None);
         assert_eq!(reading_grid(&[course(|_| f64::NAN)], 0), None);
-        // Two readings are no grid, however often they come.
+        // Two readings are no grid, however often they occur.
         assert_eq!(
             reading_grid(&[course(|t| if t < 300.0 { 1.0 } else { 2.7 })], 0),
             None

@@ -1,34 +1,33 @@
-//! Whether the readings of records are whole multiples of one number, and of which: exactly, as a converter leaves them, or with
-//! noise of their own on them.
+//! Whether the readings of records are whole multiples of one number, and of which: exactly, as after a converter, or with additional
+//! noise.
 
 use ct_signals::Record;
 
 use crate::reading_grid;
 
-/// How well readings must lie on the multiples: the mean of `cos(2 pi y/D)`, one where all of them do. With white noise of
-/// a tenth of the step, 0.82.
+/// Least agreement of the readings with multiples: the mean of `cos(2 pi y/D)`, one for exact multiples. With white noise of a tenth of the
+/// step, 0.82.
 const ALIGNED: f64 = 0.8;
 /// The most steps between the least and the largest reading that are looked for.
 const MOST_STEPS: f64 = 100.0;
-/// The fewest: below, any few distinct levels would do.
+/// The least number of steps: fewer distinct levels would always fit.
 const FEWEST_STEPS: f64 = 4.0;
-/// Readings that the first look takes.
+/// Number of readings in the first test.
 const FIRST_LOOK: usize = 400;
 
-/// The largest `D` that nearly all readings of an output are multiples of \[output unit\], if there is one that is coarse enough to be
-/// more than the last digit.
+/// The largest `D` such that nearly all readings of an output are multiples of `D` \[output unit\], if it is larger than the last digit.
 pub(crate) fn reading_step(records: &[Record], output: usize) -> Option<f64> {
     exact_reading_step(records, output).or_else(|| noisy_step(records, output))
 }
 
-/// The same where the readings themselves are multiples, as a converter leaves them.
+/// Quantisation step if the readings themselves are exact multiples, as after an A/D converter.
 #[must_use]
 pub fn exact_reading_step(records: &[Record], output: usize) -> Option<f64> {
     let grid = reading_grid(records, output).filter(|grid| grid.is_coarse() && grid.has_zero());
     grid.map(|grid| grid.step)
 }
 
-/// The same where noise comes behind the steps.
+/// Quantisation step if noise is added after the quantisation.
 fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
     let all = || {
         records
@@ -49,19 +48,19 @@ fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
         .copied()
         .step_by(count.div_ceil(FIRST_LOOK))
         .collect();
-    // The largest reading turns by an eighth from one number of steps to the next, so none is passed over.
+    // The phase of the largest reading changes by an eighth from one number of steps to the next, so no peak is missed.
     let grid = 0.125 / reach;
     let count = ((MOST_STEPS - FEWEST_STEPS) / span / grid).min(1e5) as usize;
     let at = |k: usize| FEWEST_STEPS / span + grid * k as f64;
     let coarse: Vec<f64> = (0..count).map(|k| aligned(at(k), &some)).collect();
-    // Readings that lie on multiples of D lie on those of D/2 too, so the first is the answer.
+    // Readings on multiples of D are also on multiples of D/2, so the first (largest) step is the result.
     let tried = (1..count.saturating_sub(1))
         .filter(|&k| coarse[k] > 0.5 * ALIGNED)
         .filter(|&k| coarse[k] >= coarse[k - 1] && coarse[k] >= coarse[k + 1])
         .map(|k| climb(at(k), grid, &all));
     let mut tried = tried.map(|steps| (aligned(steps, &all), steps));
     let first = tried.find(|(alignment, _)| *alignment > ALIGNED)?;
-    // A neighbour that counts one step more or less on the way up is aligned well too, but not as well.
+    // A neighbouring frequency with one step more or less over the range has a high alignment too, but a lower one.
     let nearby = tried.take_while(|(_, steps)| *steps < 1.5 * first.1);
     let best = nearby.fold(
         first,
@@ -70,7 +69,7 @@ fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
     Some(1.0 / best.1)
 }
 
-/// How well readings lie on the multiples of one over `steps`.
+/// Agreement of readings with multiples of one over `steps`.
 fn aligned(steps: f64, readings: &[f64]) -> f64 {
     let turn = std::f64::consts::TAU * steps;
     let sum: f64 = readings.iter().map(|y| (turn * y).cos()).sum();

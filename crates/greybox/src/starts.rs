@@ -1,4 +1,4 @@
-//! Starts from all over the plausible region.
+//! Starts over the whole plausible region.
 //!
 //! What a tank's record fixes well is its throughput in the mean; what it may be anything of is its time constants.
 //! So time constants are drawn evenly on a logarithmic scale between the sampling interval and the record's length,
@@ -13,7 +13,7 @@ use estimation::within;
 
 use crate::{Setup, at_rest};
 
-/// One start for the plant's own parameters and the initial levels; effects start at their first start value.
+/// One start for the plant's own parameters and the initial levels; effects use their first start value.
 #[must_use]
 pub fn random_starts(setup: &Setup, n: usize, seed: u64) -> Vec<Vec<f64>> {
     use rand::SeedableRng;
@@ -24,7 +24,7 @@ pub fn random_starts(setup: &Setup, n: usize, seed: u64) -> Vec<Vec<f64>> {
         .map(|_| {
             let mut tau = || shortest * (longest / shortest).powf(rng.random::<f64>());
             let tau = [tau(), tau()];
-            // Heads of tanks that are joined, as shares of the measured level: nobody reads them all.
+            // Head differences of coupled tanks, as shares of the measured level: not all of them are measured.
             let mut head = || 0.05_f64 * 40.0_f64.powf(rng.random::<f64>());
             let heads = if setup.structure.plant.joined() {
                 [head(), head()]
@@ -39,7 +39,7 @@ pub fn random_starts(setup: &Setup, n: usize, seed: u64) -> Vec<Vec<f64>> {
 fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     let structure = &setup.structure;
     let scales = &structure.scales;
-    // The output that the others lead into, wherever it stands among them.
+    // The output furthest downstream, whatever its position among the outputs.
     let last = scales.lowest_output();
     let read = scales.outputs[last].vessel;
     let (mut u, mut y, mut uu, mut uy, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -64,7 +64,7 @@ fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     } else {
         y
     };
-    // A mean of next to nothing says nothing.
+    // A mean near zero contains no information.
     let largest = scales.input.0.abs().max(scales.input.1.abs());
     let driven = u.abs() > 1e-6 * largest;
     let drive = match (driven, largest > 0.0) {
@@ -111,8 +111,8 @@ fn start(setup: &Setup, tau: [f64; 2], heads: [f64; 2]) -> Vec<f64> {
     x
 }
 
-/// Pumps, valves and outlet of joined tanks that rest, a measured one at its mean level, with a throughput; `heads`: of the valves, as
-/// shares of that level.
+/// Pumps, valves and outlet of joined tanks at rest, a measured level at its mean, with a throughput; `heads`: of the valves, as shares of
+/// that level.
 fn joined_tanks(setup: &Setup, (read, mean): (usize, f64), flow: f64, heads: [f64; 2]) -> Vec<f64> {
     let scales = &setup.structure.scales;
     let second = scales.input_2.is_some();
@@ -126,7 +126,7 @@ fn joined_tanks(setup: &Setup, (read, mean): (usize, f64), flow: f64, heads: [f6
     let u = middle(|record| Some(&record.inputs[0]));
     let all = u + middle(|record| record.inputs.get(1));
     let gain = if all > 0.0 { flow / all } else { flow };
-    // What goes through the valves comes from the first pump; where that hardly runs, any flow says as much.
+    // The flow through the valves comes from the first pump; if that pump is nearly off, any flow is as good a guess.
     let through = (gain * u).max(0.1 * flow);
     let [d13, d32] = heads.map(|share| share * mean);
     // Levels in the row, T1, T3, T2, from the measured one.
@@ -136,7 +136,7 @@ fn joined_tanks(setup: &Setup, (read, mean): (usize, f64), flow: f64, heads: [f6
         _ => mean,
     };
     let outlet = outlet.max(0.05 * mean);
-    // Two levels that are read say the head between them.
+    // Two measured levels determine the head between them.
     let known = [0, 1, 2].map(|vessel| mean_level(setup, vessel));
     let between = |a: usize, b: usize| Some((known[a]? - known[b]?).abs());
     let least = 1e-3 * mean;
@@ -157,7 +157,7 @@ fn joined_tanks(setup: &Setup, (read, mean): (usize, f64), flow: f64, heads: [f6
     x
 }
 
-/// The levels at which joined tanks would rest under their first commands, but for the measured one, which is read.
+/// The equilibrium levels of joined tanks under their first commands, except for the measured one, which is read.
 fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
     let scales = &setup.structure.scales;
     let orifice = scales.orifice.unwrap_or(1.0);
@@ -172,7 +172,7 @@ fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
     let h2 = head(all.max(0.0), x[pumps + 2]);
     let h3 = h2 + head(first, x[pumps + 1]);
     let mut levels = [h3 + head(first, x[pumps]), h3, h2];
-    // They stand about the lowest that is read as they would at rest.
+    // Levels that are not measured start at the lowest measured one, as at rest.
     let read = scales.outputs[scales.lowest_output()].vessel;
     let shift = first_reading(setup, record, read).unwrap_or(0.0) - levels[read];
     for (vessel, level) in levels.iter_mut().enumerate() {
@@ -182,19 +182,19 @@ fn joined_levels(setup: &Setup, x: &[f64], record: &Record) -> Vec<f64> {
     levels.to_vec()
 }
 
-/// The output that reads the level of a vessel, if one does.
+/// The output that reads the level of a vessel, if there is one.
 fn output_of(setup: &Setup, vessel: usize) -> Option<usize> {
     let mut outputs = setup.structure.scales.outputs.iter();
     outputs.position(|output| output.vessel == vessel)
 }
 
-/// The first reading of a vessel's level; `None` where nobody reads it, or it has no sample.
+/// The first reading of a vessel's level; `None` if it is not measured, or has no sample.
 fn first_reading(setup: &Setup, record: &Record, vessel: usize) -> Option<f64> {
     let output = &record.outputs[output_of(setup, vessel)?];
     output.present().next()
 }
 
-/// The mean reading of a vessel's level, if it is above zero; `None` where nobody reads it.
+/// The mean reading of a vessel's level, if it is above zero; `None` if it is not measured.
 fn mean_level(setup: &Setup, vessel: usize) -> Option<f64> {
     let output = output_of(setup, vessel)?;
     let outputs = setup.records.iter().map(|record| &record.outputs[output]);
@@ -204,8 +204,8 @@ fn mean_level(setup: &Setup, vessel: usize) -> Option<f64> {
     Some(sum / count).filter(|mean| *mean > 0.0)
 }
 
-/// The initial states of the records of a setup from their first readings, for these parameters: a level that is not read, and lags, at rest
-/// under the first command.
+/// The initial states of the records of a setup from their first readings, for these parameters: levels that are not measured, and lags,
+/// are at rest under the first command.
 #[must_use]
 pub fn levels_from_readings(setup: &Setup, parameters: &[f64]) -> Vec<f64> {
     let mut x = parameters.to_vec();
@@ -213,8 +213,8 @@ pub fn levels_from_readings(setup: &Setup, parameters: &[f64]) -> Vec<f64> {
     x.split_off(parameters.len())
 }
 
-/// Appends initial states: a level that is measured from its first reading, an upper one that is not and lags at rest under the first
-/// command, the controller's as they give the measured command.
+/// Appends initial states: a measured level from its first reading, an upper level that is not measured and lags at rest under the first
+/// command, and the controller's from the measured command.
 pub(crate) fn extend_levels(setup: &Setup, x: &mut Vec<f64>) {
     for (r, record) in setup.records.iter().enumerate() {
         let structure = &setup.structure;

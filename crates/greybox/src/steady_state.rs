@@ -1,4 +1,4 @@
-//! Where a plant comes to rest under the first inputs of a record.
+//! Steady state of a plant under the first inputs of a record.
 //!
 //! The plant is simulated on these inputs over steps that double until its levels stay where they are. A plant that integrates, or that is
 //! driven by the clock, comes to no rest.
@@ -7,13 +7,13 @@ use plants::{Command, Simulator};
 
 use crate::{Setup, at_rest, levels_from_readings};
 
-/// The step doubles at most so often, from the sampling interval on.
+/// Largest number of doublings of the step, from the sampling interval on.
 const DOUBLINGS: usize = 24;
-/// Levels that move by less than this share of the largest over two steps rest.
+/// Levels are at rest if they change by less than this share of the largest level over two steps.
 const STILL: f64 = 1e-12;
 
-/// The initial states of the first record of a setup at rest under its first inputs \[units of the levels\], for these parameters; `None` where
-/// the plant comes to no rest.
+/// The initial states of the first record of a setup at rest under its first inputs \[units of the levels\], for these parameters; `None`
+/// if the plant has no equilibrium.
 #[must_use]
 pub fn steady_state(setup: &Setup, parameters: &[f64]) -> Option<Vec<f64>> {
     let record = setup.records.first()?;
@@ -23,7 +23,7 @@ pub fn steady_state(setup: &Setup, parameters: &[f64]) -> Option<Vec<f64>> {
     let own = setup.plant_states_of(0).len();
     let mut states = levels_from_readings(setup, parameters);
     states.truncate(own);
-    // A level that is read nowhere begins at nothing, where an outlet by a square root has no slope.
+    // A level that is not measured begins at zero, where an outlet by a square root has no slope.
     let largest = states
         .iter()
         .take(vessels)

@@ -1,4 +1,4 @@
-//! A limit on the time of a search that consists of many fits.
+//! Time limit of a search that consists of many fits.
 //!
 //! A fit whose setup has a limit that has passed takes no further steps and ends where it is
 //! ([`Stop::Evaluations`](crate::Stop::Evaluations)); of several starts only the first is followed. So results depend on the speed of the
@@ -10,7 +10,7 @@ use std::sync::{
 };
 use std::time::{Duration, Instant};
 
-/// A limit that a search moves from phase to phase, and what was left out for it.
+/// Time limit that a search moves from phase to phase, and the steps that were left out because of it.
 #[derive(Debug)]
 pub struct TimeLimit {
     begun: Instant,
@@ -21,7 +21,7 @@ pub struct TimeLimit {
 }
 
 impl TimeLimit {
-    /// A search that begins now; `None`: it may take as long as it needs.
+    /// A limit for a search that begins now; `None`: without limit.
     #[must_use]
     pub fn new(whole: Option<Duration>) -> Self {
         let limit = Self {
@@ -34,7 +34,7 @@ impl TimeLimit {
         limit
     }
 
-    /// From now on work may go on until this share of the whole time has passed since the beginning.
+    /// Allows work until this share of the whole time has passed since the beginning.
     pub fn allow(&self, share: f64) {
         let until = self.whole.map_or(u64::MAX, |whole| {
             u64::try_from(whole.mul_f64(share).as_micros()).unwrap_or(u64::MAX)
@@ -42,7 +42,7 @@ impl TimeLimit {
         self.until.store(until, Ordering::Relaxed);
     }
 
-    /// The time that is allowed has passed.
+    /// Whether the allowed time has passed.
     #[must_use]
     pub fn passed(&self) -> bool {
         let until = self.until.load(Ordering::Relaxed);
@@ -55,7 +55,7 @@ impl TimeLimit {
         self.begun.elapsed()
     }
 
-    /// Notes a part of the search that was left out or cut short; each is kept once.
+    /// Notes a step of the search that was left out or cut short; each step is noted once.
     pub fn leave_out(&self, part: &str) {
         let mut left_out = match self.left_out.lock() {
             Ok(left_out) => left_out,
@@ -66,7 +66,7 @@ impl TimeLimit {
         }
     }
 
-    /// What was left out, in order.
+    /// Steps that were left out, in order.
     #[must_use]
     pub fn left_out(&self) -> Vec<String> {
         match self.left_out.lock() {

@@ -1,10 +1,10 @@
-//! What is refused of any method.
+//! Checks of records that all methods share.
 
 use ct_signals::{Channel, Record};
 
 use crate::{Error, MAX_ORDER, Order};
 
-/// A record that was put together in code.
+/// Checks a record that was built in code.
 pub(crate) fn whole(record: &Record) -> Result<(), Error> {
     record.validate()?;
     for (channels, kind) in [(&record.inputs, "input"), (&record.outputs, "output")] {
@@ -81,7 +81,7 @@ mod tests {
         Method::Rivc,
     ];
 
-    /// Of every method.
+    /// Errors that all methods share.
     fn refused(record: &Record, order: Order) -> Vec<Error> {
         let refused = |method| identify(record, &Request::new(method, order)).unwrap_err();
         METHODS.map(refused).into()

@@ -1,15 +1,15 @@
-//! What identification refuses: every message names the record and the mend.
+//! Errors of identification: every message names the record and the correction.
 
 use ct_signals::quoted;
 use missing_effect::numbers::significant;
 
 use crate::{MAX_ORDER, Method, Order, warnings::or_lower};
 
-/// Why no model came of it.
+/// Reason why no model was identified.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// No record.
+    /// No record is given.
     #[error("no record is given")]
     NoRecord,
     /// A record without an input or an output.
@@ -17,7 +17,7 @@ pub enum Error {
     NoSignal {
         /// Name of the record.
         record: String,
-        /// What is not there: `input` or `output`.
+        /// Missing signal: `input` or `output`.
         kind: &'static str,
     },
     /// An order that no model has.
@@ -25,10 +25,10 @@ pub enum Error {
         "an order is n,m with n from 1 to {MAX_ORDER} and m from 0 to n, as in 2,1; found {order}"
     )]
     WrongOrder {
-        /// What was asked for.
+        /// Requested order.
         order: Order,
     },
-    /// A signal that does not move.
+    /// A signal is constant.
     #[error(
         "{record}: \"{signal}\" stands at {value} throughout, so that nothing can be identified; record at least a step up and a step down"
     )]
@@ -37,44 +37,44 @@ pub enum Error {
         record: String,
         /// Name of the signal.
         signal: String,
-        /// Where it stands, in its unit.
+        /// Constant value, in the signal's unit.
         value: f64,
     },
     /// A setting that has to be above 0.
     #[error("{option} is {value}, but must be a number of {unit} above 0")]
     NotPositive {
-        /// As it is typed.
+        /// Option as typed.
         option: &'static str,
         /// Its unit.
         unit: &'static str,
         /// What was given.
         value: f64,
     },
-    /// A bandwidth with which the filters pass nothing, or nothing but rounding.
+    /// A bandwidth for which the filters pass nothing, or only rounding errors.
     #[error(
         "--bandwidth is {found:e} 1/s, but the filters need one from {low:.1e} to {high:.1e} 1/s for this record; without the option it is found"
     )]
     Bandwidth {
-        /// What was given, 1/s.
+        /// Given value, 1/s.
         found: f64,
         /// The least, 1/s.
         low: f64,
         /// The largest, 1/s.
         high: f64,
     },
-    /// The method has come to no model that can be simulated.
-    #[error("{record}: no model of order {order} came of it: {why}; try {}another method", or_lower(*.order))]
+    /// The method has not found a model that can be simulated.
+    #[error("{record}: no model of order {order} was found: {why}; try {}another method", or_lower(*.order))]
     NoModel {
         /// Name of the record.
         record: String,
         /// The order.
         order: Order,
-        /// What the model lacks.
+        /// Reason in words.
         why: String,
     },
     /// The information of the record is singular.
     #[error(
-        "the record does not tell the parameters of order {order} apart; try {}a record with more movement in its input",
+        "the record does not determine the parameters of order {order}; try {}a record with more movement in its input",
         or_lower(*.order)
     )]
     Untold {
@@ -115,21 +115,21 @@ pub enum Error {
         /// The method that was asked for.
         method: Method,
     },
-    /// Every one of several methods has refused.
+    /// Every one of several methods has failed.
     #[error("{reason}")]
     AllRefused {
-        /// What the first one said.
+        /// Message of the first error.
         reason: String,
     },
     /// The fit ended where the loop would become unstable.
     #[error(
-        "{record}: the fit ended where the loop would become unstable: the record asks for a plant that this controller does not stabilise; check the controller's sign and units, or the orders"
+        "{record}: the fit ended where the loop would become unstable: the best fit is a plant that this controller does not stabilise; check the controller's sign and units, or the orders"
     )]
     StabilityBorder {
         /// Name of the record.
         record: String,
     },
-    /// The controller did not give the command that was measured.
+    /// The controller's output is not the measured command.
     #[error(
         "{record}: the measured command disagrees with the controller of the model file, R/S (r - y), by {} {unit} rms, {:.0} % of what it moves: \
          check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
@@ -141,7 +141,7 @@ pub enum Error {
         record: String,
         /// Measured command less the controller's, root mean square, in `unit`.
         mismatch: f64,
-        /// What the command moves, root mean square, in `unit`.
+        /// Standard deviation of the command, in `unit`.
         size: f64,
         /// Unit of the command.
         unit: String,
@@ -167,15 +167,15 @@ pub enum Error {
         /// The method.
         method: Method,
     },
-    /// What an estimator refuses, with the record that it is about.
+    /// Error of an estimator, with its record.
     #[error("{record}: {what}")]
     InRecord {
         /// Name of the record.
         record: String,
-        /// What is wrong and the mend.
+        /// What is wrong and the correction.
         what: String,
     },
-    /// Rows are missing, and the fit that says for how long the input may be held failed.
+    /// Rows are missing, and the first fit for the longest hold failed.
     #[error(
         "{record}: rows or samples of the input are missing, and a first fit that says for how long the input may be held failed: {why}; choose a part with --from and --to, or put the record on a coarser grid with --resample"
     )]
@@ -185,7 +185,7 @@ pub enum Error {
         /// Why.
         why: String,
     },
-    /// Nothing is left of a record between its gaps.
+    /// No part of a record between its gaps is long enough.
     #[error(transparent)]
     NoStretch(missing_effect::Error),
     /// A record.

@@ -1,7 +1,7 @@
-//! Records in which rows or samples of the input are missing, as the methods take them.
+//! Preparation of records with missing rows or samples of the input.
 //!
-//! As everywhere else ([`ct_signals::Gaps`]) the input is held through a gap of at most a tenth of the plant's fastest time constant, which a first
-//! fit says (SRIVC of the order that is asked for). At a longer gap the record is cut.
+//! As everywhere else ([`ct_signals::Gaps`]) the input is held through a gap of at most a tenth of the plant's fastest time constant, which
+//! a first fit says (SRIVC of the order that is asked for). At a longer gap the record is cut.
 //!
 //! | methods | what they take |
 //! |---|---|
@@ -19,24 +19,24 @@ use crate::{
     refined,
 };
 
-/// For the first fit inputs are held for so many sampling intervals.
+/// For the first fit, inputs are held for this number of sampling intervals.
 const FIRST_HOLD: f64 = 20.0;
-/// What a plant has kept of a gap where it counts as forgotten.
+/// A gap is forgotten when the plant's response to it has decayed to this share.
 const FORGOTTEN: f64 = 0.01;
 
 /// A record without gaps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mended {
-    /// On one clock: inputs held through every gap, readings left out behind long ones.
+    /// On one clock: inputs held through every gap, readings left out after long ones.
     pub whole: Record,
     /// Between long gaps.
     pub parts: Vec<Record>,
-    /// What was done; nothing where there are no gaps.
+    /// Handling of gaps; `None` if there are no gaps.
     pub gaps: Option<MendedGaps>,
 }
 
 impl Mended {
-    /// Readings of the parts that the whole lacks.
+    /// Number of readings of the parts that the whole lacks.
     pub(crate) fn readings_left_out(&self) -> usize {
         let readings = |record: &Record| record.outputs.first().map_or(0, |y| y.present().count());
         let of_parts: usize = self.parts.iter().map(readings).sum();
@@ -51,10 +51,11 @@ struct TimeConstants {
     slowest: f64,
 }
 
-/// Records that are fitted, and others of the same plant, without gaps, for models of at most this order.
+/// The fitted records, and others of the same plant, without gaps, for models of at most this order.
 ///
 /// # Errors
-/// [`Error::Signals`] and [`Error::NoSignal`] for a record that is none, [`Error::NoStretch`] where nothing is left of a record, [`Error::FirstFit`] where its first fit fails.
+/// [`Error::Signals`] and [`Error::NoSignal`] for a record that is none, [`Error::NoStretch`] where nothing is left of a record,
+/// [`Error::FirstFit`] where its first fit fails.
 pub fn mend(
     fitted: Vec<Record>,
     others: Vec<Record>,
@@ -93,7 +94,7 @@ pub fn mend(
     Ok((all(&fitted)?, all(&others)?))
 }
 
-/// A record with inputs held for at most `limit`; behind longer gaps its whole lacks the readings of `memory` \[s\].
+/// A record with inputs held for at most `limit`; after longer gaps the readings within `memory` \[s\] are left out of the whole record.
 fn cut(record: &Record, limit: f64, memory: f64) -> Result<Mended, Error> {
     let (parts, gaps) = record.without_gaps(limit);
     let (whole, _) = record.without_gaps(f64::INFINITY);
@@ -138,7 +139,7 @@ fn cut(record: &Record, limit: f64, memory: f64) -> Result<Mended, Error> {
     })
 }
 
-/// Of a first fit, by SRIVC, of the highest order that is determined.
+/// Time constants of a first fit by SRIVC, with the highest order that is determined.
 fn time_constants(
     records: &[Mended],
     order: Order,
@@ -158,7 +159,7 @@ fn time_constants(
         };
         let found = match refined::plant(records, &request) {
             Ok((plant, true)) => plant,
-            // The lowest order is better than nothing.
+            // With the lowest order, an undetermined result is accepted.
             Ok((plant, false)) if n == 1 => plant,
             Ok(_) => continue,
             Err(error) => {
@@ -172,7 +173,7 @@ fn time_constants(
             &found.a[..]
         };
         if a.len() < 2 {
-            // An integrator alone forgets nothing, and is as fast as it is filled.
+            // A pure integrator never forgets; its filter gives the fast limit.
             let duration = records.iter().map(|mended| mended.whole.duration());
             return Ok(TimeConstants {
                 fastest: duration.fold(f64::INFINITY, f64::min),

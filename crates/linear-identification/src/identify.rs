@@ -1,4 +1,4 @@
-//! The entry: gaps are mended, then the method is called.
+//! Entry point: gaps are handled, then the method is called.
 
 use ct_signals::Record;
 
@@ -44,7 +44,7 @@ pub fn identify_mended(records: &[Mended], request: &Request) -> Result<Identifi
     let left_out = first.readings_left_out();
     if left_out > 0 && !request.method.is_refined() {
         found.warnings.push(format!(
-            "{} simulates through long gaps, from the input as it was held, and leaves out {left_out} readings behind them, until the plant has forgotten them; srivc and rivc begin anew there, and lose none",
+            "{} simulates through long gaps, from the input as it was held, and leaves out {left_out} readings behind them, until the effect of the gap has decayed; srivc and rivc restart with new initial states there, and lose none",
             request.method.id()
         ));
     }

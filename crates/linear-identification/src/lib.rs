@@ -7,8 +7,8 @@
 //! | [`Method::CtRls`] | equation error of the filtered signals | noise is low: it biases the estimates, by the share of noise the filters let through |
 //! | [`Method::StabilizedOe`] | output error of a model in parallel | noise is there: it is not in the regressor |
 //!
-//! Four have to do with a loop of a known controller `u = R/S (r - y)`; without a controller they identify in open loop. Their signals are deviations from levels of
-//! rest, see [`LevelChoice`]; in a loop the model is that of the whole loop, driven by the reference:
+//! Four have to do with a loop of a known controller `u = R/S (r - y)`; without a controller they identify in open loop. Their signals are
+//! deviations from levels of rest, see [`LevelChoice`]; in a loop the model is that of the whole loop, driven by the reference:
 //!
 //! | method | what it does | use it where |
 //! |---|---|---|
@@ -17,33 +17,33 @@
 //! | [`Method::Iv`] | instruments simulated in the loop | a check that needs no iteration |
 //! | [`Method::Ls`] | least squares | noise is low, or to see what noise does |
 //!
-//! Two use instruments that are renewed with the estimates, of one record or several, with a delay, an integrator, a second input, on uneven
-//! times; where a reference moves they are those of a loop, whatever its controller:
+//! Two use instruments that are renewed with the estimates, of one record or several, with a delay, an integrator, a second input, on
+//! uneven times; where a reference moves they are those of a loop, whatever its controller:
 //!
 //! | method | what it assumes of the noise |
 //! |---|---|
 //! | [`Method::Srivc`] | white; other noise costs efficiency, and the standard errors allow for it |
 //! | [`Method::Rivc`] | autoregressive, of an order that is chosen |
 //!
-//! Of the first two: the offset `d` is always estimated, as records are seldom taken from their point of rest. Inside, time and signals are scaled so that all
-//! parameters are about 1.
+//! Of the first two: the offset `d` is always estimated, as records are seldom taken from their point of rest. Inside, time and signals are
+//! scaled so that all parameters are about 1.
 //!
-//! Of the first two, the numbers that are not given are found from the best model of first order, over a grid of time constants: the start, the bandwidth of
-//! the filters (3 over its time constant) and the memory (a fifth of the record, at least 10 time constants). The four try several
-//! bandwidths for their regressions; recursive-fcloe has the same memory, in time constants of its start.
+//! Of the first two, the numbers that are not given are found from the best model of first order, over a grid of time constants: the start,
+//! the bandwidth of the filters (3 over its time constant) and the memory (a fifth of the record, at least 10 time constants). The four try
+//! several bandwidths for their regressions; recursive-fcloe has the same memory, in time constants of its start.
 //!
-//! Readings of the output may be missing. The output errors (fcloe, recursive-fcloe, stabilized-oe) have no residual there, srivc and rivc no row, and the simulation runs on;
-//! iv puts what its model says in their place in its filters, stabilized-oe too; ls and ct-rls, which have no model beside them, take the output for a line between its readings
-//! and leave rows out behind gaps longer than their filters. Gaps of the input: see [`mend`].
+//! Readings of the output may be missing. The output errors (fcloe, recursive-fcloe, stabilized-oe) have no residual there, srivc and rivc
+//! no row, and the simulation runs on; iv puts what its model says in their place in its filters, stabilized-oe too; ls and ct-rls, which
+//! have no model beside them, take the output for a line between its readings and leave rows out after gaps longer than their filters. Gaps
+//! of the input: see [`mend`].
 //!
-//! How often 95 % intervals hold the truth then, of every method with all readings and without 30 % of them and a block of 10 rows:
+//! How often 95 % intervals contain the true value then, of every method with all readings and without 30 % of them and a block of 10 rows:
 //! `RECORDS=400 cargo test -p ctid --test all identify_missing -- --nocapture`.
 //!
-//! On 3000 samples every second of plants with a time constant of 20 s, and of 10 and 15 s, noise of a tenth of the output, white and coloured,
-//! 60 noises: stabilized-oe covers the truth with 1.96 standard errors in 88 to 98 % of them
-//! (`cargo test -p ctid --test all identify::how_sure -- --nocapture`). ct-rls finds a_2 too small by more than 40 % with white noise
-//! (`cargo test -p ctid --test all identify::biases`). Where poles and zeros nearly cancel expect the output error too to be off by more
-//! than its standard errors.
+//! On 3000 samples every second of plants with a time constant of 20 s, and of 10 and 15 s, noise of a tenth of the output, white and
+//! coloured, 60 noises: stabilized-oe covers the truth with 1.96 standard errors in 88 to 98 % of them (`cargo test -p ctid --test all
+//! identify::how_sure -- --nocapture`). ct-rls finds a_2 too small by more than 40 % with white noise (`cargo test -p ctid --test all
+//! identify::biases`). Where poles and zeros nearly cancel expect the output error too to be off by more than its standard errors.
 //!
 //! # Example
 //! A tank under steps of its pump, by refined instruments.

@@ -2,31 +2,32 @@
 
 use serde::Serialize;
 
-/// How the parameters are found.
+/// Estimation method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Recursive output error, stabilised by an adaptive error filter that is kept within bounds
+    /// Recursive output error, stabilised by an adaptive error filter with bounds
     StabilizedOe,
     /// Recursive least squares on the filtered equation
     CtRls,
-    /// Least squares on filtered signals, of the whole record: biased by noise, a start for the others
+    /// Least squares on filtered signals, of the whole record: biased by noise, useful as a start for the others
     Ls,
     /// Instruments simulated in the loop, of the whole record
     Iv,
     /// Closed-loop output error of the whole record: the loop is simulated from the reference; without a controller output error
     Fcloe,
-    /// The same, recursively
+    /// Closed-loop output error, recursive
     RecursiveFcloe,
-    /// Refined instruments for white noise; where the reference moves those of a loop, whatever its controller (CLSRIVC)
+    /// Refined instrumental variables for white noise; in a loop with a reference the instruments come from the reference, and no
+    /// controller is needed (CLSRIVC)
     Srivc,
     /// Refined instruments with an autoregressive model of the noise (CLRIVC in a loop)
     Rivc,
 }
 
 impl Method {
-    /// As it is typed.
+    /// Name as typed.
     pub fn id(self) -> &'static str {
         match self {
             Self::StabilizedOe => "stabilized-oe",
@@ -40,12 +41,12 @@ impl Method {
         }
     }
 
-    /// Whether it has to do with the loop's controller.
+    /// Whether the method uses the loop's controller.
     pub fn is_of_loop(self) -> bool {
         !matches!(self, Self::StabilizedOe | Self::CtRls) && !self.is_refined()
     }
 
-    /// Whether it is SRIVC or RIVC: with delays, integrators, a second input, several records.
+    /// Whether the method is SRIVC or RIVC: with delays, integrators, a second input, several records.
     pub fn is_refined(self) -> bool {
         matches!(self, Self::Srivc | Self::Rivc)
     }

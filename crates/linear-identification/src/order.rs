@@ -8,9 +8,9 @@ pub const MAX_ORDER: usize = 4;
 /// n and m, `m <= n`, n from 1 to [`MAX_ORDER`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Order {
-    /// Of A.
+    /// Degree of A.
     pub n: usize,
-    /// Of B.
+    /// Degree of B.
     pub m: usize,
 }
 
@@ -40,12 +40,12 @@ impl std::fmt::Display for Order {
 }
 
 impl Order {
-    /// How many parameters there are, the offset among them.
+    /// Number of parameters, including the offset.
     pub fn parameters(self) -> usize {
         self.n + self.m + 2
     }
 
-    /// With one pole less; of the first order there is none.
+    /// The order with one pole less; `None` for the first order.
     pub(crate) fn lower(self) -> Option<Self> {
         let n = self.n.checked_sub(1).filter(|n| *n > 0)?;
         Some(Self {
@@ -55,7 +55,7 @@ impl Order {
     }
 }
 
-/// One order, or all of n from one number to another with m below n.
+/// One order, or a range of n with m below n.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Orders(pub Vec<Order>);
 

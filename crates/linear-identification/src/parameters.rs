@@ -18,7 +18,7 @@ pub(crate) fn names(order: Order, record: &Record) -> Vec<(String, String)> {
     names
 }
 
-/// Of one input, from a_1 to a_n and b_0 to b_m.
+/// Plant with one input, from a_1 to a_n and b_0 to b_m.
 pub(crate) fn plant(parameters: &[Parameter], order: Order) -> rivc::Plant {
     let values = |range: std::ops::Range<usize>| parameters[range].iter().map(|p| p.value);
     let a = std::iter::once(1.0).chain(values(0..order.n)).collect();

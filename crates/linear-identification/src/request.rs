@@ -1,32 +1,32 @@
-//! What may be asked for.
+//! Options of an identification.
 
 use crate::{DelayChoice, LevelChoice, Method, Order};
 
-/// What may be asked for.
+/// Options of an identification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     /// The method.
     pub method: Method,
     /// The order.
     pub order: Order,
-    /// Memory of the recursion, s; found where not given.
+    /// Memory of the recursion, s; default chosen from the record.
     pub memory: Option<f64>,
-    /// Bandwidth of the state variable filters, 1/s; found where not given.
+    /// Bandwidth of the state variable filters, 1/s; default chosen from the record.
     pub bandwidth: Option<f64>,
-    /// The controller of the loop, time in s; for the methods that have to do with it. Without one they work in open loop.
+    /// The controller of the loop, time in s; for the methods for a loop. Without one they work in open loop.
     pub controller: Option<fcloe::Controller>,
-    /// Where zero is; for the same methods.
+    /// Operating point; for the same methods.
     pub levels: LevelChoice,
-    /// Smallest and largest command, in the input's unit; infinite where there is none.
+    /// Smallest and largest command, in the input's unit; infinite without a limit.
     pub limits: (f64, f64),
-    /// Delay of the inputs; none where nothing is said. For SRIVC and RIVC.
+    /// Delay of the inputs; none by default. For SRIVC and RIVC.
     pub delay: Option<DelayChoice>,
     /// Whether `A(0) = 0`; for the same methods.
     pub integrator: bool,
 }
 
 impl Request {
-    /// Everything else found, in open loop.
+    /// A request with defaults, in open loop.
     pub fn new(method: Method, order: Order) -> Self {
         Self {
             method,

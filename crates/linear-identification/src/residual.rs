@@ -1,8 +1,8 @@
-//! Sizes of signals and of simulation errors.
+//! Standard deviations of signals and of simulation errors.
 
 use ct_signals::Channel;
 
-/// Measured less simulated, where there are readings.
+/// Measured minus simulated output, where there are readings.
 pub(crate) fn errors<'a>(
     output: &'a Channel,
     simulated: &'a [f64],
@@ -29,7 +29,7 @@ pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
-/// Smallest and largest of all finite values; 0 and 1 where there are none.
+/// Smallest and largest of all finite values; 0 and 1 if there are none.
 pub(crate) fn limits(values: &[f64]) -> (f64, f64) {
     let finite = values.iter().filter(|value| value.is_finite());
     let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {

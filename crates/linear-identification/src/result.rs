@@ -1,4 +1,4 @@
-//! What was found.
+//! Results of an identification.
 
 use ct_signals::Channel;
 use missing_effect::{MendedGaps, Parameter};
@@ -6,20 +6,20 @@ use serde::Serialize;
 
 use crate::{Drift, InLoop, Method, Order, Refined};
 
-/// What was used.
+/// Settings that were used.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Settings {
     /// Memory of the recursion, `1/eta`, s.
     pub memory: f64,
     /// Bandwidth of the state variable filters, 1/s.
     pub bandwidth: f64,
-    /// Time constant of the best model of first order, s: what the recursion starts from.
+    /// Time constant of the best model of first order, s: start of the recursion.
     pub first_order: f64,
     /// Simulation error of that model, root mean square, in the output's unit.
     pub first_order_rmse: f64,
 }
 
-/// What was found.
+/// Result of an identification.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Identification {
     /// Version of this record.
@@ -30,10 +30,10 @@ pub struct Identification {
     pub order: Order,
     /// Name of the record.
     pub record: String,
-    /// What a recursion without a loop used.
+    /// Settings of a recursion without a loop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub settings: Option<Settings>,
-    /// a_1 to a_n, b_0 to b_m, offset, at the end of the record. The standard error is of the recursion with its memory.
+    /// a_1 to a_n, b_0 to b_m, offset, at the end of the record. The standard error is that of the recursion with its memory.
     pub parameters: Vec<Parameter>,
     /// Time constants of the model's real poles, s, the slowest first.
     pub time_constants: Vec<f64>,
@@ -44,26 +44,26 @@ pub struct Identification {
     pub simulation_rmse: f64,
     /// `100 (1 - simulation_rmse/s)` with the standard deviation s of the output, %.
     pub fit_percent: f64,
-    /// What should be known before it is used.
+    /// Warnings about the use of the model.
     pub warnings: Vec<String>,
-    /// The parameters over the record; of a recursion.
+    /// The parameters over time; for a recursion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trajectory: Option<Trajectory>,
-    /// What a method that has to do with the loop says besides.
+    /// Additional results of a method for a loop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_loop: Option<InLoop>,
-    /// What SRIVC and RIVC say besides.
+    /// Additional results of SRIVC and RIVC.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refined: Option<Refined>,
-    /// Gain and time constant over the level; nothing where the level stands, or the record is too short to tell.
+    /// Gain and time constant over the level; `None` if the level is constant, or if the record is too short.
     pub drift: Option<Drift>,
-    /// What was done about missing rows and samples of the input; nothing where there are none.
+    /// Handling of missing rows and samples of the input; `None` if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<MendedGaps>,
     /// The plant, without offsets.
     #[serde(skip)]
     pub plant: rivc::Plant,
-    /// The record, to be drawn.
+    /// The record for a plot.
     #[serde(skip)]
     pub shown: Shown,
 }
@@ -71,7 +71,7 @@ pub struct Identification {
 /// A pair of complex poles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Oscillation {
-    /// Without damping, s.
+    /// Natural period without damping, s.
     pub period: f64,
     /// Relative damping, 0 to 1.
     pub damping: f64,
@@ -82,17 +82,17 @@ pub struct Oscillation {
 pub struct Trajectory {
     /// Time, s.
     pub time: Vec<f64>,
-    /// Which samples those are, from 0.
+    /// Numbers of these samples, from 0.
     #[serde(skip)]
     pub samples: Vec<usize>,
     /// One series for each parameter.
     pub values: Vec<Vec<f64>>,
-    /// Standard errors; NaN (`null`) where too little has been seen.
+    /// Standard errors; NaN (`null`) with too few samples.
     pub std_errors: Vec<Vec<f64>>,
 }
 
 impl Trajectory {
-    /// From when on the start is forgotten as far as it will be: half the record.
+    /// Time from which the start is forgotten as far as possible: half the record.
     #[must_use]
     pub fn settled(&self) -> f64 {
         match (self.time.first(), self.time.last()) {

@@ -1,14 +1,14 @@
-//! What should be known before a model is used.
+//! Warnings about the use of a model.
 
 use ct_signals::Record;
 use missing_effect::Parameter;
 
 use crate::{Method, Order, Settings};
 
-/// A simulation error so many times that of the start is worse.
+/// Ratio of the simulation error to that of the start above which the result is worse.
 const WORSE: f64 = 1.05;
 
-/// The start was better than the end.
+/// The start has a smaller error than the final estimates.
 pub(crate) fn worse_than_first_order(
     (method, order): (Method, Order),
     rmse: f64,
@@ -36,7 +36,7 @@ pub(crate) fn worse_than_first_order(
     ))
 }
 
-/// A highest coefficient that may as well be 0 says that the order is too high.
+/// A highest coefficient that is not significantly different from 0 means that the order is too high.
 pub(crate) fn doubtful(parameters: &[Parameter], order: Order) -> Vec<String> {
     let mut highest = Vec::new();
     if let Some(lower) = order.lower() {
@@ -60,7 +60,7 @@ pub(crate) fn doubtful(parameters: &[Parameter], order: Order) -> Vec<String> {
     highest.into_iter().filter_map(doubtful).collect()
 }
 
-/// Standard errors need more stretches of a time constant within the memory than there are parameters.
+/// Standard errors need more intervals of one time constant within the memory than there are parameters.
 pub(crate) fn unsure(parameters: &[Parameter], settings: &Settings) -> Option<String> {
     if parameters.iter().all(|p| p.std_error.is_some()) {
         return None;
@@ -79,19 +79,19 @@ pub(crate) fn too_fast(time_constants: &[f64], record: &Record, order: Order) ->
     let fastest = time_constants.last().filter(|fastest| **fastest < step)?;
     let mend = lower_or_faster(order);
     Some(format!(
-        "the fastest time constant, {fastest:.2} s, is below the longest step of {step} s: it cannot be known from these samples, and the output's way between them biases the estimates \
-         by more than the standard errors say; {mend}"
+        "the fastest time constant, {fastest:.2} s, is below the longest step of {step} s: it cannot be known from these samples, and the unknown output between the samples biases the \
+         estimates by more than the standard errors show; {mend}"
     ))
 }
 
-/// The first of what to try: `--order 2,0, or `; nothing where there is no lower order.
+/// First suggestion: `--order 2,0, or `; empty without a lower order.
 pub(crate) fn or_lower(order: Order) -> String {
     order
         .lower()
         .map_or_else(String::new, |lower| format!("--order {lower}, or "))
 }
 
-/// What to try where the model is too fast for the record.
+/// Advice if the model is too fast for the record.
 pub(crate) fn lower_or_faster(order: Order) -> String {
     match order.lower() {
         None => "sample faster".to_owned(),

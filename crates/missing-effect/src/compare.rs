@@ -1,4 +1,4 @@
-//! The comparison: the believed model, fitted, and where it fails.
+//! Comparison: the fitted believed model, and where it fails.
 
 use std::time::Instant;
 
@@ -26,13 +26,12 @@ use crate::{
     sentences,
 };
 
-/// Share of a diagnosis' time limit that a comparison has, and of that the shares after which its phases end: further starts, single
-/// effects.
+/// Share of a diagnosis' time limit for a comparison, and the shares of this after which its phases end: further starts, single effects.
 const SHARE: f64 = 0.2;
 const FITTED: f64 = 0.6;
 const TRIED: f64 = 0.8;
 
-/// Fits the believed model and says where it fails: a diagnosis of one step without a search of sets.
+/// Fits the believed model and locates its errors: a diagnosis of one step without a search of sets.
 ///
 /// # Errors
 /// Where the records, the plant or the fit do not allow it.
@@ -52,7 +51,7 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
     Ok(diagnosis)
 }
 
-/// One model has to be fitted, and no sets of effects are searched.
+/// Only one model is fitted, and no sets of effects are searched.
 fn of_one_model<'a>(options: &Options<'a>) -> Options<'a> {
     Options {
         time_limit: options.time_limit.map(|limit| limit.mul_f64(SHARE)),
@@ -60,11 +59,11 @@ fn of_one_model<'a>(options: &Options<'a>) -> Options<'a> {
     }
 }
 
-/// The believed model as a comparison shows it.
+/// The believed model for a comparison.
 pub(crate) struct Believed<'a> {
-    /// The fit that is shown.
+    /// The displayed fit.
     pub shown: Node<'a>,
-    /// The fit under the noise model of its residual.
+    /// The fit with the noise model of its residual.
     own: Fit,
     left: Option<Left>,
     pub lacking: bool,
@@ -81,8 +80,8 @@ pub(crate) fn believed<'a>(
     let (base, control_loop) = base(problem, options, FITTED)?;
     allow(&base, TRIED);
     let own = coloured(&base.setup, base.fit.clone(), NOISE_ORDER, STOPPING)?;
-    // The model lacks something where its residual is not noise, or where some effect would lower the error by more than
-    // chance does: the one needs no catalogue, the other sees what is small.
+    // The model is incomplete if its residual is not noise, or if some effect lowers the error significantly: the first test needs no
+    // catalogue, the second one detects small effects.
     let in_noise = Node {
         fit: own.clone(),
         ..base.clone()
@@ -93,7 +92,7 @@ pub(crate) fn believed<'a>(
     let left = remains(&base, &own)?;
     let lacking = tempted || left.is_some();
     let floor = floors(problem, &own.noise, "the residual of the believed model");
-    // In the metric of a noise that wanders a simulation may drift off.
+    // With a noise model that drifts, the simulation of the prewhitened fit may drift.
     let shown = if lacking || wanders(&base, &own.noise) {
         base
     } else {
@@ -117,7 +116,7 @@ pub(crate) fn believed<'a>(
     })
 }
 
-/// The same of records without gaps.
+/// Comparison of records without gaps.
 fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Error> {
     let Believed {
         shown,

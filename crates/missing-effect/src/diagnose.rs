@@ -1,4 +1,4 @@
-//! The algorithm, from records to a verdict.
+//! The diagnosis, from records to a verdict.
 
 use std::time::Instant;
 
@@ -35,8 +35,8 @@ use crate::{
     sentences,
 };
 
-/// Shares of the time limit after which the phases end: further starts of the believed model, the search of sets, then all that follows
-/// but the report, the fits of the report, and the shape of what is not explained. What each has begun it brings to its end.
+/// Shares of the time limit after which the phases end: further starts of the believed model, the search of sets, all later steps except
+/// the report, the fits of the report, and the unexplained error. Each phase finishes the step that it has begun.
 pub(crate) const FITTED: f64 = 0.2;
 const SEARCHED: f64 = 0.65;
 const CONFIRMED: f64 = 0.82;
@@ -67,7 +67,7 @@ pub fn diagnose(
     Ok(diagnosis)
 }
 
-/// The same of records without gaps.
+/// Diagnosis of records without gaps.
 fn diagnose_whole(
     problem: &Problem,
     options: &Options,
@@ -79,8 +79,7 @@ fn diagnose_whole(
     allow(&base, SEARCHED);
     let found = find(&base, options.max_effects, &tell)?;
     allow(&base, CONFIRMED);
-    // The weighting in which single effects are ranked: white where the residual wanders, since a noise model takes slow effects for
-    // noise.
+    // The weighting for the ranking of single effects: white if the residual drifts, because a noise model absorbs slow effects.
     let white = base.setup.white_noise();
     let (metric, believed, grown) = match &found.prewhitened {
         Some(grown) if !found.by_simulation && !found.wandering => {
@@ -137,7 +136,7 @@ fn diagnose_whole(
         reasons: Vec::new(),
     };
     let mut partial = false;
-    // Noise whose memory had to be limited may hold slow physics; a valve that sticks in a loop makes a limit cycle, which noise with a
+    // Noise whose memory had to be limited may contain slow physics; a sticking valve in a loop causes a limit cycle, which noise with a
     // memory describes.
     let sticking = widen && sticks(&problem.records);
     let unexplained = course.left.is_some() || found.limited || sticking;
@@ -196,7 +195,7 @@ fn diagnose_whole(
             &problem.records[0].outputs,
         ));
         let longer = judge.longer(course.nodes.clone(), rounded.node)?;
-        // What nothing explains stays unexplained where rounding leaves something that is not noise.
+        // If rounding leaves structure in the residual, the error stays unexplained.
         if longer.left.is_none() || !course.last().added.is_empty() {
             course = longer;
             groups.push(rounded.group);

@@ -1,6 +1,6 @@
-//! What can go wrong in a diagnosis.
+//! Errors of a diagnosis.
 
-/// What can go wrong in a diagnosis.
+/// Error of a diagnosis.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -34,37 +34,37 @@ pub enum Error {
     OtherOutput {
         /// The record.
         record: String,
-        /// Which of its outputs, counted from one.
+        /// Number of the output, from one.
         output: usize,
-        /// The column there, or that it is missing.
+        /// The record's column, or that it is missing.
         column: String,
         /// The first record.
         first: String,
-        /// The column that the first record has there, or that it is missing.
+        /// The first record's column, or that it is missing.
         needed: String,
     },
-    /// The controller reads an output that there is not.
+    /// The controller reads an output that does not exist.
     #[error("controller: it reads output {output}, but the model has {outputs}: name one of these")]
     ControlledOutput {
-        /// Which output, counted from one.
+        /// Number of the output, from one.
         output: usize,
-        /// How many there are.
+        /// Number of outputs.
         outputs: usize,
     },
-    /// The controller and the fitted plant do not make a stable loop.
+    /// The loop of the controller and the fitted plant is unstable.
     #[error(
         "controller: the loop of {controller} and the fitted plant is unstable (its output grows {} a sample): check the sign and the unit of the gain, and that integral_time is in seconds",
         growth(*radius)
     )]
     UnstableLoop {
-        /// Its settings, as [`plants::controller::Controller::describe`] writes them.
+        /// Settings of the controller, as [`plants::controller::Controller::describe`] writes them.
         controller: String,
         /// Largest magnitude of the sampled loop's eigenvalues.
         radius: f64,
     },
 }
 
-/// A growth from one sample to the next, in words that stay short.
+/// Growth from one sample to the next, in short words.
 fn growth(radius: f64) -> String {
     if radius < 2.0 {
         format!("by {:.2} %", 100.0 * (radius - 1.0))

@@ -1,4 +1,4 @@
-//! The fitted model for those who go on with it: simulate it on other inputs, write its curves.
+//! The fitted model for further use: simulation on other inputs, and its curves.
 
 use greybox::{Fit, FitUncertainty, Setup};
 
@@ -9,20 +9,20 @@ use crate::{
     fit::noise_model::NOISE_ORDER,
 };
 
-/// What a fit of the believed model gives.
+/// Result of a fit of the believed model.
 #[derive(Debug, Clone, Copy)]
 pub struct Fitted<'f, 'a> {
     /// The plant with its effects against the records, cut where gaps are long.
     pub setup: &'f Setup<'a>,
     /// The fit.
     pub fit: &'f Fit,
-    /// How well its parameters are known; `None` where the records do not determine them.
+    /// Uncertainty of its parameters; `None` if the records do not determine them.
     pub uncertainty: Option<&'f FitUncertainty>,
-    /// The model lacks something: its residual is more than noise.
+    /// The model is incomplete: its residual is more than noise.
     pub lacking: bool,
 }
 
-/// Fits the believed model as [`crate::compare`] does, and hands the fit on.
+/// Fits the believed model as [`crate::compare`] does, and passes the fit on.
 ///
 /// # Errors
 /// Where the records, the plant or the fit do not allow it.

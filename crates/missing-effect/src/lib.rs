@@ -1,7 +1,7 @@
 #![doc = include_str!("../README.md")]
 
-// Each of these uses only those before it: error, numbers, result; fit, base, diagnostics, search, accept, sentences; compare, diagnose,
-// fitted, design.
+// Each module uses only earlier ones: error, numbers, result; fit, base, diagnostics, search, accept, sentences; compare, diagnose, fitted,
+// design.
 mod accept;
 mod base;
 mod compare;

@@ -1,8 +1,8 @@
-//! Numbers for people: as many digits as they deserve, and columns of them.
+//! Numbers for display: with the significant digits, and columns of them.
 
 pub use ct_signals::duration;
 
-/// A number with this many significant digits, `-` where there is none.
+/// A number with this many significant digits, `-` if there is none.
 #[must_use]
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
@@ -34,7 +34,7 @@ pub fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Option<St
     if largest < 6 && last > -7 {
         (decimals(value, -last), Some(decimals(error, -last)))
     } else {
-        // So many digits, or so large, that only powers of ten can be read.
+        // Numbers with so many digits, or so large, that only powers of ten are readable.
         (
             significant(value, (largest - last + 1).min(8)),
             Some(significant(error, 2)),
@@ -42,7 +42,7 @@ pub fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Option<St
     }
 }
 
-/// A whole number, `-` where there is none.
+/// A whole number, `-` if there is none.
 #[must_use]
 pub fn whole(value: f64) -> String {
     if value.is_finite() {
@@ -52,8 +52,7 @@ pub fn whole(value: f64) -> String {
     }
 }
 
-/// Numbers that stand under each other: all with the decimals that give the smallest of them two
-/// significant digits; `-` where there is none.
+/// Numbers of a column: all with the number of decimals that gives the smallest one two significant digits; `-` if there is none.
 #[must_use]
 pub fn column(values: &[Option<f64>]) -> Vec<String> {
     let finite = || values.iter().flatten().filter(|value| value.is_finite());
@@ -80,7 +79,7 @@ pub fn exponent(value: f64) -> i32 {
     if value == 0.0 {
         return 0;
     }
-    // The printed form does not round: log10 would make 0.001 a power of -2.99.
+    // The printed form is exact: log10 would make 0.001 a power of -2.99.
     format!("{:e}", value.abs())
         .split_once('e')
         .and_then(|(_, exponent)| exponent.parse().ok())
@@ -97,7 +96,7 @@ pub fn decimals(value: f64, places: i32) -> String {
             format!("{:.0}", (value / step).round() * step)
         }
     };
-    // No minus before a number that is all zeros.
+    // No minus sign before a number that is rounded to zero.
     match text.strip_prefix('-') {
         Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_string(),
         _ => text,

@@ -33,8 +33,8 @@ pub(crate) fn record(
     )
 }
 
-/// The same for a linear tank at levels of 12 to 20 cm, believed to be one; what the pump makes of the command, what the sensor reads
-/// at a time and a level, and the noise's correlation from sample to sample.
+/// Record of a linear tank at levels of 12 to 20 cm, and a believed model with one tank. The arguments give the actuator's characteristic,
+/// the sensor's reading as a function of time and level, and the noise's correlation from sample to sample.
 pub(crate) fn tank(
     pump: impl Fn(f64) -> f64,
     sensor: impl Fn(f64, f64) -> f64,
@@ -52,7 +52,7 @@ pub(crate) fn tank(
     problem(plant, Known::default(), vec![record])
 }
 
-/// Both levels of two linear tanks, the upper reading with four times the noise of the lower one.
+/// Record of both levels of two linear tanks; the upper reading has four times the noise of the lower one.
 pub(crate) fn two_levels(seed: u64) -> Problem {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (plant, range, samples) = (Plant::CascadedTanksLinear, (3.0, 5.0), 600);
@@ -115,7 +115,7 @@ fn through(
     }
 }
 
-/// A plant without effects that is believed of the records.
+/// A believed plant without effects for the records.
 pub(crate) fn problem(plant: Plant, known: Known, records: Vec<Record>) -> Problem {
     Problem::builder(plant, known, records).build().unwrap()
 }

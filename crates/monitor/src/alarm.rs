@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{TimeAxis, isolate::Suspect, watched::Raised};
 
-/// The number of the schema of [`Alarm`]; it rises when a key changes its meaning.
+/// The version of the schema of [`Alarm`]; it rises when a key changes its meaning.
 pub const SCHEMA: u32 = 1;
 
 /// Whether an alarm is new.
@@ -15,21 +15,21 @@ pub const SCHEMA: u32 = 1;
 pub enum Stage {
     /// The model has stopped fitting.
     Alarm,
-    /// More rows have come since, and it was looked again.
+    /// More rows have come since, and they were evaluated.
     Update,
-    /// The last look; the model stays as it was learned.
+    /// The last evaluation; the model keeps its learned parameters.
     Final,
 }
 
-/// What the rows since the change say.
+/// Verdict on the rows since the change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// One effect of the catalogue explains them, and no other does.
+    /// One effect of the catalogue explains the rows, and no other effect does.
     Effect,
-    /// Several explain them, and cannot be told apart yet.
+    /// Several effects explain the rows, and cannot be distinguished yet.
     Undecided,
-    /// No effect of the catalogue explains them.
+    /// No effect of the catalogue explains the rows.
     Unexplained,
 }
 
@@ -38,40 +38,39 @@ pub enum Verdict {
 pub struct Alarm {
     /// [`SCHEMA`].
     pub schema: u32,
-    /// New, or more is known of it.
+    /// Whether the alarm is new, or updated.
     pub event: Stage,
     /// Time of the row after which it was raised \[s\].
     pub time: f64,
-    /// When the change began, as the best effect has it \[s\]; `None` where nothing explains it.
+    /// Start of the change, as estimated with the best effect \[s\]; `None` if no effect explains the rows.
     pub since: Option<f64>,
-    /// What the rows say.
+    /// Verdict on the rows.
     pub verdict: Verdict,
-    /// The effects that cannot be told apart, best first; empty where nothing explains the rows.
+    /// The effects that cannot be distinguished, best first; empty if no effect explains the rows.
     pub effects: Vec<String>,
-    /// By how much the Bayesian information criterion falls with the best of them.
+    /// Fall of the Bayesian information criterion with the best of them.
     pub evidence: Option<f64>,
-    /// The next effect, whether in the group or behind it, and its evidence.
+    /// The next effect, in the group or after it, and its fall of the criterion.
     pub next: Option<Other>,
     /// The size of the best effect.
     pub size: Option<Size>,
-    /// The score that passed the threshold when the alarm was raised, and the threshold.
+    /// The score above the threshold at the alarm, and the threshold.
     pub score: f64,
-    /// See `score`.
+    /// Threshold of `score`.
     pub threshold: f64,
-    /// Of several outputs the one at which the offset of the reading had the largest score when the alarm was raised: the vessel whose level
-    /// it reads.
+    /// With several outputs, the one whose reading offset had the largest score at the alarm: this names the vessel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<String>,
-    /// All of it in words.
+    /// The alarm in words.
     pub sentence: String,
 }
 
-/// An effect and its evidence.
+/// An effect and its fall of the criterion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Other {
     /// The effect.
     pub effect: String,
-    /// By how much the criterion falls with it.
+    /// Fall of the criterion with the effect.
     pub evidence: f64,
 }
 
@@ -80,25 +79,26 @@ pub struct Other {
 pub struct Size {
     /// The parameter's name.
     pub name: String,
-    /// Its value; of a drift, what has been reached by now.
+    /// Value of the size; for a drift, the present value.
     pub value: f64,
-    /// Its unit; empty for a share.
+    /// Unit of the size; empty for a share.
     pub unit: String,
-    /// The vessel, of several; of an effect at a sensor the one whose level that reads, of several outputs.
+    /// The vessel, if there are several; for an effect at a sensor the vessel whose level it reads, if there are several outputs.
     pub vessel: Option<String>,
 }
 
 /// Units of the signals, for sentences.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Units {
-    /// Of the readings.
+    /// Unit of the readings.
     pub output: String,
-    /// Of the command.
+    /// Unit of the command.
     pub input: String,
 }
 
 impl Alarm {
-    /// Nothing explains the rows so far; `output`: the name of the one at which it shows most, of several. The sentence is not there yet.
+    /// Alarm that no effect explains the rows so far; `output`: name of the output with the largest deviation, if there are several. The
+    /// sentence is added later.
     pub(crate) fn unexplained(raised: &Raised, output: Option<String>) -> Self {
         Self {
             schema: SCHEMA,
@@ -118,7 +118,7 @@ impl Alarm {
     }
 }
 
-/// What a look at the rows found.
+/// Result of an evaluation of the rows.
 pub(crate) fn alarm(
     raised: &Raised,
     suspects: &[Suspect],
@@ -180,7 +180,7 @@ fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain, axis: &Tim
             format!("; it shows most at the {}", domain.sensor_words(output))
         });
         format!(
-            "The model does not fit since about {} or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
+            "The model has not fitted since about {} or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
             axis.at(raised),
             alarm.score,
             alarm.threshold
@@ -188,7 +188,7 @@ fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain, axis: &Tim
     })
 }
 
-/// What the rows are consistent with, `place` in words behind the size; `None` where nothing explains them.
+/// Sentence on the effect that the rows are consistent with; `place` follows the size in words. `None` if no effect explains the rows.
 pub(crate) fn consistent(alarm: &Alarm, place: &str, axis: &TimeAxis) -> Option<String> {
     let (since, evidence, size) = (alarm.since?, alarm.evidence?, alarm.size.as_ref()?);
     let unit = if size.unit.is_empty() {
@@ -204,7 +204,7 @@ pub(crate) fn consistent(alarm: &Alarm, place: &str, axis: &TimeAxis) -> Option<
     });
     let group = match &alarm.effects[..] {
         [_, others @ ..] if !others.is_empty() => {
-            format!("; not to be told yet from {}", others.join(", "))
+            format!("; not yet distinguishable from {}", others.join(", "))
         }
         _ => String::new(),
     };

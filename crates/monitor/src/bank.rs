@@ -1,15 +1,16 @@
-//! Scores: does the learned model still fit, in each direction in which it may change, over windows of several lengths?
+//! Scores: tests whether the learned model still fits, in each direction of a possible change, over windows of several lengths.
 //!
 //! For a direction `i` (a parameter of the plant, or an offset of one output) let `s_io` be the derivative of the reading of output `o`,
-//! whitened by the noise's colour and in units of its innovations, and `e_o` the whitened residual. With `l = exp(-1/W)`, a sample adds over
-//! the outputs that have a reading
+//! whitened by the noise's spectrum and in units of its innovations, and `e_o` the whitened residual. With `l = exp(-1/W)`, a sample adds
+//! over the outputs that have a reading
 //! ```text
 //! z_i <- l z_i + sum_o s_io e_o      v_i <- l^2 v_i + sum_o s_io^2      c_i <- l c_i + sum_o s_io s_po      score_i = z_i/sqrt(v_i + c_i' P c_i)
 //! ```
-//! is the score statistic of a change of direction `i` within the window (M. Basseville, I. V. Nikiforov, Detection of Abrupt
-//! Changes, 1993, ch. 8: the local approach), `s_p` the parameters' derivatives and `P` the covariance with which they were learned: an error
-//! of learning leaves `c_i' dp` in `z_i`. The noises of the outputs are independent. The sum is a martingale in a loop too, where `s`
-//! depends on the past noise. So the score is standard normal where nothing has changed. `e_o` is cut at 4, so that a few wild readings do not raise an alarm.
+//! is the score statistic of a change of direction `i` within the window (M. Basseville, I. V. Nikiforov, Detection of Abrupt Changes,
+//! 1993, ch. 8: the local approach), `s_p` the parameters' derivatives and `P` the covariance with which they were learned: an error of
+//! learning leaves `c_i' dp` in `z_i`. The noises of the outputs are independent. The sum is a martingale in a loop too, where `s` depends
+//! on the past noise. So the score is standard normal where nothing has changed. `e_o` is cut at 4, so that a few wild readings do not
+//! raise an alarm.
 //!
 //! Cost: windows x directions x (parameters + 4) x outputs multiplications a sample; the product with `P` only where `z_i^2/v_i` passes.
 
@@ -19,7 +20,7 @@ use serde::{Deserialize, Serialize};
 const WINDOWS: [f64; 4] = [0.25, 0.75, 2.0, 6.0];
 /// The unit of the windows is at least so many rows.
 const FEWEST: f64 = 16.0;
-/// Innovations count up to this many standard deviations.
+/// Innovations are clipped at this many standard deviations.
 const CUT: f64 = 4.0;
 
 /// The lengths of the windows \[rows\], for a time constant in rows.
@@ -32,13 +33,14 @@ pub(crate) fn windows(time_constant: f64) -> [f64; WINDOWS.len()] {
 pub(crate) struct Bank {
     lengths: Vec<f64>,
     keep: Vec<f64>,
-    /// Parameters, which come first among the directions, and directions: behind them an offset of each output.
+    /// Number of parameters, which come first among the directions, and of directions: after the parameters there is an offset of each
+    /// output.
     parameters: usize,
     directions: usize,
-    /// For each window and direction.
+    /// One sum for each window and direction.
     z: Vec<f64>,
     v: Vec<f64>,
-    /// For each window and direction, an entry for each parameter.
+    /// For each window and direction, one entry for each parameter.
     c: Vec<f64>,
 }
 
@@ -83,8 +85,8 @@ impl Bank {
             && self.c.len() == cells * parameters
     }
 
-    /// Takes in the whitened rows of a sample, one for each output that has a reading: a derivative for each direction, then the residual.
-    /// Whether a score passes the threshold; `covariance` is that of the parameters, row by row.
+    /// Processes the whitened rows of a sample, one for each output with a reading: a derivative for each direction, then the residual.
+    /// Returns whether a score exceeds the threshold; `covariance` is that of the parameters, row by row.
     pub(crate) fn update(&mut self, rows: &[f64], covariance: &[f64], threshold: f64) -> bool {
         let (p, q) = (self.parameters, self.directions);
         let limit = threshold * threshold;
@@ -117,7 +119,7 @@ impl Bank {
     /// The largest magnitude of a score.
     pub(crate) fn largest(&self, covariance: &[f64]) -> f64 {
         let cells = 0..self.z.len();
-        // Where nothing has been seen yet there is no score.
+        // Before the first row there is no score.
         cells
             .map(|cell| self.score(cell, covariance))
             .fold(0.0, f64::max)

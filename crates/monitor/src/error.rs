@@ -1,15 +1,15 @@
-//! What a monitor refuses.
+//! Errors of a monitor.
 
-/// Why there is no monitor.
+/// Reason why no monitor can be built.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The plant and its effects do not go together.
+    /// The plant and its effects are incompatible.
     #[error(transparent)]
     Structure(#[from] plants::Error),
-    /// An effect that follows the time since a record began.
+    /// An effect that is a function of the time since a record began.
     #[error(
-        "{effect} follows the time since a record began, and what is watched has no beginning: remove it, the monitor looks for it by itself"
+        "{effect} follows the time since a record began, and a monitored plant has no start time: remove it, the monitor looks for it by itself"
     )]
     ByClock {
         /// The effect.
@@ -28,12 +28,12 @@ pub enum Error {
         "the model has a measured disturbance, and a row of the monitor has one input: delete disturbance under [known] and its column"
     )]
     Disturbance,
-    /// A model of its user's own that follows the time itself.
+    /// A user's own model that depends on time explicitly.
     #[error(
-        "the model uses `time`, and what is watched has no beginning: give what follows the clock as an input"
+        "the model uses `time`, and a monitored plant has no start time: give what follows the clock as an input"
     )]
     Time,
-    /// A model of its user's own without parameters that are fitted.
+    /// A user's own model without parameters that are fitted.
     #[error(
         "the model has no parameter that is fitted: declare one of them as `parameter`, so that it can be learned and tracked"
     )]
@@ -41,14 +41,14 @@ pub enum Error {
     /// A setting is outside its range.
     #[error("{setting} is {value}, but has to be {range}")]
     Setting {
-        /// Which setting.
+        /// Name of the setting.
         setting: &'static str,
         /// Its value.
         value: f64,
-        /// What is allowed.
+        /// Allowed range.
         range: &'static str,
     },
-    /// A state that another version wrote.
+    /// A state from another version.
     #[error(
         "the state is of version {found}, and this program reads version {known}: begin without it"
     )]
@@ -60,22 +60,22 @@ pub enum Error {
     },
     /// A state of another model.
     #[error(
-        "the state belongs to another model: {differences}; name another state file, or delete it to begin anew"
+        "the state belongs to another model: {differences}; name another state file, or delete it to start again"
     )]
     OtherModel {
-        /// What differs, in the words of the model file.
+        /// The differences, in the words of the model file.
         differences: String,
     },
-    /// A state whose numbers do not go together.
-    #[error("the state is damaged: {what}; delete it to begin anew")]
+    /// A state with inconsistent numbers.
+    #[error("the state is damaged: {what}; delete it to start again")]
     Damaged {
-        /// What does not go together.
+        /// Inconsistency.
         what: String,
     },
 }
 
-/// Why a row is not used, or one of its readings is not ([`Step::lost`](crate::Step::lost)). A row that is not used leaves the monitor as it was,
-/// but for the count of times that go back.
+/// Reason why a row or one of its readings is not used ([`Step::lost`](crate::Step::lost)). A row that is not used does not change the
+/// monitor, except for the count of times that go back.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refused {
@@ -84,7 +84,7 @@ pub enum Refused {
     NotFinite {
         /// `time`, `input` or `output`.
         column: &'static str,
-        /// Which of the inputs or outputs, counted from zero.
+        /// Index of the input or output, from zero.
         at: usize,
         /// The value.
         value: f64,
@@ -94,14 +94,14 @@ pub enum Refused {
     TooLarge {
         /// `time`, `input` or `output`.
         column: &'static str,
-        /// Which of the inputs or outputs, counted from zero.
+        /// Index of the input or output, from zero.
         at: usize,
         /// The value.
         value: f64,
-        /// What has to be larger than it.
+        /// Limit of the absolute value.
         limit: f64,
     },
-    /// A command that no pump of this range gets: simulated, it would bury the model for hours.
+    /// A command far outside the range of this pump: simulated, it would make the model useless for hours.
     #[error("{value} is beyond the command's full range, input_range = {range}")]
     BeyondRange {
         /// The value.
@@ -109,7 +109,7 @@ pub enum Refused {
         /// The full range.
         range: f64,
     },
-    /// A reading that no sensor of this tank gives, however wrong it is.
+    /// A reading that a sensor of this tank cannot give, even with a large error.
     #[error("{value} is far above the tank, tank_height = {height}")]
     AboveTank {
         /// The value.
@@ -134,7 +134,7 @@ pub enum Refused {
 }
 
 impl Refused {
-    /// Which of the inputs or outputs is to be looked at, counted from zero.
+    /// Index of the input or output in question, from zero.
     #[must_use]
     pub fn at(&self) -> usize {
         match self {
@@ -143,7 +143,7 @@ impl Refused {
         }
     }
 
-    /// The column to look at: `time`, `input` or `output`.
+    /// Name of the column in question: `time`, `input` or `output`.
     #[must_use]
     pub fn column(&self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! What a saved state has to agree with, in the words of the model file, and where it does not.
+//! Properties that have to agree between a saved state and the model, in the words of the model file, and their differences.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,13 +6,13 @@ use greybox::PriorValue;
 
 use crate::Model;
 
-/// Of a model of its user's own the seconds in one unit of its time.
+/// For a user's own model: the seconds in one unit of its time.
 pub(crate) const TIME_UNIT: &str = "unit of time, s";
 
 /// A longer value is not quoted: a term may have 512 knots.
 const LONGEST: usize = 60;
 
-/// Each entry of the model file and its value, written with all its digits.
+/// Each entry of the model file with its value, printed with all digits.
 pub(crate) type Fingerprint = BTreeMap<String, String>;
 
 /// The entries of a model.

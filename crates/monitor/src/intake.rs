@@ -1,33 +1,34 @@
-//! Rows as they come: what is refused, where samples are missing, and the means of blocks of rows.
+//! Incoming rows: rejected rows, gaps, and means of blocks of rows.
 //!
 //! The usual step of the time is the median of the first 21. A step of more than one and a half times the longest of them is
 //! a gap: a short one is bridged by the held command, a longer one begins a new stretch. Where 20 steps in a
 //! row are of another length, the sampling interval has changed. A time that goes back is refused; where 100 rows in a row do, in order
 //! among themselves, the clock was set back, or ran ahead for a row, and a new stretch begins.
 //!
-//! A process that is sampled much faster than it moves is watched in blocks: time, command and reading are their means over
+//! A process that is sampled much faster than its dynamics is monitored in blocks: time, command and reading are their means over
 //! `every` rows, and the command runs in a straight line from one mean to the next.
 //!
-//! A row may lack the reading of an output. In a block such a row is taken on the straight line between the readings beside it; a block whose
-//! last row lacks the reading, or more than half of its rows, has none of that output.
+//! A row may lack the reading of an output. In a block such a row is taken on the straight line between the readings beside it; a block
+//! whose last row lacks the reading, or more than half of its rows, has none of that output.
 
 use serde::{Deserialize, Serialize};
 
 use crate::{Each, Notice, Refused, Row};
 
-/// Steps from which the usual one is taken.
+/// Number of steps from which the usual one is computed.
 const STEPS: usize = 21;
 /// A step above this many of the longest usual ones is a gap.
 const GAP: f64 = 1.5;
-/// Steps of another length in a row that make it the usual one.
+/// Number of consecutive steps of another length that make it the usual one.
 const OTHER: usize = 20;
-/// Rows in a row whose time goes back, after which it is the clock that did: more than a logger sends again when its line was down.
+/// Number of consecutive rows with earlier times after which the clock counts as set back: more than a logger repeats after a broken
+/// connection.
 const BACK: usize = 100;
-/// A gap of more than so many usual steps begins a new stretch.
+/// A gap of more than this number of usual steps starts a new part.
 const BRIDGED: f64 = 5.0;
-/// Values beyond this cannot be raised to the powers that a fit takes.
+/// Larger values would overflow in the powers that a fit computes.
 const LARGEST: f64 = 1e15;
-/// Rows that a monitor counts; at a million rows a second it comes to so many after 285 years.
+/// Largest count of rows; at a million rows a second it is reached after 285 years.
 const MOST_ROWS: u64 = 1 << 53;
 /// Rows in a block.
 pub(crate) const LONGEST_BLOCK: usize = 1 << 24;
@@ -35,7 +36,7 @@ pub(crate) const LONGEST_BLOCK: usize = 1 << 24;
 /// A reading of each output; `None` where it is lost.
 pub(crate) type Readings = Each<Option<f64>>;
 
-/// A row, or the mean of a block of rows, as it is watched.
+/// A row, or the mean of a block of rows, for monitoring.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Sample {
     /// \[s\]
@@ -44,29 +45,29 @@ pub(crate) struct Sample {
     pub inputs: Each<f64>,
     /// In the order of the outputs.
     pub outputs: Readings,
-    /// How it follows the one before.
+    /// Relation to the preceding sample.
     pub follows: Follows,
 }
 
-/// How a sample follows the one before.
+/// Relation of a sample to the preceding one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Follows {
-    /// After the usual step, or a gap that is bridged.
+    /// One step later, or after a gap that is bridged.
     On,
     /// After a long gap.
     Gap,
-    /// The first one of another sampling interval.
+    /// The first sample with another sampling interval.
     Interval,
 }
 
-/// What became of a row.
+/// Result of a row.
 pub(crate) struct Taken {
-    /// What is to be watched, where a block is complete.
+    /// The sample to be monitored, if a block is complete.
     pub sample: Option<Sample>,
     pub notice: Option<Notice>,
 }
 
-/// A value that can be computed with; `at`: of the inputs or the outputs which.
+/// Checks that a value can be used in computations; `at`: index of the input or output.
 pub(crate) fn usable(column: &'static str, at: usize, value: f64) -> Result<f64, Refused> {
     if !value.is_finite() {
         return Err(Refused::NotFinite { column, at, value });
@@ -90,13 +91,13 @@ pub(crate) struct Intake {
     /// Rows that were taken.
     pub rows: u64,
     pub last: Option<f64>,
-    /// Of the latest rows that lie before that, in order among themselves: the last one's time, and how many.
+    /// For the latest rows with earlier times, if their times increase: time of the last one, and their number.
     back: Option<(f64, usize)>,
     /// The latest steps, at most [`STEPS`].
     steps: Vec<f64>,
     /// Median and longest of the usual steps.
     usual: Option<(f64, f64)>,
-    /// Steps of another length in a row.
+    /// Number of consecutive steps of another length.
     other: usize,
     /// Sum of the block's times (since its first), and of each of its inputs; rows in it; its first time.
     sum: f64,
@@ -110,12 +111,12 @@ pub(crate) struct Intake {
 /// The readings of an output.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct Output {
-    /// Sum of the block's.
+    /// Sum of the block's readings.
     sum: f64,
-    /// The latest one of the stretch, and rows without one since.
+    /// The latest reading of the part, and rows without a reading since.
     reading: Option<f64>,
     without: usize,
-    /// Rows of the block with one.
+    /// Number of rows of the block with a reading.
     readings: usize,
 }
 
@@ -138,7 +139,7 @@ impl Intake {
         }
     }
 
-    /// The numbers that a file may have spoilt.
+    /// The numbers that a damaged file may have changed.
     pub(crate) fn sound(&self, inputs: usize, outputs: usize) -> bool {
         (1..=LONGEST_BLOCK).contains(&self.every)
             && self.rows <= MOST_ROWS
@@ -164,7 +165,7 @@ impl Intake {
         }
     }
 
-    /// Takes in a row with those of its `readings` that can be used.
+    /// Processes a row with its usable `readings`.
     pub(crate) fn take(&mut self, row: &Row, readings: &Readings) -> Result<Taken, Refused> {
         let time = usable("time", 0, row.time)?;
         for at in 0..self.inputs.len() {
@@ -230,7 +231,7 @@ impl Intake {
         self.begin();
     }
 
-    /// A row that goes back is refused, but not for ever: one wrong time that lies ahead would make the monitor deaf.
+    /// A row with an earlier time is rejected, but not for ever: after a single wrong future time the monitor would reject all rows.
     fn set_back(&mut self, previous: f64, time: f64) -> Result<Notice, Refused> {
         let count = match self.back {
             Some((last, count)) if time >= last => count + usize::from(time > last),
@@ -247,7 +248,7 @@ impl Intake {
         })
     }
 
-    /// Looks at a step of the time.
+    /// Processes a step of the time.
     fn step(&mut self, previous: f64, time: f64) -> Option<Notice> {
         let step = time - previous;
         if self.steps.len() == STEPS {
@@ -293,7 +294,7 @@ impl Intake {
         })
     }
 
-    /// Of the latest steps; a single long one is no usual one.
+    /// Median and longest of the latest steps; a single long step is unusual.
     fn median_and_longest(&self) -> (f64, f64) {
         let mut sorted = self.steps.clone();
         sorted.sort_by(f64::total_cmp);
@@ -302,7 +303,8 @@ impl Intake {
 }
 
 impl Output {
-    /// Adds a reading to the block of so many rows, this one among them, and what the rows of the block right before it lack.
+    /// Adds a reading to a block of the given number of rows, including this one and the missing readings of the rows of the block directly
+    /// before it.
     fn read(&mut self, reading: f64, filled: usize) {
         let in_block = self.without.min(filled - 1);
         let before = self.reading.unwrap_or(reading);

@@ -1,14 +1,13 @@
-//! Isolation: which effect of the catalogue began, and when, explains the latest rows.
+//! Isolation: the effect of the catalogue, and its onset, that explains the latest rows.
 //!
-//! An effect that begins at row `k` is fitted to the rows of all outputs from `k` on by `greybox`, in the metric of the learned noise: every
-//! parameter of the plant as it was learned, the levels at `k` as the learned model has them, only the effect's own
-//! parameters free. Onsets lie on a grid that is finer towards now, and then between its neighbours. With the innovations
-//! `e` of the learned model,
+//! An effect that begins at row `k` is fitted to the rows of all outputs from `k` on by `greybox`, in the metric of the learned noise:
+//! every parameter of the plant as it was learned, the levels at `k` as the learned model has them, only the effect's own parameters free.
+//! Onsets lie on a grid that is finer towards now, and then between its neighbours. With the innovations `e` of the learned model,
 //! ```text
 //! evidence = sum_o (sum_{j >= k} e_jo^2 - cost_o/sigma_o^2) - (parameters + 1) ln n
 //! ```
 //! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs `o`.
-//! Effects within [`GROUP_MARGIN`] of the best cannot be told apart yet.
+//! Effects within [`GROUP_MARGIN`] of the best cannot be distinguished yet.
 
 mod search;
 
@@ -22,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use self::search::Search;
 use crate::{Each, intake::Sample, learn::Learned, lost::interpolated};
 
-/// Effects that begin while a plant runs. What is a plant's shape, a wrong law or a lag does not.
+/// Effects that can begin while a plant runs. The plant's shape, a wrong law or a lag are not among them.
 const BEGIN: [&str; 12] = [
     "stiction_backlash",
     "pump_deadzone",
@@ -44,9 +43,9 @@ const ONSETS: [f64; 13] = [
 ];
 /// At every such onset the catalogue's starts are tried again.
 const AFRESH: usize = 4;
-/// An onset has at least so many rows behind it.
+/// Least number of rows after an onset.
 pub(crate) const FEWEST: usize = 8;
-/// A drift of the pump is even where its settling takes as long as it may.
+/// A drift of the pump is linear if its settling time is at its upper bound.
 const EVEN: (&str, &str) = ("pump_gain_drift", "time_constant");
 pub(crate) const ROUGH: Stopping = Stopping {
     evaluations: 8,
@@ -56,42 +55,44 @@ pub(crate) const FINE: Stopping = Stopping {
     evaluations: 40,
     cost: 1e-8,
 };
-/// What is left is more than noise where its squares lie so many standard errors above those of the noise ...
+/// The residual is more than noise if its sum of squares exceeds that of the noise by this number of standard errors ...
 const BEYOND: f64 = 4.0;
-/// ... and are more than this share of what was above the noise before: no learned model is exact, and beside a large effect its errors show.
+/// ... and if the excess is more than this share of the excess without the effect: no learned model is exact, and its errors are visible in
+/// the presence of a large effect.
 const LEFT: f64 = 0.1;
 
-/// A row that is kept, with what the learned model said of it.
+/// A stored row with the output of the learned model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Kept {
     pub sample: Sample,
-    /// States of the learned model: the levels, of a plant.
+    /// States of the learned model: the levels of a plant.
     pub states: Each<f64>,
-    /// Where in it stood what the command moves: play has a memory without an end, and no run-up finds it.
+    /// State of the actuator's backlash in the input's unit: backlash has unlimited memory, so the state cannot be found by simulating a
+    /// few rows.
     pub stands: f64,
-    /// Readings of the learned model.
+    /// Simulated readings of the learned model.
     pub modelled: Each<f64>,
     /// Whitened residual of each output in its standard deviations; zero where the reading is lost.
     pub innovations: Each<f64>,
 }
 
 impl Kept {
-    /// Measured minus the learned model.
+    /// Residual: measured minus the learned model's output.
     pub(crate) fn residual(&self, output: usize) -> Option<f64> {
         Some(self.sample.outputs[output]? - self.modelled[output])
     }
 }
 
-/// An effect that explains the latest rows, as well as it can.
+/// An effect with its best explanation of the latest rows.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Suspect {
     pub placed: Placed,
     pub evidence: f64,
     /// \[s\]
     pub since: f64,
-    /// Its size: name, value, unit.
+    /// Size of the effect: name, value, unit.
     pub size: (&'static str, f64, Unit),
-    /// The size lies inside its plausible range.
+    /// Whether the size is inside its plausible range.
     pub plausible: bool,
     pub(crate) left: Left,
 }
@@ -99,16 +100,16 @@ pub(crate) struct Suspect {
 /// Whitened squares from an onset on, in the noise's variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Left {
-    /// What the learned model leaves.
+    /// Sum of squares of the learned model.
     pub before: f64,
-    /// What is left with an effect.
+    /// Sum of squares with the effect.
     pub left: f64,
-    /// Rows there times outputs.
+    /// Number of rows times outputs.
     pub samples: usize,
 }
 
 impl Left {
-    /// What an effect leaves is more than noise.
+    /// Whether the residual with the effect is more than noise.
     pub(crate) fn is_more_than_noise(self) -> bool {
         let n = self.samples as f64;
         self.left > n + BEYOND * (2.0 * n).sqrt() && self.left - n > LEFT * (self.before - n)
@@ -116,15 +117,15 @@ impl Left {
 }
 
 impl Suspect {
-    /// Belongs to the group of the best.
+    /// Whether the effect belongs to the group of the best.
     pub(crate) fn near(&self, best: &Self) -> bool {
         self.plausible && best.evidence - self.evidence < GROUP_MARGIN
     }
 }
 
-/// Every effect that may have begun, best first: an implausible size comes after every plausible one. The noise of each output is `growth`
-/// times as large as it was learned. Residuals of lost readings are taken on straight lines between those beside them, for each effect alike;
-/// they count as readings. An output that has no reading in all the rows is left out.
+/// Every effect that may have begun, best first: implausible sizes come last. The noise of each output is `growth` times the learned noise.
+/// Residuals of missing readings are interpolated linearly, in the same way for each effect; they count as readings. An output without any
+/// reading in all rows is left out.
 pub(crate) fn isolate(
     structure: &Structure,
     learned: &Learned,
@@ -191,7 +192,7 @@ pub(crate) fn isolate(
             .partial_cmp(&(a.plausible, a.evidence))
             .unwrap_or(std::cmp::Ordering::Equal)
     });
-    // Of two vessels, or outputs, the one that explains more.
+    // Of two vessels or outputs, the one that explains more.
     let mut best: Vec<Suspect> = Vec::with_capacity(suspects.len());
     for suspect in suspects {
         if best
@@ -204,7 +205,7 @@ pub(crate) fn isolate(
     best
 }
 
-/// Innovations of an output in their standard deviations, of lost readings too: as a fit to the filled record has them.
+/// Innovations of an output in standard deviations, also for missing readings: according to a fit to the interpolated record.
 fn innovations(rows: &[Kept], output: usize, residuals: &[f64], noise: &ArModel) -> Vec<f64> {
     let p = noise.order();
     (0..rows.len())
@@ -223,9 +224,9 @@ fn innovations(rows: &[Kept], output: usize, residuals: &[f64], noise: &ArModel)
 
 /// An output in each row.
 struct Series {
-    /// Measured or filled in; all NaN where there is none.
+    /// Measured or interpolated readings; all NaN if there are none.
     readings: Vec<f64>,
-    /// The same less the learned model's.
+    /// Residuals minus those of the learned model.
     residuals: Vec<f64>,
 }
 

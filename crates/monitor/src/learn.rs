@@ -1,4 +1,4 @@
-//! The learning phase: the believed model fitted to the first rows of all outputs, and the noise that it leaves at each.
+//! Learning phase: the believed model is fitted to the first rows of all outputs, and a noise model to the residual of each output.
 
 mod learned;
 
@@ -11,22 +11,24 @@ pub use self::learned::Model;
 pub(crate) use self::learned::{Learned, OutputNoise};
 use crate::{intake::Sample, lost::expect, lost::interpolated, scatter::Limit};
 
-/// A command that moves by less of itself stands still.
+/// A command with a smaller relative change is constant.
 const STILL: f64 = 1e-9;
 
-/// Fewest rows with a reading of each output, as a part of all.
+/// Least share of rows with a reading of each output.
 pub(crate) const READ: f64 = 0.5;
 
-/// Fits in turn with what is expected of lost readings: each leaves of the error of the one before the share of the information that is lost.
+/// Number of iterated fits with expected values for missing readings: each reduces the preceding error by the share of the missing
+/// information.
 const ROUNDS: usize = 2;
 
-const NO_NOISE: &str = "the model leaves no noise to judge by: are the readings measured?";
+const NO_NOISE: &str =
+    "the residual is zero, so no threshold can be set: are the readings measured?";
 
-/// More of either was never learned: a state that says so would be computed for ever.
+/// Larger values are never learned: a state with larger values would need endless computing time.
 const MOST_SUBSTEPS: usize = 1024;
 const MOST_COEFFICIENTS: usize = 64;
 
-/// Whether an input of this range has not moved.
+/// Whether an input with this range is constant.
 pub(crate) fn stands_still(low: f64, high: f64) -> bool {
     high - low <= STILL * high.abs().max(low.abs())
 }
@@ -59,13 +61,13 @@ pub(crate) fn record<'a>(
     record
 }
 
-/// Where in its band a valve that sticks stands when a record begins.
+/// State of a sticking valve within its band at the start of a record.
 pub(crate) const BEGIN: &str = "stiction_backlash.begin";
 
-/// The fit, and the levels at the first row; in words why there is none.
+/// The fit, and the levels at the first row; or the reason in words why there is none.
 ///
-/// Where readings are lost, what is expected of them under the fitted model and its noise stands in for them, and the fit is repeated
-/// (after the EM algorithm, A. P. Dempster, N. M. Laird, D. B. Rubin, J. Royal Statistical Society B 39, 1977, without the covariance of what is
+/// Where readings are lost, what is expected of them under the fitted model and its noise can replace them, and the fit is repeated (after
+/// the EM algorithm, A. P. Dempster, N. M. Laird, D. B. Rubin, J. Royal Statistical Society B 39, 1977, without the covariance of what is
 /// missing: the more readings are lost, the more coloured the noise looks).
 pub(crate) fn learn(
     model: &Model,
@@ -75,7 +77,7 @@ pub(crate) fn learn(
     let vessels = model.known.outputs(model.plant);
     let outputs = vessels.len();
     let mut filled = Vec::with_capacity(outputs);
-    // Of each output the rows without a reading.
+    // For each output the rows without a reading.
     let mut lost: Vec<Vec<usize>> = Vec::with_capacity(outputs);
     for output in 0..outputs {
         let readings: Vec<Option<f64>> = samples.iter().map(|s| s.outputs[output]).collect();
@@ -99,7 +101,7 @@ pub(crate) fn learn(
     let options = FitOptions::default();
     let said = |error: &dyn std::fmt::Display| error.to_string();
     let mut fixed = model.fixed();
-    // The simulation goes on from where the last one stood, and does not begin within the band anew.
+    // The simulation continues from the last state, and does not start again within the band.
     fixed.insert(BEGIN.into(), 0.0);
     let bare = Setup::from_records(
         model.plant,
@@ -120,7 +122,7 @@ pub(crate) fn learn(
     let (low, high) = record.input_range();
     if stands_still(low, high) {
         return Err(format!(
-            "the command has stood still at {low}, which says nothing about the plant: move it"
+            "the command has been constant at {low}, which does not excite the plant: move it"
         ));
     }
     let mut starts = random_starts(&setup, options.starts, options.seed);
@@ -152,7 +154,8 @@ pub(crate) fn learn(
     }
 
     let n = setup.parameter_count();
-    // What stands in for a lost reading has no noise, and says nothing of its own. The output that lost most counts for all.
+    // The replacement of a missing reading has no noise and adds no information. The output with the most missing readings determines the
+    // number of rows.
     let read = |output: usize| samples.len() - lost[output].len();
     let all_over_read = |output: usize| samples.len() as f64 / read(output) as f64;
     let most = (0..outputs).map(all_over_read).fold(1.0, f64::max);
@@ -195,7 +198,7 @@ pub(crate) fn learn(
     Ok((learned, levels))
 }
 
-/// The covariance of a fit's first `n` entries, row by row, so many times as large; zero for what was not fitted, or held at a bound.
+/// The covariance of a fit's first `n` entries, row by row, this many times as large; zero for what was not fitted, or held at a bound.
 pub(crate) fn covariance(fit: &Fit, n: usize, widened: f64) -> Result<Vec<f64>, String> {
     let errors = fit.std_errors();
     let mut covariance = vec![0.0; n * n];
@@ -241,9 +244,9 @@ pub(crate) fn output_noise(
             whitener.skip();
         }
     }
-    // Of several outputs each has fewer parameters to itself: the limit is a little wide.
+    // With several outputs, each has fewer parameters than assumed: the limit is slightly wide.
     let scatter = Limit::learned(&innovations, parameters)
-        .ok_or("the model leaves no noise to judge by: do the readings move?")?;
+        .ok_or("the residual is zero, so no threshold can be set: do the readings move?")?;
     Ok(OutputNoise {
         coefficients: noise.coefficients().to_vec(),
         sigma,
@@ -252,7 +255,7 @@ pub(crate) fn output_noise(
     })
 }
 
-/// The fit once more, with what is expected of lost readings beside it in the record.
+/// The fit repeated with the expected values of missing readings in the record.
 fn again(
     setup: &Setup,
     records: &mut [Record; 1],

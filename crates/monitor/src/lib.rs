@@ -1,25 +1,25 @@
-//! Watches a plant row by row: tracks its parameters, says when the model stops fitting, since when, and which effect of the
-//! catalogue it looks like. It watches one of the plants, or a model of its user's own.
+//! Monitors a plant row by row: tracks its parameters, detects when the model stops fitting, since when, and which effect
+//! of the catalogue is consistent with the change. It monitors a built-in plant, or a user's own model.
 //!
 //! | question | answer |
 //! |---|---|
 //! | Where do I start? | [`Monitor::new`] with the believed [`Model`] or [`OwnModel`], then [`Monitor::update`] once a row |
-//! | What does a row say? | [`Step`]: the innovation of each output, and now and then an [`Alarm`], a [`ScatterAlarm`] or a [`Notice`] |
+//! | What is the result of a row? | [`Step`]: the innovation of each output, and now and then an [`Alarm`], a [`ScatterAlarm`] or a [`Notice`] |
 //! | What are the parameters now? | [`Monitor::estimates`] |
-//! | What if it is stopped? | [`Monitor::state`] is saved, [`Monitor::restore`] goes on as if nothing had happened |
+//! | What if it is stopped? | save [`Monitor::state`]; [`Monitor::restore`] continues without a difference |
 //!
-//! It learns first: the believed model is fitted to the first rows (a thousand and twenty time constants at least), with the
-//! colour of the noise at each output. From then on the learned model runs beside the plant on the measured command, and never
-//! learns: so a feedback that hides a change in the reading shows it in the command, and a slow change does not pass for
-//! normal. After an alarm it stays the learned one, until it fits again. Memory is constant, and a row of up to eight inputs, outputs and states
-//! each allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
+//! It learns first: the believed model is fitted to the first rows (a thousand and twenty time constants at least), with the spectrum of
+//! the noise at each output. From then on the learned model is simulated in parallel with the plant on the measured command, and does not
+//! adapt: a change that feedback hides in the reading is then visible through the command, and a slow change does not become normal. After
+//! an alarm the learned model is kept until it fits again. Memory is constant, and a row of up to eight inputs, outputs and states each
+//! allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
 //!
-//! **Several outputs.** Readings are given in the order of [`plants::Known::measured`], or of the outputs of the text. Each output has a noise of its own, independent of the
-//! others, and may lack readings for itself. One model runs beside all of them: scores, tracker and isolation take each innovation in units
-//! of its own standard deviation, and an alarm that speaks of a sensor says of which.
+//! **Several outputs.** Readings are given in the order of [`plants::Known::measured`], or of the outputs of the text. Each output has a
+//! noise of its own, independent of the others, and may lack readings for itself. One model runs beside all of them: scores, tracker and
+//! isolation take each innovation in units of its own standard deviation, and an alarm that speaks of a sensor says of which.
 //!
-//! **Models of their user's own** have any number of inputs, outputs and states. Which effect a change looks like is not asked of them: an alarm
-//! says since when the model does not fit.
+//! **Users' own models** have any number of inputs, outputs and states. For these models no effect is named: an alarm gives the
+//! time since when the model does not fit.
 //!
 //! # Example
 //! A tank loses water from the 3000th row on.

@@ -1,11 +1,11 @@
-//! What stands in for lost readings where a whole record is needed.
+//! Replacement of missing readings for computations that need a complete record.
 
 use ct_signals::ArModel;
 
-/// Sweeps over the lost values; one is enough where no two lie within the noise's order.
+/// Sweeps over the missing values; one is enough if no two are within the noise's order.
 const SWEEPS: usize = 30;
 
-/// Values that are missing on straight lines between their neighbours, at an end as the nearest one; `None` where there is none at all.
+/// Linear interpolation of missing values, at an end with the nearest value; `None` if there is no value.
 pub(crate) fn interpolated(values: &[Option<f64>]) -> Option<Vec<f64>> {
     let first = values.iter().position(Option::is_some)?;
     let mut before = values[first]?;
@@ -25,7 +25,7 @@ pub(crate) fn interpolated(values: &[Option<f64>]) -> Option<Vec<f64>> {
     Some(filled)
 }
 
-/// Gives the `lost` values of a noise what is expected of them beside the others: the least squares of the innovations.
+/// Sets the `lost` values of a noise to their conditional mean given the others: least squares of the innovations.
 pub(crate) fn expect(noise: &ArModel, values: &mut [f64], lost: &[usize]) {
     let filter: Vec<f64> = std::iter::once(1.0)
         .chain(noise.coefficients().iter().map(|a| -a))
@@ -67,7 +67,7 @@ mod tests {
         let mut values = [1.0, 2.0, 77.0, -1.0, 3.0];
         expect(&noise, &mut values, &[2]);
         assert!((values[2] - a * (2.0 - 1.0) / (1.0 + a * a)).abs() < 1e-12);
-        // At the end there is only what was before.
+        // At the end of the series only earlier values are used.
         expect(&noise, &mut values, &[4]);
         assert!((values[4] + a).abs() < 1e-12);
         let mut white = [1.0, 5.0];

@@ -26,20 +26,20 @@ pub struct Row {
     pub time: f64,
     /// Inputs in the order of the model \[their units\].
     pub inputs: Each<f64>,
-    /// Readings in the order of the outputs \[their units\], made before the inputs act. NaN where one is lost: the inputs and the other
-    /// readings of the row are used all the same.
+    /// Readings in the order of the outputs \[their units\], taken before the inputs act. NaN for a missing one: the inputs and the other
+    /// readings of the row are still used.
     pub outputs: Each<f64>,
 }
 
 impl Row {
-    /// A row of time \[s\], the only input \[its unit\] and readings \[their units\]; outputs without one have lost it, and readings behind
-    /// the last output are not looked at.
+    /// A row of time \[s\], the only input \[its unit\] and readings \[their units\]; outputs without a reading count as missing, and
+    /// readings after the last output are ignored.
     #[must_use]
     pub fn new(time: f64, input: f64, readings: &[f64]) -> Self {
         Self::with_inputs(time, &[input], readings)
     }
 
-    /// The same with any number of inputs.
+    /// A sample with any number of inputs.
     #[must_use]
     pub fn with_inputs(time: f64, inputs: &[f64], readings: &[f64]) -> Self {
         Self {
@@ -55,31 +55,31 @@ impl Row {
     }
 }
 
-/// What a row says.
+/// Result of a row.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Step {
-    /// The learned model beside the reading of each output; `None` while learning, within a block of rows, and without a reading.
+    /// The innovation of each output; `None` while learning, within a block of rows, and without a reading.
     pub innovations: Each<Option<Innovation>>,
-    /// Of each output why its reading is not used, where it is not; the inputs are.
+    /// For each output the reason why its reading is not used, if so; the inputs are used.
     pub lost: Each<Option<Refused>>,
-    /// Something about the rows or the phase, where there is something.
+    /// Notices about the rows or the phase.
     pub notices: [Option<Notice>; 2],
-    /// The model does not fit any more, or more is known of that.
+    /// Alarm that the model does not fit any more, or an update of an alarm.
     pub alarm: Option<Alarm>,
-    /// Outputs whose noise has grown, or is back where it was.
+    /// Outputs whose noise has increased, or is back at the learned level.
     pub scatter: Vec<ScatterAlarm>,
 }
 
-/// The learned model beside a reading.
+/// Prediction error of the learned model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
-    /// Measured minus model, which runs on the command alone \[output unit\].
+    /// Measured minus the model's simulation from the command alone \[output unit\].
     pub residual: f64,
-    /// What of it the noise's past does not foretell, in standard deviations.
+    /// Innovation in standard deviations: the part of the residual that its past does not predict.
     pub standardised: f64,
 }
 
-/// Something that is not an alarm.
+/// Notice that is not an alarm.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Notice {
@@ -87,55 +87,55 @@ pub enum Notice {
     Gap {
         /// Time of the row before \[s\].
         from: f64,
-        /// Time of the row behind it \[s\].
+        /// Time of the row after it \[s\].
         to: f64,
-        /// How many.
+        /// Number of missing rows.
         missing: u64,
-        /// The command is taken to have been held; else what is not known of the levels is waited for.
+        /// Whether the command is assumed to have been held; otherwise the monitor waits for new levels.
         bridged: bool,
     },
-    /// The clock was set back, as 100 rows in a row say: they are followed from here on, as behind a long gap.
+    /// The clock was set back, as 100 consecutive rows show: these rows are used from here on, as after a long gap.
     ClockSetBack {
         /// The latest time before \[s\].
         from: f64,
         /// The time now \[s\].
         to: f64,
     },
-    /// The time steps by another interval now: the noise is learned anew.
+    /// The time step has changed: the noise is learned again.
     IntervalChanged {
-        /// Since when \[s\].
+        /// Time of the change \[s\].
         time: f64,
         /// The usual step before \[s\].
         from: f64,
         /// The usual step now \[s\].
         to: f64,
     },
-    /// The learning is over.
+    /// Learning is finished.
     Learned {
-        /// From so many rows.
+        /// Number of rows.
         rows: usize,
         /// The slowest time constant \[s\].
         time_constant: f64,
         /// Standard deviation of the noise at each output \[output unit\].
         noise: Vec<f64>,
-        /// Rows are watched in blocks of so many.
+        /// Number of rows in a block.
         every: usize,
-        /// What a score has to pass; far above 6 where the noise is so slow that these rows hardly say how large it is.
+        /// Threshold of a score; far above 6 if the noise is so slow that these rows hardly determine its variance.
         threshold: f64,
     },
-    /// After an alarm the learned model fits again.
+    /// After an alarm, the learned model fits again.
     FitsAgain {
         /// Now \[s\].
         time: f64,
-        /// When the alarm was raised \[s\].
+        /// Time of the alarm \[s\].
         since: f64,
     },
-    /// What was gathered or learned is given up, and an alarm that was being followed ends.
+    /// The collected rows or the learned model are dropped, and a present alarm ends.
     LearnsAnew {
         /// Why.
         why: &'static str,
     },
-    /// The rows so far do not determine the model; it goes on learning.
+    /// The rows so far do not determine the model; learning continues.
     NotLearned {
         /// Why.
         why: String,
@@ -162,14 +162,14 @@ impl State {
         &self.units
     }
 
-    /// Seconds in one unit of the time of a model of its user's own, as the state has it.
+    /// Seconds in one unit of the time of a user's own model, as the state has it.
     #[must_use]
     pub fn time_unit(&self) -> Option<f64> {
         self.model.get(TIME_UNIT)?.parse().ok()
     }
 }
 
-/// A monitor; `'a` is how long a model of its user's own lives.
+/// A monitor; `'a` is the lifetime of a user's own model.
 pub struct Monitor<'a> {
     model: Watched<'a>,
     intake: Intake,
@@ -179,13 +179,13 @@ pub struct Monitor<'a> {
 }
 
 impl<'a> Monitor<'a> {
-    /// A monitor that has seen nothing yet, of a [`Model`](crate::Model) of a plant or an [`OwnModel`](crate::OwnModel).
+    /// A new monitor of a [`Model`](crate::Model) of a plant or an [`OwnModel`](crate::OwnModel).
     ///
-    /// `units` are those of a plant's rows; a model of its user's own has units itself.
+    /// `units` are those of a plant's rows; a user's own model has units itself.
     ///
     /// # Errors
-    /// [`Error::Setting`]; of a plant [`Error::TwoPumps`], [`Error::Disturbance`], [`Error::ByClock`] for an effect in the model that follows
-    /// the time since a record began, [`Error::Structure`]; of a model of its user's own [`Error::Time`], [`Error::NoParameters`].
+    /// [`Error::Setting`]; of a plant [`Error::TwoPumps`], [`Error::Disturbance`], [`Error::ByClock`] for an effect in the model that
+    /// follows the time since a record began, [`Error::Structure`]; of a user's own model [`Error::Time`], [`Error::NoParameters`].
     pub fn new(
         model: impl Into<Watched<'a>>,
         settings: Settings,
@@ -203,7 +203,7 @@ impl<'a> Monitor<'a> {
         })
     }
 
-    /// Goes on where a saved monitor was; with the same model and settings what follows is the same, bit for bit.
+    /// Continues a saved monitor; with the same model and settings all results are the same, bit for bit.
     ///
     /// # Errors
     /// As [`Monitor::new`], and [`Error::Version`], [`Error::OtherModel`], [`Error::Damaged`].
@@ -237,18 +237,18 @@ impl<'a> Monitor<'a> {
         Ok(monitor)
     }
 
-    /// How times are said in sentences; a restored monitor goes on as before.
+    /// Format of times in sentences; a restored monitor keeps its format.
     #[must_use]
     pub fn axis(&self) -> &TimeAxis {
         &self.core.axis
     }
 
-    /// Says when the times of the rows are zero: to be known before the first row.
+    /// Sets the date of time zero; call it before the first row.
     pub fn set_axis(&mut self, axis: TimeAxis) {
         self.core.axis = axis;
     }
 
-    /// All of it, to be saved.
+    /// Complete state, for saving.
     #[must_use]
     pub fn state(&self) -> State {
         let (checkpoint, since) = self.core.saved();
@@ -263,10 +263,10 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// Takes in a row.
+    /// Processes a row.
     ///
-    /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command, and
-    /// nothing is judged by what is lost.
+    /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command,
+    /// and no test uses a missing reading.
     ///
     /// # Errors
     /// [`Refused`]: time or command cannot be used, and the row is not.
@@ -304,37 +304,37 @@ impl<'a> Monitor<'a> {
         Ok(step)
     }
 
-    /// Rows that were taken since the beginning, before a restoration too.
+    /// Number of rows since the beginning, including rows before a restoration.
     #[must_use]
     pub fn rows(&self) -> u64 {
         self.intake.rows
     }
 
-    /// Time of the latest row that was taken \[s\], before a restoration too.
+    /// Time of the latest row \[s\], also from before a restoration.
     #[must_use]
     pub fn last_time(&self) -> Option<f64> {
         self.intake.last
     }
 
-    /// How many outputs there are.
+    /// Number of outputs.
     #[must_use]
     pub fn outputs(&self) -> usize {
         self.model.0.outputs()
     }
 
-    /// The parameters as they are tracked, with their band; empty while learning. Allocates.
+    /// The tracked parameters with their bands; empty while learning. Allocates.
     #[must_use]
     pub fn estimates(&self) -> Vec<Estimate> {
         self.core.estimates()
     }
 
-    /// What there is to learn from; `None` where the learning is over.
+    /// Rows collected for learning; `None` if learning is finished.
     #[must_use]
     pub fn gathered(&self) -> Option<Gathered> {
         self.core.gathered()
     }
 
-    /// Where it is.
+    /// Phase and progress.
     #[must_use]
     pub fn progress(&self) -> Progress {
         let (score, threshold) = self.core.score().unwrap_or((f64::NAN, f64::NAN));
@@ -345,7 +345,7 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// The slowest time constant that was learned \[s\].
+    /// The slowest learned time constant \[s\].
     #[must_use]
     pub fn time_constant(&self) -> Option<f64> {
         Some(self.core.learned()?.time_constant)

@@ -1,4 +1,4 @@
-//! One of the plants, with its effects, as it is watched.
+//! A built-in plant with its effects, for monitoring.
 
 use std::sync::Arc;
 
@@ -16,9 +16,10 @@ use crate::{
     watched::{Believed, Raised},
 };
 
-/// A command above so many times its full range is in another unit, or none, as in a record.
+/// A command above its full range by this factor has another unit, or no meaning, as in a record.
 const BEYOND: f64 = 1.01;
-/// A reading above so many times the tank's height is in another unit, or none; below it a sensor may be off, which is to be seen.
+/// A reading above the tank's height by this factor has another unit, or no meaning; a smaller reading may be a sensor error, which the
+/// monitor should detect.
 const ABOVE: f64 = 1.5;
 
 impl<'a> From<Model> for Watched<'a> {
@@ -28,7 +29,7 @@ impl<'a> From<Model> for Watched<'a> {
 }
 
 impl Model {
-    /// The structure that was learned.
+    /// The learned structure.
     fn learned_structure(&self, learned: &Learned, units: &Units) -> Result<Structure, String> {
         let scales = learned.scales.clone().ok_or("a plant has scales")?;
         let mut structure = self.structure(scales).map_err(|error| error.to_string())?;

@@ -1,4 +1,4 @@
-//! The size of an output's innovations: has their scatter grown, whatever their structure?
+//! Noise monitor: tests whether the variance of an output's innovations has increased, whatever their structure is.
 //!
 //! The scores ask whether the residual has a structure, so innovations that only grow, as those of a loose cable do, fit. Here the rows
 //! are taken in pairs: `d = |e_2j - e_2j-1|` is the scatter from a row to the next, which a residual that moves slowly leaves as it is, so
@@ -14,25 +14,25 @@
 use serde::{Deserialize, Serialize};
 use statrs::function::{beta::ln_beta, factorial::ln_binomial};
 
-/// The share of the false alarms that is promised for the scatter; the scores have the rest.
+/// Share of the false alarm rate for the noise monitor; the scores have the rest.
 pub(crate) const SHARE: f64 = 0.1;
-/// Pairs in a block: the short ones see a large growth soon, the long ones a small one at all.
+/// Pairs in a block: short blocks detect a large increase early, long blocks detect a small increase.
 const BLOCKS: [usize; 3] = [16, 64, 256];
-/// The limit is passed by one learned pair in so many.
+/// In learning, one pair of this number exceeds the limit.
 const BEYOND: usize = 10;
-/// While it has grown, its size is taken from blocks of this length ...
+/// While the noise is increased, its variance is computed from blocks of this length ...
 const SIZED: usize = 1;
-/// ... and whether it has come back from these.
+/// ... and these blocks decide whether it has returned to normal.
 const BACK: usize = 2;
-/// Of the latest eight pairs so many beyond the limit are suspicious: usually there is one.
+/// This number of the latest eight pairs beyond the limit is suspicious: usually there is one.
 const SUSPICIOUS: u32 = 3;
 
-/// The limit that was learned.
+/// The learned limit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Limit {
-    /// Of the difference of two neighbours, in standard deviations of the innovations.
+    /// Limit of the difference of two neighbours, in standard deviations of the innovations.
     difference: f64,
-    /// Learned pairs, and how many of them lie at it or beyond.
+    /// Number of learned pairs, and of those at or beyond the limit.
     pairs: usize,
     beyond: usize,
     /// Root mean square of the learned innovations.
@@ -40,7 +40,7 @@ pub(crate) struct Limit {
 }
 
 impl Limit {
-    /// From the learned innovations; `parameters` were fitted to them.
+    /// Limit from the learned innovations; `parameters` were fitted to them.
     pub(crate) fn learned(innovations: &[f64], parameters: usize) -> Option<Self> {
         let pairs = innovations.chunks_exact(2);
         let mut apart: Vec<f64> = pairs.map(|pair| (pair[0] - pair[1]).abs()).collect();
@@ -83,7 +83,7 @@ impl Limit {
         0
     }
 
-    /// The mean of that number and a standard deviation more: what a block has as a rule.
+    /// The mean of that number plus a standard deviation: a typical value for a block.
     fn usual(&self, length: usize) -> f64 {
         let (k, rest, b) = (
             self.beyond as f64,
@@ -96,7 +96,7 @@ impl Limit {
     }
 }
 
-/// What a block has had so far.
+/// Sums of a block so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Block {
     pairs: usize,
@@ -114,31 +114,32 @@ impl Block {
     }
 }
 
-/// The scatter's state between two rows.
+/// State of the noise monitor between two rows.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Scatter {
     first: Option<f64>,
     blocks: [Block; BLOCKS.len()],
     /// Whether the latest pairs were beyond the limit, a bit each.
     latest: u8,
-    /// How many times as large as learned it is.
+    /// Ratio to the learned noise.
     grown: Option<f64>,
 }
 
-/// What has become of the scatter.
+/// Change of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Moved {
-    /// It is so many times as large as it was learned.
+    /// The noise has this ratio to the learned noise.
     Grown(f64),
     Back,
 }
 
-/// How many pairs beyond the limit an alarm takes, for each length of a block.
+/// Number of pairs beyond the limit for an alarm, for each length of a block.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Most([usize; BLOCKS.len()]);
 
 impl Most {
-    /// For one of so many outputs, which share the false alarms; `samples` is the mean number between those of all kinds.
+    /// Limits for one of this number of outputs, which share the rate of false alarms; `samples` is the mean number of samples between
+    /// false alarms of all kinds.
     pub(crate) fn new(limit: &Limit, samples: f64, outputs: usize) -> Self {
         let samples = samples * outputs as f64;
         Self(BLOCKS.map(|length| {
@@ -155,17 +156,17 @@ impl Scatter {
         grown.is_finite() && grown >= 1.0 && blocks.into_iter().all(|(b, n)| b.pairs < n)
     }
 
-    /// How many times as large as learned it is; one where it has not grown.
+    /// Ratio of the noise to the learned noise; one if it has not grown.
     pub(crate) fn growth(&self) -> f64 {
         self.grown.unwrap_or(1.0)
     }
 
-    /// It may be about to be found grown: a score that passes now may be of that.
+    /// Whether an increase of the noise may soon be detected: a score above its threshold may have this cause.
     pub(crate) fn is_suspicious(&self) -> bool {
         self.grown.is_none() && self.latest.count_ones() >= SUSPICIOUS
     }
 
-    /// What was begun is given up: rows are missing, or say nothing of it.
+    /// Drops the started block: rows are missing, or are not suitable.
     pub(crate) fn begin(&mut self) {
         *self = Self {
             grown: self.grown,
@@ -173,7 +174,7 @@ impl Scatter {
         };
     }
 
-    /// Takes in an innovation \[standard deviations\].
+    /// Processes an innovation \[standard deviations\].
     pub(crate) fn update(&mut self, e: f64, limit: &Limit, most: &Most) -> Option<Moved> {
         let Some(first) = self.first.take() else {
             self.first = Some(e);
@@ -212,40 +213,40 @@ impl Scatter {
     }
 }
 
-/// The scatter of the readings about the learned model has grown, or has come back. Its serialised form is one line of the program's output.
+/// The noise of the readings has increased, or has returned to normal. Its serialised form is one line of the program's output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScatterAlarm {
     /// [`SCHEMA`](crate::SCHEMA).
     pub schema: u32,
-    /// Which of them.
+    /// The event.
     pub event: ScatterEvent,
     /// Time of the row after which it was raised \[s\].
     pub time: f64,
     /// The vessel whose level is read, of several outputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<String>,
-    /// Standard deviation of the noise as it was learned \[output unit\].
+    /// Learned standard deviation of the noise \[output unit\].
     pub learned: f64,
     /// Standard deviation of the noise now \[output unit\].
     pub now: f64,
     /// The output unit.
     pub unit: String,
-    /// All of it in words.
+    /// The alarm in words.
     pub sentence: String,
 }
 
-/// What the scatter did.
+/// Event of the noise monitor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ScatterEvent {
-    /// It has grown.
+    /// The noise has increased.
     ScatterGrown,
-    /// It is back where it was learned.
+    /// The noise is at the learned level again.
     ScatterBack,
 }
 
 impl ScatterAlarm {
-    /// `output`: its name, of several, and what it is in words; `noise`: as it was learned, with its unit.
+    /// `output`: its name, if there are several, and its description; `noise`: the learned noise, with its unit.
     pub(crate) fn new(
         moved: Moved,
         time: f64,
@@ -264,7 +265,7 @@ impl ScatterAlarm {
             Moved::Grown(ratio) => {
                 let now = ratio * noise;
                 let sentence = format!(
-                    "The scatter of the readings{of} has grown from {} to {}, without a structure that an effect of the plant has: look at the sensor and its cable.",
+                    "The noise of the readings{of} has grown from {} to {}, without the signature of an effect of the plant: look at the sensor and its cable.",
                     written(noise),
                     written(now)
                 );
@@ -274,7 +275,7 @@ impl ScatterAlarm {
                 ScatterEvent::ScatterBack,
                 noise,
                 format!(
-                    "The scatter of the readings{of} is back at {}.",
+                    "The noise of the readings{of} is back at {}.",
                     written(noise)
                 ),
             ),
@@ -305,7 +306,7 @@ mod tests {
         (0..n).map(|_| rng.sample(student)).collect()
     }
 
-    /// How often, over many learned limits and the rows behind each, the scatter grows where it does not.
+    /// Rate of false alarms of increased noise, over many learned limits and the rows after each.
     fn false_alarms(degrees: f64, samples: f64) -> usize {
         let (learned, rows) = (1000, 10_000);
         let run = |seed| {
@@ -354,7 +355,7 @@ mod tests {
         let grown: Vec<f64> = student(3000, 1e6, 3).iter().map(|e| 1.4 * e).collect();
         let (at, back) = seen(&grown);
         assert!(back && at.is_some_and(|(k, ratio)| k < 2048 && (1.2..1.8).contains(&ratio)));
-        // A slow residual is none of its business.
+        // A slow residual must not cause a noise alarm.
         let slow: Vec<f64> = student(3000, 1e6, 4)
             .iter()
             .enumerate()

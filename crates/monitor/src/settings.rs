@@ -1,16 +1,16 @@
-//! How to watch.
+//! Settings of the monitor.
 
 use crate::Error;
 
-/// How to watch. Every field has a usual value: `Settings::default()`.
+/// Settings of the monitor. Every field has a default: `Settings::default()`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Mean number of rows between false alarms of all kinds, from 1000 on; usually 1e6. Rows count as they come, also where they are
-    /// watched in blocks.
+    /// Mean number of rows between false alarms of all kinds, from 1000 on; default 1e6. Input rows are counted, also if they are processed
+    /// in blocks.
     pub rows_between_false_alarms: f64,
-    /// Fewest rows that are learned from, 100 to 1024; usually 1000.
+    /// Least number of rows for learning, 100 to 1024; default 1000.
     pub learning_rows: usize,
-    /// Fewest slowest time constants that are learned from, 5 to 100; usually 20.
+    /// Least number of slowest time constants for learning, 5 to 100; default 20.
     pub learning_time_constants: f64,
     /// Memory of the tracker, in slowest time constants, 1 to 1000; usually 20.
     pub memory: f64,

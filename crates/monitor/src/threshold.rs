@@ -32,7 +32,7 @@ pub(crate) fn relative_error(noise: &ArModel, rows: usize) -> f64 {
     (of_sum / (left * left) + 0.5 / n).sqrt()
 }
 
-/// The level that scores over windows of these lengths \[rows\] pass once in `rows` rows where nothing has changed.
+/// The level that scores over windows of these lengths \[rows\] exceed once in `rows` rows without a change.
 pub(crate) fn threshold(windows: &[f64], directions: usize, rows: f64, relative_error: f64) -> f64 {
     let density = |h: f64| h * (-0.5 * h * h).exp() / std::f64::consts::TAU.sqrt();
     let speed: f64 = windows.iter().map(|w| 1.0 / w).sum::<f64>() * directions as f64;
@@ -41,7 +41,7 @@ pub(crate) fn threshold(windows: &[f64], directions: usize, rows: f64, relative_
         for i in -NODES..=NODES {
             let node = f64::from(i) / f64::from(NODES) * 4.0;
             let weight = (-0.5 * node * node).exp();
-            // Below one the passage is no rare event, and the rate of a score's own changes is its bound.
+            // Below one, crossings are no rare events, and the rate of a score's own changes is used as a bound.
             sum += weight * density((h * (-relative_error * node).exp()).max(1.0));
             weights += weight;
         }

@@ -1,9 +1,9 @@
-//! How times are said: in seconds, or as dates.
+//! Format of times: in seconds, or as dates.
 
 use ct_signals::Calendar;
 use serde::{Deserialize, Serialize};
 
-/// How the times of rows \[s\] are said: in seconds, or as dates where it is known when zero was.
+/// Format of the times of rows \[s\]: in seconds, or as dates if the date of time zero is known.
 ///
 /// ```
 /// use ct_signals::{Calendar, Zone};
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct TimeAxis {
-    /// When zero was, and the zone in which dates are said.
+    /// Date of time zero, and the zone of the dates.
     pub calendar: Option<Calendar>,
 }
 
@@ -41,7 +41,7 @@ impl TimeAxis {
         }
     }
 
-    /// From one time to another \[s\]: `from 450 to 599 s`, or dates.
+    /// A range of times \[s\]: `from 450 to 599 s`, or dates.
     #[must_use]
     pub fn span(&self, from: f64, to: f64) -> String {
         match &self.calendar {
@@ -62,7 +62,7 @@ impl TimeAxis {
     }
 }
 
-/// To the millisecond; a time of more than 1e12 s has none left.
+/// Rounds to the millisecond; a time above 1e12 s is not rounded.
 fn rounded(time: f64) -> f64 {
     if time.abs() < 1e12 {
         (time * 1e3).round() / 1e3

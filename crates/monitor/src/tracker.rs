@@ -9,31 +9,31 @@ use ct_rls::{DynamicRls, Guards, RecursiveEstimator, Weights};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Forgetting never raises the variances above so many times the learned ones on average.
+/// Forgetting never raises the variances above the learned ones times this factor on average.
 const MOST: f64 = 1e4;
-/// After a jump, standard errors are so many times what they were.
+/// After a step change, standard errors are multiplied by this factor.
 const JUMP: f64 = 30.0;
 
-/// A tracker in its serialisable form: the deviations and their covariance, both in learned standard errors.
+/// Serialisable form of a tracker: the deviations and their covariance, both in learned standard errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct TrackerState {
     pub deviation: Vec<f64>,
     pub covariance: Vec<f64>,
 }
 
-/// Which directions are tracked, and by which sizes.
+/// Tracked directions and their scales.
 pub(crate) struct Tracker {
     rls: DynamicRls,
     weights: Weights,
-    /// The same without forgetting.
+    /// The weights without forgetting.
     together: Weights,
-    /// Lane and learned standard error of each tracked parameter.
+    /// Seed index and learned standard error of each tracked parameter.
     tracked: Vec<(usize, f64)>,
     phi: Vec<f64>,
 }
 
 impl TrackerState {
-    /// As learned: `covariance` of the tracked parameters, row by row.
+    /// Initial tracker; `covariance` of the tracked parameters, row by row.
     pub(crate) fn learned(covariance: &[f64]) -> Self {
         let n = covariance.len().isqrt();
         let error = |i: usize| covariance[i * n + i].sqrt();
@@ -45,7 +45,7 @@ impl TrackerState {
         }
     }
 
-    /// The parameters have jumped: what was known of them counts for little from now on.
+    /// The parameters have changed abruptly: earlier information gets a small weight.
     pub(crate) fn open(&mut self) {
         for entry in &mut self.covariance {
             *entry *= JUMP * JUMP;
@@ -54,7 +54,7 @@ impl TrackerState {
 }
 
 impl Tracker {
-    /// `memory` \[s\]; `None` where there is nothing to track, or the covariance is not one.
+    /// `memory` \[s\]; `None` if there is nothing to track, or if the covariance is not positive definite.
     pub(crate) fn new(state: &TrackerState, tracked: &[(usize, f64)], memory: f64) -> Option<Self> {
         let n = tracked.len();
         if n == 0 || state.deviation.len() != n || state.covariance.len() != n * n {
@@ -85,20 +85,20 @@ impl Tracker {
     /// seconds after the sample before.
     pub(crate) fn update<'a>(&mut self, rows: impl Iterator<Item = &'a [f64]>, h: f64) {
         for (i, row) in rows.enumerate() {
-            // Rows of one instant: what was known before is forgotten once.
+            // Rows of one instant: forgetting is applied once.
             let weights = if i == 0 { self.weights } else { self.together };
             self.take(row, h, &weights);
         }
     }
 
     fn take(&mut self, row: &[f64], h: f64, weights: &Weights) {
-        // A row says as much whatever its length: the estimator's information is an integral over time.
+        // The information of a row does not depend on its length: the estimator's information is an integral over time.
         let density = 1.0 / h.sqrt();
         for (phi, (lane, error)) in self.phi.iter_mut().zip(&self.tracked) {
             *phi = row[*lane] * error * density;
         }
         let residual = row.last().copied().unwrap_or(f64::NAN);
-        // What the estimator refuses leaves it as it was.
+        // A rejected sample does not change the estimator.
         let _ = self
             .rls
             .update_with(&self.phi, residual * density, h, weights);
@@ -179,7 +179,7 @@ mod tests {
             (now[0].0 - 3.0).abs() < 0.6 && (now[1].0 + 1.0).abs() < 0.6,
             "{now:?}"
         );
-        // Not told, it takes a memory, 200 rows.
+        // Without notice of the step, adaptation takes the memory, 200 rows.
         let (now, _) = run(jumped, 5060, None);
         assert!((now[0].0 - 3.0).abs() > 1.5, "{now:?}");
     }

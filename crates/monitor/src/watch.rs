@@ -1,4 +1,4 @@
-//! The learned model beside the plant: innovations, scores and the tracked parameters, a row at a time.
+//! The learned model run in parallel with the plant: innovations, scores and the tracked parameters, row by row.
 
 use ct_signals::{Hold, Whitener};
 
@@ -13,7 +13,7 @@ use crate::{
     watched::Watched,
 };
 
-/// The running model; what it holds is rebuilt from rows, and never saved.
+/// The running model; it is rebuilt from rows, and never saved.
 pub(crate) struct Watch<'a> {
     model: Box<dyn Model + 'a>,
     /// The noise of each output: what whitens it, and one over its standard deviation.
@@ -23,30 +23,30 @@ pub(crate) struct Watch<'a> {
     /// Seconds since the last sample with a reading.
     since: f64,
     lanes: usize,
-    /// A row for each output: a derivative for each lane, one for an offset of each output, the residual. Those of the outputs that have a
+    /// A row for each output: a derivative for each seed, one for an offset of each output, the residual. Those of the outputs that have a
     /// reading come first, in order.
     rows: Vec<f64>,
     /// Outputs that have a reading.
     read: Vec<usize>,
 }
 
-/// What the learned model says of a row.
+/// Output of the learned model for a row.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Said {
-    /// Its states.
+    /// States of the model.
     pub states: Each<f64>,
-    /// Where what the command moves stands \[input unit\].
+    /// State of the actuator \[input unit\].
     pub stands: f64,
-    /// Its readings \[output unit\].
+    /// Simulated readings \[output unit\].
     pub modelled: Each<f64>,
-    /// What each reading says; `None` where that is lost.
+    /// Innovation of each reading; `None` if the reading is missing.
     pub innovations: Each<Option<Innovation>>,
     /// Seconds since the sample with a reading before; zero for the first.
     pub step: f64,
 }
 
 impl Said {
-    /// With its row, to be kept.
+    /// The same with its row, for storage.
     pub(crate) fn of(&self, sample: Sample) -> Kept {
         Kept {
             sample,
@@ -68,7 +68,7 @@ impl Said {
 }
 
 impl<'a> Watch<'a> {
-    /// From given states on; `None` where the learned numbers do not make a model.
+    /// Starts from given states; `None` if the learned numbers do not make a model.
     pub(crate) fn new(
         model: &Watched<'a>,
         learned: &Learned,
@@ -94,7 +94,7 @@ impl<'a> Watch<'a> {
         })
     }
 
-    /// Follows the plant to its next row.
+    /// Simulates the plant to the next row.
     pub(crate) fn follow(&mut self, sample: &Sample) -> Said {
         if let Some(last) = &self.last {
             self.model.advance(self.hold, last, sample);
@@ -140,7 +140,7 @@ impl<'a> Watch<'a> {
         said
     }
 
-    /// Lets the scores and the tracker see the readings that were followed last, each `growth` times as noisy as was learned.
+    /// Updates the scores and the tracker with the latest readings, with the noise of each output `growth` times the learned one.
     pub(crate) fn judge(
         &mut self,
         bank: &mut Bank,
@@ -170,13 +170,13 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// The tracker as it was learned.
+/// The tracker after learning.
 pub(crate) fn as_learned(learned: &Learned, lanes: usize) -> TrackerState {
     let positions: Vec<usize> = tracked(learned, lanes).iter().map(|(i, _)| *i).collect();
     TrackerState::learned(&learned.covariance_of(&positions))
 }
 
-/// Lanes and learned standard errors of the parameters that are tracked, of those that have a lane.
+/// Seed indices and learned standard errors of the tracked parameters, if they have a seed index.
 pub(crate) fn tracked(learned: &Learned, lanes: usize) -> Vec<(usize, f64)> {
     let mut errors = learned.errors();
     errors.retain(|(i, _)| *i < lanes);

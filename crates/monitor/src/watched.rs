@@ -1,4 +1,4 @@
-//! What a monitor needs of the model that it watches: one of the plants, or a model of its user's own.
+//! Interface of a monitored model: a built-in plant, or a user's own model.
 
 use std::sync::Arc;
 
@@ -17,55 +17,55 @@ use crate::{
 #[derive(Clone)]
 pub struct Watched<'a>(pub(crate) Arc<dyn Believed<'a> + 'a>);
 
-/// An alarm as it was raised, and when it is looked at again.
+/// An alarm, and the times of its evaluations.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Raised {
     pub stage: Stage,
     /// Now \[s\].
     pub time: f64,
-    /// When it was raised \[s\].
+    /// Time of the alarm \[s\].
     pub since: f64,
-    /// What passed, and what it had to pass.
+    /// The score that exceeded its threshold, and the threshold.
     pub score: f64,
     pub threshold: f64,
-    /// The output at which it shows most.
+    /// The output with the largest deviation.
     pub output: usize,
 }
 
-/// What the monitor asks of a model. States and simulations of its user's own model live as long as that, `'a`.
+/// Interface of a model for the monitor. States and simulations of a user's own model have the lifetime `'a`.
 pub(crate) trait Believed<'a>: Send + Sync {
-    /// Why it cannot be watched.
+    /// Reason why the model cannot be monitored.
     fn check(&self) -> Result<(), Error>;
     fn inputs(&self) -> usize;
     fn outputs(&self) -> usize;
     fn states(&self) -> usize;
     /// What the inputs do between rows.
     fn hold(&self) -> Hold;
-    /// An input that no row of this plant has.
+    /// An input outside the possible range of this plant.
     fn check_input(&self, value: f64) -> Result<(), Refused>;
-    /// A reading that no sensor of this plant gives.
+    /// A reading outside the possible range of this plant's sensors.
     fn check_reading(&self, value: f64) -> Result<(), Refused>;
-    /// What a saved state has to agree with.
+    /// Properties that a saved state has to agree with.
     fn fingerprint(&self) -> Fingerprint;
-    /// The model fitted to rows, and the states at the first of them; in words why it cannot be.
+    /// The model fitted to rows, and the states at the first of them; or the reason in words why there is none.
     fn learn(&self, samples: &[Sample], hold: Hold) -> Result<(Learned, Vec<f64>), String>;
-    /// Name and unit of each parameter, in the order of [`Learned::theta`]; in words why there are none.
+    /// Name and unit of each parameter, in the order of [`Learned::theta`]; or the reason in words why there are none.
     fn parameters(&self, learned: &Learned, units: &Units)
     -> Result<Vec<(String, String)>, String>;
-    /// By how many of so many parameters, the first ones, derivatives are taken.
+    /// Number of the first parameters for which derivatives are computed.
     fn lanes(&self, parameters: usize) -> usize;
-    /// The learned model from these states on; `at_rest`: the first input before.
+    /// The learned model from these states on; `at_rest`: the input before the first row.
     fn run(&self, learned: &Learned, states: &[f64], at_rest: f64)
     -> Option<Box<dyn Running + 'a>>;
-    /// Puts the states that are read where they are read.
+    /// Sets the measured states to their readings.
     fn put_readings(&self, states: &mut Each<f64>, readings: &Readings);
     /// The name of an output, of several.
     fn output_name(&self, output: usize) -> Option<String>;
-    /// What an output is called in a sentence: "at the ...".
+    /// Name of an output in a sentence: "at the ...".
     fn output_words(&self, output: usize, units: &Units) -> String;
     /// The unit of an output.
     fn output_unit(&self, output: usize, units: &Units) -> String;
-    /// What the latest rows say of what began; units and times of its sentence are those of `said_in`.
+    /// Evaluates the latest rows after the onset of a change; `said_in` has the units and times of the sentence.
     fn look(
         &self,
         learned: &Learned,

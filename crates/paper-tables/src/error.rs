@@ -1,4 +1,4 @@
-//! What the computation of the tables can refuse: each message names the argument, the numbers that disagree and what to do, in one line.
+//! Errors of the computation of the tables: each message names the argument, the numbers that disagree and the correction, in one line.
 
 /// Everything this crate can refuse.
 #[derive(Debug, thiserror::Error)]
@@ -20,7 +20,7 @@ pub enum Error {
         /// [`baysse::FEWEST`](crate::baysse::FEWEST).
         fewest: usize,
     },
-    /// A noise that ends before the run does.
+    /// A noise with too few values for the run.
     #[error("the noise has {values} values, but the run needs {needed}; draw as many")]
     ShortNoise {
         /// Values that were given.
@@ -40,7 +40,7 @@ pub enum Error {
     /// A tank that `plants` refuses.
     #[error(transparent)]
     Plant(#[from] plants::Error),
-    /// A recursive estimator whose settings make no sense.
+    /// A recursive estimator with invalid settings.
     #[error(transparent)]
     Estimator(#[from] stabilized_oe::Error),
     /// A filter that `ct-lti` refuses.

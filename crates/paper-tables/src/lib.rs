@@ -1,9 +1,9 @@
-//! The tables of two papers, computed again: the figures that a paper prints beside those of many runs of the same experiment, each with
-//! another noise.
+//! The tables of two papers, computed again: the printed figures compared with those of many runs of the same experiment with different
+//! noises.
 //!
 //! A paper prints one run, or a few, of a noise that is not known. Its figures are consistent with a computation where they lie among those
-//! of many runs; more cannot be said without its noise. What a paper does not print (the excitation, the step, the starting values) was found
-//! by a search against its own tables: agreement says that the experiment can have been so, not that it was.
+//! of many runs; more cannot be said without its noise. What a paper does not print (the excitation, the step, the starting values) was
+//! found by a search against its own tables: agreement says that the experiment can have been so, not that it was.
 //!
 //! | question | answer |
 //! |---|---|
@@ -14,8 +14,8 @@
 //! | the emulated tank of table II, and its records | [`baysse::Rig`] |
 //! | what the papers print | [`udink::printed`], [`baysse::printed`] |
 //!
-//! Results are plain structs, which serialize to the JSON that `ctid tables` writes. The same seed gives the same numbers, whatever the number
-//! of threads.
+//! Results are plain structs, which serialize to the JSON that `ctid tables` writes. The same seed gives the same numbers, whatever the
+//! number of threads.
 //!
 //! # Example
 //! Tables 1 to 4 with 20 noises, by Euler's rule as in the paper.

@@ -1,6 +1,6 @@
-//! A figure as a paper prints it.
+//! A printed figure of a paper.
 
-/// A figure as it is printed: value and decimals, so that its rounding is known.
+/// A printed figure: value and decimals, which determine its rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Printed {
     /// The figure, in the unit of its table.

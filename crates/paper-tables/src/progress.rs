@@ -1,4 +1,4 @@
-//! How many runs are done, and runs in parallel that report it.
+//! Number of finished runs, and parallel runs that report it.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 use crate::Error;
 
-/// How many runs of a stage are done. Reports come from several threads, so that a smaller count may follow a larger one.
+/// Number of finished runs of a stage. Reports come from several threads, so a smaller count may follow a larger one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// What is computed.
+    /// Name of the stage.
     pub stage: Stage,
     /// Runs that are done, 1 to `total`.
     pub done: usize,
@@ -23,7 +23,7 @@ pub struct Progress {
 pub enum Stage {
     /// Tables 1 to 4 of Udink ten Cate.
     UdinkTables,
-    /// The same with one setting changed.
+    /// The tables with one setting changed.
     UdinkOtherSettings,
     /// Table 1 of Udink ten Cate with larger `P(0)`.
     UdinkLargerP,
@@ -51,7 +51,7 @@ pub(crate) fn in_parallel<T: Send>(
     (0..total).into_par_iter().map(run).collect()
 }
 
-/// Counts runs and reports the count.
+/// Counts finished runs and reports the count.
 pub(crate) struct Counter<'a, F> {
     stage: Stage,
     total: usize,
@@ -69,7 +69,7 @@ impl<'a, F: Fn(Progress) + Sync> Counter<'a, F> {
         }
     }
 
-    /// One more run is done.
+    /// Counts one more run.
     pub(crate) fn one_more(&self) {
         (self.progress)(Progress {
             stage: self.stage,

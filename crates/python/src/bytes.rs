@@ -1,4 +1,4 @@
-//! Objects as bytes, for `pickle`: MessagePack, which keeps numbers that are none.
+//! Objects as bytes, for `pickle`: MessagePack, which can store NaN and infinity.
 
 use pyo3::prelude::*;
 use serde::de::DeserializeOwned;
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 
-/// The version of ctid that has written them; others may have other layouts.
+/// The version of ctid that wrote the bytes; other versions may have other layouts.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// A value as bytes.
@@ -18,7 +18,7 @@ pub fn of(value: &impl Serialize) -> PyResult<Vec<u8>> {
 /// A value from its bytes.
 pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> PyResult<T> {
     let other = |why: String| Error::new_err(format!("this is no object of ctid {VERSION}: {why}"));
-    // The version first: what follows may have another layout.
+    // The version comes first, because the rest may have another layout.
     let mut reader = rmp_serde::Deserializer::from_read_ref(bytes);
     let all = Versioned::<T>::deserialize(&mut reader);
     let Versioned(version, value) = all.map_err(|error| other(error.to_string()))?;
@@ -30,6 +30,6 @@ pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> PyResult<T> {
     Ok(value)
 }
 
-/// A value behind the version that has written it.
+/// A value after the version that has written it.
 #[derive(Deserialize)]
 struct Versioned<T>(String, T);

@@ -17,7 +17,7 @@ use crate::frame::Content;
 use crate::model::{Inner, Kept, Model};
 use crate::{bytes, error, work};
 
-/// What a model is missing; it never changes.
+/// Diagnosis of a model; immutable.
 #[pyclass(frozen, module = "ctid._ctid")]
 pub struct Diagnosis {
     model: Arc<Inner>,
@@ -27,7 +27,7 @@ pub struct Diagnosis {
     found: effect_search::Diagnosis,
 }
 
-/// The same as it is pickled.
+/// The diagnosis in its pickled form.
 #[derive(Serialize, Deserialize)]
 struct KeptDiagnosis {
     model: Kept,
@@ -37,10 +37,11 @@ struct KeptDiagnosis {
     simulated: Vec<Vec<Vec<f64>>>,
 }
 
-/// Where a model fails: position of the record of a window, from, to, samples, mean, root mean square, whether it is clear.
+/// A bin of the residual: index of the record (for a window), from, to, samples, mean, root mean square, whether the model fails clearly in
+/// the bin.
 pub type Bin = (Option<usize>, f64, f64, usize, f64, f64, bool);
 
-/// Where a model fails, by what.
+/// Bins of the residual, by kind.
 pub fn bins(failures: &Failures) -> Vec<(&'static str, Bin)> {
     let Failures {
         by_time,
@@ -92,7 +93,7 @@ impl Diagnosis {
 
 #[pymethods]
 impl Diagnosis {
-    /// The result as `ctid diagnose --json` writes it, without its mark.
+    /// The result in the form of `ctid diagnose --json`, without its mark.
     fn json(&self) -> PyResult<String> {
         json(&self.found)
     }
@@ -110,7 +111,7 @@ impl Diagnosis {
         py.detach(|| diagnosed_page(&self.model.file, &self.records, &self.found).html())
     }
 
-    /// The model with the effects that were found, and its values in the last step.
+    /// The model with the found effects, and its values in the last step.
     #[getter]
     fn model(&self) -> PyResult<Model> {
         let mut file = self.model.file.clone();
@@ -127,10 +128,10 @@ impl Diagnosis {
         })))
     }
 
-    /// The experiment that tells two effects apart best; what `ctid design --json` writes, without its mark, and the unit of the model's time
-    /// \[s\].
+    /// The experiment that distinguishes two effects best; the output of `ctid design --json` without its mark, and the unit of the model's
+    /// time \[s\].
     #[pyo3(signature = (between, *, ranges, slews, inputs, duration, seed, effort, time_limit, progress=None))]
-    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    #[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
     fn design(
         &self,
         py: Python<'_>,
@@ -173,14 +174,14 @@ impl Diagnosis {
         Ok((json(&found)?, self.records.time_unit))
     }
 
-    /// The unit of each output; empty where no record says it.
+    /// The unit of each output; empty if no record has it.
     #[getter]
     fn output_units(&self) -> Vec<String> {
         crate::fit::units_of(&self.records.records)
     }
 
-    /// Of each record, fitted ones first: its name, whether it is held out, its times \[s\], and of each output its name, what was measured and
-    /// what each step gives.
+    /// For each record, fitted ones first: its name, whether it is held out, its times \[s\], and for each output its name, the measured
+    /// values and the values of each step.
     #[getter]
     #[allow(clippy::type_complexity)]
     fn series<'py>(
@@ -214,7 +215,7 @@ impl Diagnosis {
         all.collect()
     }
 
-    /// As bytes, to be pickled.
+    /// As bytes, for pickle.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let steps = self.found.steps.iter();
         let bytes = bytes::of(&KeptDiagnosis {

@@ -1,4 +1,4 @@
-//! What the program refuses, as Python exceptions with its messages.
+//! Errors of the program as Python exceptions with its messages.
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -7,7 +7,7 @@ pyo3::create_exception!(
     ctid,
     Error,
     PyValueError,
-    "Something that ctid refuses; the message is one line that names the place and the mend."
+    "An input that ctid rejects. The message is one line that names the place and the correction."
 );
 pyo3::create_exception!(ctid, DataError, Error, "Something about records.");
 pyo3::create_exception!(

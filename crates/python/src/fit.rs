@@ -28,11 +28,11 @@ pub struct Fit {
     frames: Arc<Vec<Content>>,
     fitted: FittedModel,
     comparison: Comparison,
-    /// What the program's page shows, once somebody asks.
+    /// Data for the program's page, computed on demand.
     page: OnceLock<missing_effect::Diagnosis>,
 }
 
-/// The same as it is pickled: what it is of, and the fit.
+/// The fit in its pickled form: its problem and the result.
 #[derive(Serialize, Deserialize)]
 struct KeptFit {
     model: Kept,
@@ -106,7 +106,7 @@ impl Fit {
         .collect()
     }
 
-    /// Half the width of the interval that holds each of them with probability `level`.
+    /// Half the width of the interval that contains each of them with probability `level`.
     fn half_widths(&self, level: f64) -> PyResult<Vec<Option<f64>>> {
         if !(level > 0.0 && level < 1.0) {
             return Err(error::of_model(format!(
@@ -133,7 +133,7 @@ impl Fit {
         Ok(Some((names.collect(), matrix)))
     }
 
-    /// Of each record, and each part that gaps leave of one: its name, its times \[s\] and its outputs.
+    /// For each record, and each part of a record with gaps: its name, its times \[s\] and its outputs.
     #[getter]
     fn series<'py>(
         &self,
@@ -154,7 +154,7 @@ impl Fit {
         all.collect()
     }
 
-    /// The unit of each output; empty where no record says it.
+    /// The unit of each output; empty if no record has it.
     #[getter]
     fn output_units(&self) -> Vec<String> {
         units_of(&self.fitted.records().records)
@@ -167,7 +167,7 @@ impl Fit {
         all.map(|s| (s.output, s.rmse, s.fit_percent)).collect()
     }
 
-    /// The same on others.
+    /// Scores on other records.
     fn score(
         &self,
         py: Python<'_>,
@@ -202,8 +202,8 @@ impl Fit {
         simulation(py, &found)
     }
 
-    /// Of each output: its name, the p-values of the tests of its residual (whiteness, trace of the inputs), where it fails, and the same in
-    /// sentences. Where it fails: by what, and a [`crate::diagnosis::Bin`].
+    /// For each output: its name, the p-values of the tests of its residual (whiteness, dependence on the inputs), the bins where the model
+    /// fails, and these failures in sentences. A bin has a kind and a [`crate::diagnosis::Bin`].
     #[getter]
     #[allow(clippy::type_complexity)]
     fn outputs(
@@ -268,9 +268,9 @@ impl Fit {
         }))
     }
 
-    /// What the model is missing.
+    /// Diagnoses the model.
     #[pyo3(signature = (test, *, effort, time_limit, max_effects, seed, progress=None))]
-    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    #[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
     fn diagnose(
         &self,
         py: Python<'_>,
@@ -308,7 +308,7 @@ impl Fit {
         ))
     }
 
-    /// As bytes, to be pickled.
+    /// As bytes, for pickle.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = bytes::of(&KeptFit {
             model: self.model.kept(),

@@ -1,5 +1,5 @@
-//! A frame of measured data as the program reads its records: written as CSV in memory, and read by the same reader, so that samples, gaps and
-//! dates mean the same, and messages name the row and the column. Row 1 is the header, as in a file.
+//! A frame of measured data as the program reads its records: written as CSV in memory, and read by the same reader, so that samples, gaps
+//! and dates mean the same, and messages name the row and the column. Row 1 is the header, as in a file.
 
 use std::fmt::Write;
 
@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::error;
 
-/// A record before a model says what of it is what.
+/// A record before a model assigns its columns.
 #[pyclass(frozen, module = "ctid._ctid")]
 #[derive(Debug)]
 pub struct Frame(pub Content);
 
-/// What is in it.
+/// Columns of a frame.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Content {
     pub name: String,
@@ -31,7 +31,7 @@ enum Times<'py> {
     Dates(Vec<String>),
 }
 
-/// A cell that the reader takes for itself, whatever stands in it.
+/// Quotes a cell so that the reader takes it literally.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }
@@ -109,7 +109,7 @@ impl Content {
         parse_inputs_csv(&self.name, &self.csv, &self.columns(columns), options)
     }
 
-    /// With the time of this frame.
+    /// The columns with the time of this frame.
     fn columns(&self, columns: &Columns) -> Columns {
         Columns {
             time: Some(self.time.clone()),

@@ -47,7 +47,7 @@ pub fn hold_of(hold: &str) -> PyResult<Hold> {
 #[pyo3(signature = (
     frames, inputs, output, *, reference, method, order, delay, integrator, memory, bandwidth, levels, controller, limits, hold
 ))]
-#[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+#[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub fn identify<'py>(
     py: Python<'py>,
     frames: Vec<Bound<'py, Frame>>,

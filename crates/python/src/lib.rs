@@ -5,7 +5,7 @@
 //! | exceptions | `error.rs` |
 //! | long work: the interpreter's lock is released, Ctrl-C is heard | `work.rs` |
 //! | frames as the program reads its records | `frame.rs` |
-//! | a model of the user's own, its fit, its diagnosis | `model.rs`, `fit.rs`, `diagnosis.rs` |
+//! | a user's own model, its fit, its diagnosis | `model.rs`, `fit.rs`, `diagnosis.rs` |
 //! | the matrices of a model about a point | `linear.rs` |
 //! | one of the plants | `tank.rs` |
 //! | a model beside a running plant | `monitor.rs` |

@@ -1,4 +1,4 @@
-//! A model of the user's own.
+//! A user's own model.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,16 +21,16 @@ use crate::{bytes, error, work};
 #[pyclass(frozen, module = "ctid._ctid")]
 pub struct Model(pub Arc<Inner>);
 
-/// A model and, where it comes from a fit, its values.
+/// A model and, after a fit, its values.
 pub struct Inner {
-    /// What a user reads of it.
+    /// Text for the user.
     pub text: String,
     pub file: OwnModelFile,
     /// Fitted values by name, of parameters and of `x(0)`; empty where nothing was fitted.
     pub values: BTreeMap<String, f64>,
 }
 
-/// The same as it is pickled.
+/// The model in its pickled form.
 #[derive(Serialize, Deserialize)]
 pub struct Kept {
     name: String,
@@ -61,7 +61,7 @@ impl Inner {
         Ok(Self { text, file, values })
     }
 
-    /// Frames as the model takes them, of which so many come first that are fitted.
+    /// Frames as records of the model; the fitted ones come first, and `fitted` is their number.
     pub fn records(&self, frames: &[Content], fitted: usize) -> Result<Records, ctid::Error> {
         records(&self.file, frames, fitted)
     }
@@ -79,7 +79,7 @@ pub fn records(
     file.gathered(all, fitted, time_unit(frames))
 }
 
-/// Seconds in one unit of the time of frames, of which there is at least one.
+/// Seconds in one unit of the time of at least one frame.
 fn time_unit(frames: &[Content]) -> f64 {
     let time = frames.first().map(|frame| frame.time.clone());
     let columns = Columns {
@@ -105,7 +105,7 @@ pub fn contents(frames: &[Bound<'_, Frame>]) -> Vec<Content> {
 
 #[pymethods]
 impl Model {
-    /// From its text; `name` stands for it in messages.
+    /// Reads a model text; `name` is its name in messages.
     #[staticmethod]
     fn from_text(text: String, name: &str) -> PyResult<Self> {
         let spec = parsed(name, &text)?;
@@ -118,7 +118,7 @@ impl Model {
         })))
     }
 
-    /// From a model file of `ctid`, which names the text.
+    /// Reads a model file of `ctid`, which names the text.
     #[staticmethod]
     fn from_model_file(path: &str) -> PyResult<Self> {
         let file = AnyModelFile::read(Path::new(path)).map_err(|error| error::of(&error))?;
@@ -135,7 +135,7 @@ impl Model {
         })))
     }
 
-    /// The same with these columns, known parameters, side measurements and hold (`zero`, `first`); what is not given stays.
+    /// The model with these columns, known parameters, side measurements and hold (`zero`, `first`); other settings do not change.
     #[pyo3(signature = (*, inputs=None, outputs=None, known=None, priors=None, hold=None))]
     fn with_settings(
         &self,
@@ -196,7 +196,7 @@ impl Model {
         })
     }
 
-    /// The model with its effects in it as text, its values the fitted ones where it comes from a fit.
+    /// The model with its effects as text, with the fitted values after a fit.
     fn to_modelica(&self) -> PyResult<String> {
         let spec = self.0.valued().map_err(|error| error::of(&error))?;
         Ok(spec.to_string())
@@ -212,7 +212,7 @@ impl Model {
         crate::linear::linearize(py, spec, &at)
     }
 
-    /// The model beside a running plant.
+    /// A monitor of a plant with this model.
     fn monitor(
         &self,
         time_unit: f64,
@@ -250,7 +250,7 @@ impl Model {
         names.zip(self.0.file.columns.inputs.clone()).collect()
     }
 
-    /// The same of the outputs.
+    /// Names and units of the outputs.
     #[getter]
     fn outputs(&self) -> Vec<(String, String)> {
         let spec = &self.0.file.base;
@@ -274,7 +274,7 @@ impl Model {
         Ok(spec.states.into_iter().map(|s| s.about.name).collect())
     }
 
-    /// As bytes, to be pickled.
+    /// As bytes, for pickle.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         Ok(PyBytes::new(py, &bytes::of(&self.0.kept())?))
     }

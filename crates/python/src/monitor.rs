@@ -1,4 +1,4 @@
-//! A model beside a running plant.
+//! A monitor: the model run in parallel with a plant.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -20,7 +20,8 @@ struct Models {
     candidates: Vec<CandidateModel>,
 }
 
-/// Models that are watched live as long as the interpreter: a monitor borrows its own. Each text is kept once with the same candidates.
+/// Monitored models live as long as the interpreter, because a monitor borrows its model. Each text is stored once with the same
+/// candidates.
 static MODELS: Mutex<Option<HashMap<String, &'static Models>>> = Mutex::new(None);
 
 fn kept(spec: ModelSpec, settings: &OwnSettings) -> PyResult<&'static Models> {
@@ -57,7 +58,7 @@ pub struct Monitor {
     monitor: Mutex<monitor::Monitor<'static>>,
 }
 
-/// What is watched, as it is pickled.
+/// The monitored model in its pickled form.
 #[derive(Clone, Serialize, Deserialize)]
 struct Watched {
     /// The model, its effects in it, with its values.
@@ -180,12 +181,12 @@ fn notice<'py>(py: Python<'py>, notice: &Notice) -> PyResult<Bound<'py, PyDict>>
     Ok(all)
 }
 
-/// Residual, the same in standard deviations; none without a reading, and while it learns.
+/// Residual, and innovation in standard deviations; none without a reading, and during learning.
 type Innovation = Option<(f64, f64)>;
 
 #[pymethods]
 impl Monitor {
-    /// Takes in a row: innovations, the alarm and those of the scatter as JSON, notices, why readings are lost.
+    /// Processes a row: innovations, the alarm and those of the noise as JSON, notices, reasons for missing readings.
     #[allow(clippy::type_complexity)]
     fn update<'py>(
         &self,
@@ -225,7 +226,7 @@ impl Monitor {
         ))
     }
 
-    /// Name, unit, value as learned, value now, half the width of its 95 % interval.
+    /// Name, unit, learned value, present value, half the width of its 95 % interval.
     #[getter]
     fn estimates(&self) -> Vec<(String, String, f64, f64, Option<f64>)> {
         let all = self.monitor().estimates().into_iter();
@@ -233,7 +234,7 @@ impl Monitor {
             .collect()
     }
 
-    /// `learning`, `watching` or `alarmed`, and rows, or the largest score and its threshold.
+    /// `learning`, `watching` or `alarmed`, and the number of rows, or the largest score and its threshold.
     #[getter]
     fn progress(&self) -> (&'static str, f64, f64) {
         match self.monitor().progress() {

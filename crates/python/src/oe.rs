@@ -11,7 +11,7 @@ use stabilized_oe::{BlockDiagonal, IoSample, StabilizedOe as Estimator, StateVar
 
 use crate::error;
 
-/// One of the crate's estimators, whose orders are known when it is compiled.
+/// An estimator of the crate with orders that are known at compile time.
 trait Oe: Send + Sync {
     fn update(&mut self, u: f64, y: f64, dt: f64) -> f64;
     fn theta(&self) -> Vec<f64>;
@@ -45,7 +45,7 @@ impl<const N: usize, const P: usize> Oe for Own<N, P> {
     }
 }
 
-/// What an estimator is made of.
+/// Arguments of an estimator.
 struct Start<'a> {
     theta: &'a [f64],
     filter: &'a [f64],
@@ -83,8 +83,8 @@ fn with_offset<const N: usize, const P: usize>(
 /// Recursive output error in continuous time, `A(s) y = B(s) u`, with a filter of its error that is adapted beside it.
 ///
 /// `order`: `(n, m)`, n from 1 to 3 and m below n. `theta0`: `a_1..a_n, b_0..b_m`, and an offset where there is one; A has to be stable.
-/// `forgetting`: rate in 1/s. `bandwidth`: of the filters that make the derivatives, in 1/s, 2 to 10 times that of the plant. `P0`, `P0_filter`: how
-/// little is known, on the diagonals. `filter0`: start of the filter's coefficients, without it those of A.
+/// `forgetting`: rate in 1/s. `bandwidth`: of the filters that make the derivatives, in 1/s, 2 to 10 times that of the plant. `P0`,
+/// `P0_filter`: how little is known, on the diagonals. `filter0`: start of the filter's coefficients, without it those of A.
 ///
 /// Raises `ctid.ModelError`.
 #[pyclass(module = "ctid._ctid")]
@@ -96,7 +96,7 @@ impl StabilizedOe {
     #[pyo3(signature = (
         order, theta0, forgetting, bandwidth, *, P0=1e3, P0_filter=1.0, filter0=None, hold="zero", offset=false
     ))]
-    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    #[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
     #[allow(non_snake_case, reason = "it is the name of the matrix")]
     fn new(
         order: (usize, usize),
@@ -161,12 +161,12 @@ impl StabilizedOe {
         Ok(Self(made.map_err(error::of_model)?))
     }
 
-    /// Takes in a sample, held over `dt` seconds. Returns the innovation before it.
+    /// Processes a sample that is held over `dt` seconds. Returns the innovation before the update.
     fn update(&mut self, u: f64, y: f64, dt: f64) -> f64 {
         self.0.update(u, y, dt)
     }
 
-    /// Takes in many samples, one `dt` in s for all. Returns the estimates after each, a row for each sample.
+    /// Processes many samples, one `dt` in s for all. Returns the estimates after each, a row for each sample.
     fn run<'py>(
         &mut self,
         py: Python<'py>,
@@ -208,7 +208,7 @@ impl StabilizedOe {
         PyArray1::from_vec(py, self.0.filter())
     }
 
-    /// What the model gives now.
+    /// Present output of the model.
     #[getter]
     fn model_output(&self) -> f64 {
         self.0.model_output()
@@ -223,7 +223,7 @@ impl StabilizedOe {
     }
 }
 
-/// Where zero of the signals is.
+/// Operating point of the signals.
 fn offsets(levels: &str) -> PyResult<Offsets> {
     match levels {
         "estimated" => Ok(Offsets::Estimated),
@@ -238,7 +238,7 @@ fn offsets(levels: &str) -> PyResult<Offsets> {
 /// Closed-loop output error over a whole record, sampled evenly: the plant in the loop of a known controller, or without one in open loop.
 #[pyfunction]
 #[pyo3(signature = (dt, r, u, y, *, order, controller, levels, theta0, level))]
-#[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+#[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub fn fcloe_fit<'py>(
     py: Python<'py>,
     dt: f64,

@@ -27,13 +27,13 @@ trait Online: Send + Sync {
 
 impl<const P: usize> Online for Fixed<P> {
     fn update(&mut self, phi: &[f64], y: f64, dt: f64) -> Innovation {
-        // Whoever calls this has counted them.
+        // The caller has checked the length.
         let phi = phi.first_chunk::<P>().copied().unwrap_or([f64::NAN; P]);
         RecursiveEstimator::update(self, &Sample::new(phi, y), dt)
     }
 
     fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]) {
-        // A copy of its own, which the compiler keeps in registers where it can.
+        // A local copy, which the compiler can keep in registers.
         let mut own = self.clone();
         let mut rows = theta.as_chunks_mut::<P>().0.iter_mut();
         let samples = phi.as_chunks::<P>().0.iter().zip(y).zip(epsilon);
@@ -67,7 +67,7 @@ impl<const P: usize> Online for Fixed<P> {
     }
 }
 
-/// Of many parameters.
+/// Estimator for many parameters.
 #[derive(Clone)]
 struct Many(DynamicRls, Weights);
 
@@ -137,8 +137,8 @@ fn online(theta: &[f64], p: &[Vec<f64>], weights: Weights) -> PyResult<Box<dyn O
 
 /// Recursive least squares in continuous time with forgetting, whose matrix stays positive definite.
 ///
-/// `theta0`: first guess, one number for each parameter. `P0`: how little is known, symmetric and positive definite. `forgetting`: rate in 1/s, the
-/// memory is its inverse; `c` and `gamma`: weights of the step and of the information, 1 of least squares.
+/// `theta0`: first guess, one number for each parameter. `P0`: how little is known, symmetric and positive definite. `forgetting`: rate in
+/// 1/s, the memory is its inverse; `c` and `gamma`: weights of the step and of the information, 1 of least squares.
 ///
 /// Raises `ctid.ModelError` where these do not go together.
 #[pyclass(module = "ctid._ctid")]
@@ -196,8 +196,8 @@ impl ContinuousRls {
         Self::made(&theta0.as_array().to_vec(), &rows_of(&P0), weights)
     }
 
-    /// Takes in a sample: the regressor, the output, and the time in s over which they are held. Returns the innovation `y - theta' phi` before
-    /// it. A sample that cannot be used, a NaN say, changes nothing; `outcome` says why.
+    /// Processes a sample: the regressor, the output, and the time in s over which they are held. Returns the innovation `y - theta' phi`
+    /// before the update. A sample that cannot be used, such as a NaN, changes nothing; `outcome` gives the reason.
     fn update(&mut self, phi: &Bound<'_, PyAny>, y: f64, dt: f64) -> PyResult<f64> {
         let innovation = if let Ok(phi) = phi.cast::<PyArray1<f64>>() {
             // A few numbers are copied faster than it is noted that they are read.
@@ -213,7 +213,7 @@ impl ContinuousRls {
         } else {
             let other =
                 || error::of_data("phi is a list of numbers, or an array of floats with one axis");
-            // Numpy makes a number of an array that holds one.
+            // Numpy converts an array with one entry to a number.
             if phi
                 .cast::<PyUntypedArray>()
                 .is_ok_and(|phi| phi.ndim() != 1)
@@ -230,8 +230,8 @@ impl ContinuousRls {
         Ok(innovation.epsilon)
     }
 
-    /// Takes in many samples: `phi` a row for each, `y` and `dt` a number for each, or one `dt` for all. Returns the estimates after each, a row
-    /// for each sample, and the innovations; without `trajectory` the innovations alone.
+    /// Takes in many samples: `phi` a row for each, `y` and `dt` a number for each, or one `dt` for all. Returns the estimates after each,
+    /// a row for each sample, and the innovations; without `trajectory` the innovations alone.
     #[pyo3(signature = (phi, y, dt, *, trajectory=true))]
     fn run<'py>(
         &mut self,
@@ -296,14 +296,14 @@ impl ContinuousRls {
         PyArray1::from_vec(py, self.rls.theta())
     }
 
-    /// The matrix that stands for their covariance.
+    /// The covariance matrix of the estimator.
     #[getter]
     #[pyo3(name = "P")]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         PyArray2::from_vec2(py, &self.rls.covariance()).map_err(error::of_data)
     }
 
-    /// What was done with the last sample of `update`.
+    /// Outcome of the last sample of `update`.
     #[getter]
     fn outcome(&self) -> String {
         format!("{:?}", self.outcome)
@@ -315,7 +315,7 @@ impl ContinuousRls {
         self.outcome.used()
     }
 
-    /// Smallest eigenvalue of the information matrix: how well the combination of parameters is known that is known worst.
+    /// Smallest eigenvalue of the information matrix: the information on the least well determined combination of parameters.
     #[getter]
     fn excitation(&self) -> PyResult<f64> {
         let health = self.rls.health().map_err(error::of_model)?;
@@ -333,7 +333,7 @@ impl ContinuousRls {
         self.__copy__()
     }
 
-    /// What it is made of again, its matrix to rounding.
+    /// Arguments for restoring the estimator; its matrix is exact up to rounding.
     #[allow(clippy::type_complexity)]
     fn __getnewargs_ex__<'py>(
         &self,

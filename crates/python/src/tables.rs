@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::work;
 
-/// What `ctid tables udink --json` writes, without its mark.
+/// Output of `ctid tables udink --json`, without its mark.
 #[pyfunction]
 pub fn udink_tables(py: Python<'_>, runs: usize, seed: u64) -> PyResult<String> {
     let settings = udink::Settings::default();

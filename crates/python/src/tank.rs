@@ -1,4 +1,4 @@
-//! One of the plants: tanks, and what is linear like them.
+//! A built-in plant: tanks, and linear processes.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::frame::{Content, Frame};
 use crate::model::contents;
 use crate::{bytes, error, work};
 
-/// What stands for the model file in messages.
+/// Name of the model in messages, instead of a file name.
 const NAME: &str = "the model";
 
 /// A plant, from the text of a model file; it never changes.
@@ -36,14 +36,14 @@ pub struct Tank {
 pub struct TankFit {
     text: String,
     frames: Arc<Vec<Content>>,
-    /// So many of them are fitted.
+    /// Number of fitted parameters.
     fitted: usize,
     problem: Problem,
     found: Found,
     known: Known,
 }
 
-/// How well the parameters are known: names, covariance, degrees of freedom.
+/// Uncertainty of the parameters: names, covariance, degrees of freedom.
 type Known = Option<(Vec<String>, Vec<Vec<f64>>, f64)>;
 
 fn parsed(text: &str) -> Result<ModelFile, ctid::Error> {
@@ -103,7 +103,7 @@ impl Tank {
         (columns.inputs.clone(), columns.outputs.clone())
     }
 
-    /// How many inputs and outputs it has.
+    /// Number of inputs and outputs.
     #[getter]
     fn signals(&self) -> (usize, usize) {
         let inputs = match self.file.plant.joined() || self.file.known.disturbance.is_some() {
@@ -163,7 +163,7 @@ impl TankFit {
             .collect()
     }
 
-    /// Half the width of the interval that holds each of them with probability `level`; none of the initial states.
+    /// Half the width of the interval that contains each of them with probability `level`; none for the initial states.
     fn half_widths(&self, level: f64) -> PyResult<Vec<Option<f64>>> {
         if !(level > 0.0 && level < 1.0) {
             return Err(error::of_model(format!(
@@ -192,7 +192,7 @@ impl TankFit {
         units_of(&self.problem.records)
     }
 
-    /// As of a diagnosis of a model of the user's own.
+    /// Series as in a diagnosis of a user's own model.
     #[getter]
     #[allow(clippy::type_complexity)]
     fn series<'py>(
@@ -306,7 +306,7 @@ impl TankFit {
         simulation(py, &found)
     }
 
-    /// The same fit with records that are held out, for their scores.
+    /// The same fit with held-out records, for their scores.
     fn with_test(&self, py: Python<'_>, test: Vec<Bound<'_, Frame>>) -> PyResult<Self> {
         let mut frames = self.frames[..self.fitted].to_vec();
         frames.extend(contents(&test));
@@ -325,9 +325,9 @@ impl TankFit {
         })
     }
 
-    /// What the plant is missing.
+    /// Diagnoses the plant.
     #[pyo3(signature = (test, *, effort, time_limit, max_effects, seed, progress=None))]
-    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
+    #[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
     fn diagnose(
         &self,
         py: Python<'_>,
@@ -358,7 +358,7 @@ impl TankFit {
         })
     }
 
-    /// What it is made of again: the text and the records, with the fit repeated.
+    /// Arguments for restoring the fit: the text and the records; the fit is repeated.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let kept = KeptTank {
             text: self.text.clone(),

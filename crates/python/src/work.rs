@@ -1,4 +1,4 @@
-//! Long work beside the interpreter: its lock is released, and Ctrl-C is heard.
+//! Long computations: the interpreter's lock is released, and Ctrl-C is checked.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -9,18 +9,18 @@ use pyo3::prelude::*;
 
 use crate::error;
 
-/// How often Ctrl-C is looked for.
+/// Interval of the checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
-/// As much as a main thread has: the texts of models are parsed by recursion.
+/// Stack size of a main thread: the texts of models are parsed by recursion.
 const STACK: usize = 8 << 20;
 
-/// What the work says.
+/// Message of the work.
 enum Said<T> {
     Phase(&'static str),
     Done(T),
 }
 
-/// Tells the caller which phase has begun.
+/// Reports the present phase to the caller.
 pub struct Phases<T>(Sender<Said<T>>);
 
 impl<T> Phases<T> {
@@ -30,8 +30,8 @@ impl<T> Phases<T> {
     }
 }
 
-/// Does work that may take long. It is handed a flag, which Ctrl-C sets: it ends soon then, and its result is dropped for a
-/// `KeyboardInterrupt`. `progress`: called with every phase that begins.
+/// Runs work that may take long. Ctrl-C sets a flag that the work receives: the work ends soon then, and a `KeyboardInterrupt` replaces its
+/// result. `progress`: called with every new phase.
 pub fn run<T: Send>(
     py: Python<'_>,
     progress: Option<&Py<PyAny>>,
@@ -71,7 +71,7 @@ pub fn run<T: Send>(
                     stop.store(true, Ordering::Relaxed);
                 }
             };
-            // A panic is a mistake of ctid's; it has said its line.
+            // A panic is an internal error of ctid; its message is already printed.
             let ended = worker.join();
             if let Some(raised) = raised {
                 return Err(raised);
@@ -79,7 +79,7 @@ pub fn run<T: Send>(
             match (ended, found) {
                 (Ok(()), Some(found)) => found.map_err(|error| error::of(&error)),
                 _ => Err(error::Error::new_err(
-                    "ctid has failed where it should not: please report the line above",
+                    "this is an internal error of ctid: please report the line above",
                 )),
             }
         })

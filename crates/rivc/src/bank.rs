@@ -10,7 +10,7 @@ use crate::grid::Stretch;
 pub(crate) struct Bank {
     /// `e_0 .. e_{n-1}` of the monic E.
     e: Vec<f64>,
-    /// For each length: Phi row by row, then the effects of the input at both ends.
+    /// For each length: Phi row by row, then the input matrices for both ends.
     tables: Vec<f64>,
 }
 
@@ -34,7 +34,7 @@ impl Bank {
         })
     }
 
-    /// Moves the states of a signal over one stretch. N is n.
+    /// Advances the states of a signal over one interval. N is n.
     #[inline]
     pub(crate) fn advance<const N: usize>(&self, state: &mut [f64; N], stretch: &Stretch) {
         let table = &self.tables[stretch.length * N * (N + 2)..][..N * (N + 2)];

@@ -1,4 +1,4 @@
-//! Records as the estimators see them: any number of inputs, one output, times that may be uneven.
+//! Records for the estimators: any number of inputs, one output, times that may be uneven.
 
 use ct_lti::Hold;
 
@@ -6,7 +6,7 @@ use crate::Error;
 
 /// Times further from an even grid than this share of a step are uneven.
 const EVEN: f64 = 1e-6;
-/// What counts in samples takes times for even that are within this share of a step of an even grid.
+/// Methods that count samples accept times within this share of a step of an even grid.
 const NEARLY_EVEN: f64 = 0.1;
 
 /// One input of a record.
@@ -14,14 +14,14 @@ const NEARLY_EVEN: f64 = 0.1;
 pub struct Input {
     /// One value for each sample, input unit.
     pub values: Vec<f64>,
-    /// What it does between samples.
+    /// Hold between samples.
     pub hold: Hold,
 }
 
 /// One record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Data {
-    /// For messages.
+    /// Name in messages.
     pub name: String,
     /// Sampling instants \[time\], rising; their steps may differ.
     pub time: Vec<f64>,
@@ -29,16 +29,16 @@ pub struct Data {
     pub inputs: Vec<Input>,
     /// The output at the sampling instants, output unit; NaN where its reading is missing.
     pub output: Vec<f64>,
-    /// The reference of a loop whose controller moves the first input; nothing in open loop. In a loop the instruments come from it,
-    /// whatever the controller.
+    /// The reference of a loop whose controller drives the first input; none in open loop. In a loop the reference gives the instruments,
+    /// for any controller.
     pub reference: Option<Vec<f64>>,
-    /// It is a part of the record before it in the list, behind a time in which the inputs are not known: it begins with a state of its own, and shares that record's offset and
-    /// noise.
+    /// Whether the record continues the preceding one in the list, after a time with unknown inputs: it has its own initial state, and
+    /// shares the offset and the noise of that record.
     pub continues: bool,
 }
 
 impl Data {
-    /// One input, held between samples, with even steps from time 0; open loop.
+    /// Record with one input that is held between samples, with even steps from time 0; open loop.
     pub fn even(step: f64, u: Vec<f64>, y: Vec<f64>) -> Self {
         Self {
             name: "record".into(),
@@ -63,7 +63,7 @@ impl Data {
         self.time.is_empty()
     }
 
-    /// Number of readings of the output that are there.
+    /// Number of present readings of the output.
     pub fn readings(&self) -> usize {
         self.output.iter().filter(|y| !y.is_nan()).count()
     }
@@ -162,7 +162,7 @@ impl Data {
         }
     }
 
-    /// Refuses times that are not nearly even, for what counts in samples.
+    /// Rejects times that are not nearly even, for methods that count samples.
     pub(crate) fn require_even(&self, what: &'static str) -> Result<(), Error> {
         match self.off_grid(NEARLY_EVEN) {
             Some(index) => Err(Error::Uneven {

@@ -1,4 +1,5 @@
-//! Where the delays are: a grid, made finer around the best, and neighbours that another noise may prefer.
+//! Estimation of delays: a grid that is refined around the best point, and neighbours that may fit better with another noise model. The
+//! grid is searched on the beginning of long records, if the inputs change there as much as later: it only has to find the right minimum.
 //!
 //! The grid is searched on the beginning of long records, if the inputs move there as they do later: it only has to find the right minimum.
 
@@ -14,19 +15,20 @@ use crate::start::{ROUGH, Start};
 
 /// Points of the first grid of delays.
 const POINTS: usize = 16;
-/// A delay moves by this share of a step at least in one iteration, if it has to.
+/// A delay changes by at least this share of a step in one iteration, if its update is larger.
 const REACH: f64 = 0.25;
 /// Grids that are finer by this factor.
 const FINER: f64 = 4.0;
 const GRIDS: usize = 4;
-/// Other points of the first grid that are starts too, beside no delay: where the order is high the rough comparison may miss the best.
+/// Number of other grid points that are also starts, in addition to zero delay: for high orders the rough comparison may miss the best
+/// point.
 const OTHERS: usize = 2;
-/// Where a better delay is looked for, in steps from the one that was found.
+/// Distances of neighbouring delays from the estimate, in steps.
 const NEIGHBOURS: [f64; 8] = [2.0, 1.5, 1.0, 0.5, -0.5, -1.0, -1.5, -2.0];
 
 /// Rows of each record on which the grid is searched.
 const ROWS: usize = 4000;
-/// They are enough where each input moves by this share of what it does in the whole record.
+/// The first rows are enough if each input varies there by this share of its variation in the whole record.
 const LIKE_ALL: f64 = 0.5;
 
 /// The beginnings of the records, where they are long and their beginnings like the rest.
@@ -49,7 +51,7 @@ pub(crate) fn beginnings(records: &[Prepared]) -> Option<Vec<Prepared>> {
 }
 
 impl Problem<'_> {
-    /// Delays to start from, the best first, and by how much a delay may move in one iteration from there. `delays` holds the known ones.
+    /// Start values of the delays, the best first, and the largest change of a delay in one iteration. `delays` contains the known ones.
     ///
     /// # Errors
     /// As [`Problem::at_delays`].
@@ -60,8 +62,8 @@ impl Problem<'_> {
     ) -> Result<(Vec<Vec<f64>>, f64), Error> {
         let estimated: Vec<(usize, f64)> = self.structure.estimated_delays().collect();
         let mut delays = delays.to_vec();
-        // All samples count here, as if the inputs had stood before the record: samples that are left out for the largest delay may hold
-        // the only step.
+        // All samples are used here, with inputs assumed constant before the record: the samples that are left out for the largest delay
+        // may contain the only step.
         let largest = 0.0;
         let mut finest = 0.0_f64;
         let mut others: Vec<Vec<f64>> = Vec::new();
@@ -125,8 +127,8 @@ impl Problem<'_> {
         Ok((candidates, finest))
     }
 
-    /// Delays about those of a model, whose whitened output error is compared under one model of the noise: each stretch between samples
-    /// has a minimum of its own, and which is the lowest depends on the noise's spectrum. The best model, where one is better.
+    /// Searches for better delays near those of a model, by the whitened output error with a common noise model: each interval between
+    /// samples has a separate minimum, and the noise's spectrum decides which is the lowest. Returns the best model, if one is better.
     pub(crate) fn better_delay(&self, found: &Refined) -> Option<Model> {
         let step = self.shortest_step();
         let largest =

@@ -25,13 +25,14 @@ pub(crate) struct Equations {
     zy: DVector<f64>,
     /// Squares of phi, to scale the columns with.
     sizes: DVector<f64>,
-    /// Rows whose reading is there.
+    /// Number of rows with a reading.
     pub(crate) samples: usize,
     /// Squares of the measured output, in the same unit.
     measured_squares: f64,
-    /// Squares of the residual, whitened where there is a model of the noise.
+    /// Sum of squared residuals, whitened if there is a noise model.
     residual_squares: f64,
-    /// The residual of each record, NaN where the reading is missing; where the filter is that of the model `y - y^` on the measured inputs.
+    /// The residual of each record, NaN where the reading is missing; where the filter is that of the model `y - y^` on the measured
+    /// inputs.
     pub(crate) residuals: Vec<Vec<f64>>,
 }
 
@@ -135,7 +136,8 @@ impl Equations {
         }
     }
 
-    /// An autoregression of each record's residual, of at most this order, one for the parts of a record; one without noise counts as one with a billionth of the largest.
+    /// An AR model of each record's residual, of at most this order, one for all parts of a record; a record without noise gets a billionth
+    /// of the largest noise.
     pub(crate) fn residual_noise(&self, order: usize) -> Result<Vec<ArModel>, Error> {
         let mut models = Vec::with_capacity(self.residuals.len());
         for group in self.layout.groups() {
@@ -167,7 +169,7 @@ impl Equations {
             zz: without(&self.zz),
             zy: zy.remove_rows_at(places),
             sizes: self.sizes.clone().remove_rows_at(places),
-            // As long as the records, and not needed to solve.
+            // Has the length of the records, and is not needed for the solution.
             residuals: Vec::new(),
             layout: self.layout.clone(),
             ..*self
@@ -177,7 +179,7 @@ impl Equations {
     /// Mean square of the residual, not below that of rounding: of the output error where the filter is that of the model.
     pub(crate) fn mean_square(&self) -> f64 {
         let rounding = ROUNDING * ROUNDING * self.measured_squares;
-        // Not a number stays what it is.
+        // NaN stays NaN.
         match self.residual_squares < rounding {
             true => rounding / self.samples as f64,
             false => self.residual_squares / self.samples as f64,
@@ -223,7 +225,7 @@ impl Equations {
         Ok(solution)
     }
 
-    /// Variance of the residual, whitened where there is a model of the noise.
+    /// Variance of the residual, whitened if there is a noise model.
     pub(crate) fn variance(&self) -> f64 {
         self.residual_squares / (self.samples - self.unknowns()).max(1) as f64
     }

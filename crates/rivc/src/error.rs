@@ -1,11 +1,10 @@
-//! What can be wrong with a record, a structure or an estimate: each message names what it is about, the numbers that disagree and the
-//! mend, in one line.
+//! Errors of records, structures and estimates: each message names the object, the numbers that disagree and the correction, in one line.
 
 /// Everything this crate can refuse.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A polynomial or a step that is no such thing.
+    /// An invalid polynomial or step.
     #[error(transparent)]
     Lti(#[from] ct_lti::Error),
     /// A series that `ct-signals` refuses.
@@ -20,7 +19,7 @@ pub enum Error {
     /// B of a larger degree than A.
     #[error("B of input {input} has degree {m} over A of degree {n}; choose m of at most {n}")]
     Improper {
-        /// Which input, from 1.
+        /// Number of the input, from 1.
         input: usize,
         /// Degree of A.
         n: usize,
@@ -49,9 +48,9 @@ pub enum Error {
     NotFinite {
         /// Name of the record.
         record: String,
-        /// Which signal.
+        /// The signal in question.
         what: String,
-        /// Which sample, from 0.
+        /// Index of the sample, from 0.
         index: usize,
         /// What was found.
         value: f64,
@@ -69,24 +68,24 @@ pub enum Error {
     Time {
         /// Name of the record.
         record: String,
-        /// Which sample, from 0.
+        /// Index of the sample, from 0.
         index: usize,
         /// The time before.
         before: f64,
-        /// The time there.
+        /// The time at this sample.
         after: f64,
     },
     /// A setting outside its range.
     #[error("{what} is {value}, but must be {range}")]
     Setting {
-        /// Which setting.
+        /// Name of the setting.
         what: &'static str,
         /// What was given.
         value: f64,
-        /// What it may be.
+        /// Allowed range.
         range: &'static str,
     },
-    /// A delay that leaves too little of a record.
+    /// A delay that leaves too few samples of a record.
     #[error(
         "{record}: a delay of up to {delay:?} leaves {left} of {samples} samples whose input is known, and {needed} are needed for {parameters} parameters; give a longer record, or a smaller largest delay"
     )]
@@ -122,7 +121,7 @@ pub enum Error {
     /// A B without coefficients.
     #[error("B of input {input} has no coefficient; give at least b_0")]
     NoNumerator {
-        /// Which input, from 1.
+        /// Number of the input, from 1.
         input: usize,
     },
     /// Too few samples.
@@ -140,57 +139,57 @@ pub enum Error {
         /// Number of parameters.
         parameters: usize,
     },
-    /// A delay beside a direct term.
+    /// A delay together with a direct term.
     #[error(
-        "the delay of input {input} cannot be estimated with m = n = {n}: the output would jump with it; choose m of at most {most}"
+        "the delay of input {input} cannot be estimated with m = n = {n}: the output would be discontinuous in the delay; choose m of at most {most}"
     )]
     DelayOfDirectTerm {
-        /// Which input, from 1.
+        /// Number of the input, from 1.
         input: usize,
         /// Degree of A and B.
         n: usize,
         /// Largest m.
         most: usize,
     },
-    /// A signal that stands still.
+    /// A signal that is constant.
     #[error(
         "{what} is constant at {value} in all records, so that nothing can be identified from it; record at least a step up and a step down"
     )]
     Constant {
-        /// Which signal.
+        /// Name of the signal.
         what: String,
-        /// Where it stands.
+        /// Constant value of the signal.
         value: f64,
     },
-    /// Steps that differ, where the method counts in samples.
+    /// Unequal steps for a method that counts samples.
     #[error(
         "{record}: the times leave an even grid at sample {index}, with a step of {step} where the mean is {expected}; {what} counts in samples: resample the record, or take SRIVC in open loop"
     )]
     Uneven {
         /// Name of the record.
         record: String,
-        /// Which sample, from 0.
+        /// Index of the sample, from 0.
         index: usize,
         /// The step to it.
         step: f64,
         /// The mean step.
         expected: f64,
-        /// What needs even steps.
+        /// Method that needs even steps.
         what: &'static str,
     },
-    /// A record in a loop beside one that is not.
+    /// A record in a loop together with one that is not.
     #[error(
         "{record}: this record has {found} that changes, and the first one has {first}; give all records of a loop their reference, or none"
     )]
     MixedLoops {
         /// Name of the record.
         record: String,
-        /// What it has.
+        /// Property of this record.
         found: &'static str,
-        /// What the first one has.
+        /// Property of the first record.
         first: &'static str,
     },
-    /// No model of the input from the reference.
+    /// No model of the input as a function of the reference was found.
     #[error(
         "{record}: {samples} samples give no stable model of the input from the reference, and without it there are no instruments in a loop; give at least {needed}, and a reference that changes often"
     )]
@@ -218,17 +217,17 @@ pub enum Error {
         /// Name of the record.
         record: String,
     },
-    /// No start led anywhere.
+    /// No start gave a stable plant.
     #[error(
         "none of {tried} bandwidths of the first filter led to a stable plant; lower the orders, move the inputs more, or give another bandwidth"
     )]
     NoStart {
-        /// How many were tried.
+        /// Number of starts.
         tried: usize,
     },
 }
 
-/// Said where readings are missing.
+/// Text about missing readings.
 fn without(missing: usize) -> String {
     match missing {
         0 => String::new(),

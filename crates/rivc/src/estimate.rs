@@ -8,21 +8,24 @@
 //! cov(x) = sigma^2 G^-1 [sum (L z)(L z)'] G^-T        G = sum (L z)(L phi)'
 //! cov(x) = G^-1 [sum_{k,l} R(k-l) z_k z_l'] G^-T      SRIVC: R the autocovariance of the residual, an autoregression
 //! ```
-//! and filter, instruments and L are computed again until the estimates have converged. A delay that is estimated takes part by its derivative. Of several
-//! records each has a model of its noise, or a variance, of its own, and counts accordingly.
+//! and filter, instruments and L are computed again until the estimates have converged. A delay that is estimated takes part by its
+//! derivative. Of several records each has a model of its noise, or a variance, of its own, and counts accordingly.
 //!
-//! Readings of the output may be missing, anywhere: their rows do not count, what the model says stands for them in the filters of y (`pass.rs`), L and R are those of
-//! autoregressions over the readings that are there, exactly ([`ArModel::fit`], [`ct_signals::Whitener`]). The limit is that of maximum likelihood from these readings. Where an input is not known for a while,
-//! the parts of the record are [`Data`] that continue: they share offset and noise, and begin with states of their own.
+//! Readings of the output may be missing, anywhere: their rows do not count, what the model says stands for them in the filters of y
+//! (`pass.rs`), L and R are those of autoregressions over the readings that are there, exactly ([`ArModel::fit`],
+//! [`ct_signals::Whitener`]). The limit is that of maximum likelihood from these readings. Where an input is not known for a while, the
+//! parts of the record are [`Data`] that continue: they share offset and noise, and begin with states of their own.
 //!
-//! Assumptions: the plant is stable, but for an integrator; the noise owes nothing to the inputs, in a loop nothing to the reference; in a loop the input is what its hold says, as of a
-//! controller that is sampled: behind a continuous one it is not, and the estimates are biased by what u does between the samples
-//! (closed-loop output error has no need of u). The starts find the right minimum; with noise of more power than the output they may not.
+//! Assumptions: the plant is stable, but for an integrator; the noise owes nothing to the inputs, in a loop nothing to the reference; in a
+//! loop the input is what its hold says, as of a controller that is sampled: after a continuous one it is not, and the estimates are biased
+//! by what u does between the samples (closed-loop output error has no need of u). The starts find the right minimum; with noise of more
+//! power than the output they may not.
 //!
 //! Convergence: no proof for finite records; [`Estimate::converged`] says whether the estimates have converged. For white noise (SRIVC), or
 //! autoregressive noise (RIVC), the limit has the least possible variance in open loop, as far as y is a line between its samples.
 //!
-//! Cost: one pass an iteration, about `2 p^2 + (3 + 2 inputs) n^2` products a sample; up to 8 passes for each of some 10 bandwidths to start.
+//! Cost: one pass an iteration, about `2 p^2 + (3 + 2 inputs) n^2` products a sample; up to 8 passes for each of some 10 bandwidths to
+//! start.
 //!
 //! References: P. C. Young, A. Jakeman, International Journal of Control 31 (1980) 741-764; M. Gilson, H. Garnier, P. C. Young, P. Van den
 //! Hof, in H. Garnier, L. Wang (eds.), Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 5, for the loop;
@@ -44,12 +47,12 @@ use crate::{Data, Delay, Error, Structure};
 
 /// Starts from which the iteration is followed until so many have converged.
 const STARTS: usize = 3;
-/// Times that a delay is looked for again beside the one that was found under coloured noise.
+/// Number of repetitions of the search for neighbouring delays with the coloured noise model.
 const MOVES: usize = 4;
-/// Largest order of the noise that stands behind the standard errors of SRIVC.
+/// Largest order of the noise model for the standard errors of SRIVC.
 const NOISE_ORDER: usize = 8;
 
-/// What is taken for the noise.
+/// Assumed noise model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Noise {
@@ -59,10 +62,10 @@ pub enum Noise {
     Autoregressive,
 }
 
-/// What may be set.
+/// Settings of an estimation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// What is taken for the noise.
+    /// Assumed noise model.
     pub noise: Noise,
     /// Largest order of autoregressive noise.
     pub noise_order: usize,
@@ -84,7 +87,7 @@ impl Settings {
     }
 }
 
-/// Which parameter.
+/// Kind of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -95,35 +98,35 @@ pub enum Kind {
     },
     /// `b_i` of an input.
     B {
-        /// Which input, from 0.
+        /// Index of the input, from 0.
         input: usize,
         /// The power of p.
         power: usize,
     },
     /// Delay of an input \[time\].
     Delay {
-        /// Which input, from 0.
+        /// Index of the input, from 0.
         input: usize,
     },
     /// Offset of a record: output unit, with an integrator output unit/time.
     Offset {
-        /// Which record, from 0; the parts of one count as one.
+        /// Index of the record, from 0; the parts of one record count as one.
         record: usize,
     },
 }
 
-/// One parameter.
+/// An estimated parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Which one.
+    /// Kind of the parameter.
     pub kind: Kind,
-    /// Its estimate.
+    /// Estimate of the parameter.
     pub value: f64,
-    /// Its standard error; nothing for a delay at the end of its range.
+    /// Standard error; none for a delay at the end of its range.
     pub std_error: Option<f64>,
 }
 
-/// A name that the program has: of a type of its own, as serde would borrow a plain reference from what is read.
+/// A name in the program: a separate type, because serde would borrow a plain reference from the input.
 type Name = &'static str;
 
 /// The estimate. `A = 1 + a_1 p + .. + a_n p^n`, with an integrator `A = p + a_2 p^2 + .. + a_n p^n`.
@@ -132,7 +135,7 @@ pub struct Estimate {
     /// SRIVC, RIVC, CLSRIVC or CLRIVC.
     #[serde(deserialize_with = "method")]
     pub method: Name,
-    /// All a that are estimated, all b, input by input, the estimated delays, and the offset of each record.
+    /// Parameters in this order: estimated a, all b input by input, estimated delays, offset of each record.
     pub parameters: Vec<Parameter>,
     /// Covariance of [`Estimate::parameters`], row by row; 0 for a delay at the end of its range.
     pub covariance: Vec<f64>,
@@ -145,15 +148,16 @@ pub struct Estimate {
     pub noise: Vec<ArModel>,
     /// Root mean square of measured less simulated output over the readings that are there, on the measured inputs; output unit.
     pub residual_rms: f64,
-    /// Samples whose residual counts: those without a reading do not.
+    /// Number of samples with a residual; samples without a reading are not counted.
     pub samples: usize,
     /// Iterations from the last start.
     pub iterations: usize,
-    /// Whether the estimates have converged; else they are those with the least output error on the way, and their standard errors mean little.
+    /// Whether the estimates have converged; otherwise they are those with the least output error among the iterates, and their standard
+    /// errors are not reliable.
     pub converged: bool,
-    /// Of each record, the first sample that counts: the inputs before it are not known under the delays.
+    /// For each record, the first sample that is used: for earlier samples the delayed inputs are not known.
     pub first: Vec<usize>,
-    /// Of each record from there on, the simulated output on the measured inputs; output unit.
+    /// For each record from this sample on, the output simulated from the measured inputs; output unit.
     pub simulated: Vec<Vec<f64>>,
 }
 
@@ -173,7 +177,7 @@ impl Estimate {
     }
 }
 
-/// Estimates a plant from records of it.
+/// Estimates a plant from its records.
 ///
 /// # Errors
 /// All of [`Error`]: see there.
@@ -250,7 +254,7 @@ pub fn estimate(
     }
     let least = found.iter().map(|found| found.mean_square);
     let least = least.fold(f64::INFINITY, f64::min);
-    // Of those that fit about as well one that has converged.
+    // Among estimates with about the same fit, one that has converged.
     let near = found
         .into_iter()
         .filter(|found| found.mean_square <= least * problem.growth());
@@ -262,7 +266,7 @@ pub fn estimate(
     let mut best = best.ok_or(refused.or(last_error).unwrap_or(Error::NoStart { tried }))?;
     let order = match settings.noise {
         Noise::Autoregressive => Some(settings.noise_order),
-        // One variance needs no weights, several do.
+        // With equal variances no weights are needed.
         Noise::White if records.iter().filter(|r| !r.continues).count() > 1 => Some(0),
         Noise::White => None,
     };

@@ -1,4 +1,4 @@
-//! From the end of an iteration to the estimate: covariance, and parameters with the lowest coefficient of A at 1.
+//! Final step: covariance, and parameters scaled so that the lowest coefficient of A is 1.
 
 use ct_signals::{ArModel, StationaryNoise};
 use nalgebra::DMatrix;
@@ -120,7 +120,7 @@ pub(crate) fn finish(
     })
 }
 
-/// One model for the parts of a record.
+/// One noise model for all parts of a record.
 fn noise_of_groups(equations: &Equations, noise: &[ArModel]) -> Vec<ArModel> {
     let groups = equations.layout.groups().into_iter();
     groups.map(|group| noise[group.start].clone()).collect()
@@ -132,7 +132,7 @@ fn rms(equations: &Equations) -> f64 {
     (squares / equations.samples as f64).sqrt()
 }
 
-/// Measured outputs less residuals; where a reading is missing, what the model says.
+/// Measured outputs minus residuals; the model's output where a reading is missing.
 fn simulated(
     problem: &Problem,
     equations: &Equations,
@@ -166,7 +166,7 @@ fn normalised(
 ) -> (Vec<Parameter>, Vec<f64>) {
     let structure = problem.structure;
     let (n, lowest) = (structure.n, structure.lowest());
-    // Of a first-order integrator the coefficient is 1 and not estimated.
+    // For a first-order integrator the coefficient is 1 and is not estimated.
     let scale = if lowest < n { model.alpha[lowest] } else { 1.0 };
     let of_scale = (lowest < n).then_some(0);
     let columns = covariance.nrows();
@@ -227,7 +227,7 @@ fn normalised(
             put(Kind::Offset { record }, offset, &terms);
         }
     }
-    // Delays are what they are, whatever the scale; they stand before the offsets.
+    // Delays do not depend on the scale; they come before the offsets.
     let offsets = |kind: &&Kind| matches!(kind, Kind::Offset { .. });
     let before = kinds.len() - kinds.iter().filter(offsets).count();
     for (i, (input, _)) in structure.estimated_delays().enumerate() {

@@ -1,8 +1,8 @@
-//! What a delayed input does between the samples: the stretches on which it runs on a line.
+//! Course of a delayed input between the samples: the intervals on which it is linear.
 //!
 //! With a delay d the input is `u(t - d)`: its jumps and kinks lie between the samples, so that a step of the record falls into stretches.
-//! Steps and stretches of one length share one number, for which the filters are sampled once. Before the first sample the input is
-//! taken to have stood at its first value.
+//! Steps and stretches of one length share one number, for which the filters are sampled once. Before the first sample the input is taken
+//! to have was at its first value.
 
 use std::collections::HashMap;
 
@@ -25,14 +25,14 @@ pub(crate) struct Stretch {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Path {
     stretches: Vec<Stretch>,
-    /// Where the stretches from each sample to the next begin; one more entry than steps.
+    /// Index of the first interval after each sample; one more entry than steps.
     begins: Vec<usize>,
     /// The input just before and just after each sample.
     limits: Vec<[f64; 2]>,
 }
 
 impl Path {
-    /// From sample k to the next.
+    /// Intervals from sample k to the next.
     pub(crate) fn step(&self, k: usize) -> &[Stretch] {
         &self.stretches[self.begins[k]..self.begins[k + 1]]
     }
@@ -66,7 +66,7 @@ impl Lengths {
     }
 }
 
-/// A signal with its hold, on times; `step` where they are even.
+/// A signal with its hold, and its times; `step` if they are even.
 pub(crate) struct Held<'a> {
     pub(crate) time: &'a [f64],
     pub(crate) step: Option<f64>,
@@ -75,7 +75,7 @@ pub(crate) struct Held<'a> {
 }
 
 impl Held<'_> {
-    /// Its value at a share of the step from sample i (none: before the first one).
+    /// Value of the input at a share of the step from sample i (none: before the first one).
     fn value(&self, i: Option<usize>, share: f64) -> f64 {
         let Some(i) = i else {
             return self.values[0];
@@ -94,7 +94,7 @@ impl Held<'_> {
         }
     }
 
-    /// By so many steps: the same stretches in every step.
+    /// Delay by a multiple of the step: every step has the same intervals.
     fn delayed_evenly(&self, delay: f64, step: f64, lengths: &mut Lengths) -> Path {
         let n = self.values.len();
         let mut whole = delay.floor();
@@ -145,7 +145,7 @@ impl Held<'_> {
     fn delayed_unevenly(&self, delay: f64, lengths: &mut Lengths) -> Path {
         let time = self.time;
         let mut path = Path::default();
-        // How many samples are at or before the instant.
+        // Number of samples at or before the instant.
         let mut passed: usize = 0;
         let share = |i: Option<usize>, at: f64| match i {
             Some(i) if i + 1 < time.len() => (at - time[i]) / (time[i + 1] - time[i]),
@@ -171,7 +171,7 @@ impl Held<'_> {
                 let i = passed.checked_sub(1);
                 let jump = time.get(passed).copied().filter(|t| *t < end - small);
                 let to = jump.unwrap_or(end);
-                // Where nothing is delayed the step stays what it is, to the last digit.
+                // Without a delay the step keeps its exact length.
                 let length = if at == begin && jump.is_none() {
                     next - now
                 } else {

@@ -10,19 +10,19 @@ use crate::model::Model;
 use crate::prepared::Prepared;
 use crate::problem::{Delayed, HALVINGS, Problem};
 
-/// The estimates have converged where none would move by more than this share of its standard error, or of itself, and the output error by no
-/// more than this share: standard errors alone say nothing where they are very large.
+/// The estimates have converged where none would move by more than this share of its standard error, or of itself, and the output error by
+/// no more than this share: standard errors alone say nothing where they are very large.
 const SHARE_OF_ERROR: f64 = 1e-3;
 const SHARE_OF_ITSELF: f64 = 1e-9;
 const SHARE_OF_SQUARE: f64 = 1e-5;
 /// A delay is known where steps forth and back leave less than this share of its standard error between them: where a whole number of
 /// samples fits best the criterion has a kink, and no step is small.
 const SHARE_OF_DELAY: f64 = 0.02;
-/// The output error may be larger than the least on the way by this share, in open loop and in a loop: its minimum is not quite where the
-/// equations hold beside coloured noise, and less so where the input answers to the noise.
+/// Largest relative increase of the output error over the least one among the iterates, in open loop and in a loop: with coloured noise,
+/// the solution of the equations is not exactly the minimum of the output error, in particular with feedback.
 const GROWTH: [f64; 2] = [0.02, 1.0];
-/// The models of the noise are estimated again while an estimate moves by more than this share of its standard error, or a standard deviation
-/// of the noise by more than that share, so many times at most.
+/// The models of the noise are estimated again while an estimate moves by more than this share of its standard error, or a standard
+/// deviation of the noise by more than that share, so many times at most.
 const SHARE_FOR_NOISE: f64 = 0.1;
 const SHARE_OF_SIGMA: f64 = 1e-3;
 const NOISE_UPDATES: usize = 12;
@@ -33,7 +33,7 @@ pub(crate) struct Refined {
     pub(crate) model: Model,
     pub(crate) iterations: usize,
     pub(crate) converged: bool,
-    /// Models of the records' noise, where there are any.
+    /// Noise models of the records, if there are any.
     pub(crate) noise: Option<Vec<ArModel>>,
     /// Mean square of the output error on the measured inputs; whitened where there are models of the noise.
     pub(crate) mean_square: f64,
@@ -44,22 +44,22 @@ pub(crate) struct Refined {
     pub(crate) at_limit: Vec<usize>,
 }
 
-/// What the equations ask for at a model.
+/// Equations at a model.
 struct Asked {
     next: Model,
-    /// Whether no estimate would move by more than this share of its standard error.
+    /// Whether no estimate would change by more than this share of its standard error.
     within: [bool; 2],
     at_limit: Vec<usize>,
 }
 
-/// By how much each delay may move: less where it has turned back.
+/// Largest change of each delay: smaller after the direction of its change has reversed.
 struct Reach {
     most: Vec<f64>,
     last: Vec<f64>,
 }
 
 impl Problem<'_> {
-    /// By which factor an output error may be above the least one and its model still be the better one.
+    /// Largest ratio of an output error to the least one for which the model is still preferred.
     pub(crate) fn growth(&self) -> f64 {
         1.0 + GROWTH[usize::from(self.records.iter().any(Prepared::is_in_loop))]
     }
@@ -70,8 +70,8 @@ impl Problem<'_> {
         structure.n - structure.lowest() + structure.numerators()
     }
 
-    /// Solves the equations at a model. A delay that would move too far, or beyond its limits, moves as far as it may, and the others are
-    /// solved for beside that.
+    /// Solves the equations at a model. A delay whose change exceeds its limit is set to the limit, and the others are solved for with this
+    /// value.
     fn ask(
         &self,
         model: &Model,
@@ -142,9 +142,8 @@ impl Problem<'_> {
         })
     }
 
-    /// Filter, instruments and, where there are any, the models of the noise, of at most the given order, estimated again until all has
-    /// converged. `reach` limits the change of a delay in one iteration. Without convergence the model with the least output error on the
-    /// way comes back.
+    /// Iterates filter, instruments and, if used, noise models of at most the given order until convergence. `reach` limits the change of a
+    /// delay in one iteration. Without convergence the iterate with the least output error is returned.
     pub(crate) fn refine(
         &self,
         start: Model,
@@ -191,7 +190,7 @@ impl Problem<'_> {
             let asked = match asked {
                 Ok(asked) if iterations < most => asked,
                 Ok(_) => break,
-                // The first equations say what is wrong; later ones only that it went astray.
+                // The first equations show the actual error; later ones show only that the iteration diverged.
                 Err(error) if iterations == 0 => return Err(error),
                 Err(_) => break,
             };
@@ -215,7 +214,7 @@ impl Problem<'_> {
             for _ in 0..HALVINGS {
                 if next.is_stable(structure) {
                     if with_delays {
-                        // A first sample that came and went with a delay would keep the estimates from converging.
+                        // A first sample that changes with a delay would prevent convergence.
                         largest = next.delays.iter().copied().fold(largest, f64::max);
                         delayed = Arc::new(self.delayed(&next.delays, largest));
                     }

@@ -1,5 +1,5 @@
-//! Where the unknowns of the records stand in the equations: what all records share first, then of each its offset and its initial states.
-//! The parts of one record, between which the input is not known, share its offset.
+//! Positions of the unknowns in the equations: first the unknowns that all records share, then the offset and the initial states of each
+//! record. The parts of one record, between which the input is not known, share its offset.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::Structure;
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     shared: usize,
-    /// Of each record, the places of its own columns.
+    /// For each record, the positions of its own columns.
     own: Vec<Vec<usize>>,
     /// Whether a record is a part of the one before.
     continues: Vec<bool>,
@@ -55,7 +55,7 @@ impl Layout {
         self.shared + self.own.first().map_or(0, Vec::len)
     }
 
-    /// Where column i of a record is.
+    /// Position of column i of a record.
     pub(crate) fn place(&self, index: usize, i: usize) -> usize {
         match i.checked_sub(self.shared) {
             None => i,
@@ -63,7 +63,7 @@ impl Layout {
         }
     }
 
-    /// What is each record's own, of all unknowns; nothing where nothing is.
+    /// Each record's own unknowns; empty if it has none.
     pub(crate) fn of_records(&self, x: &[f64]) -> Vec<Vec<f64>> {
         let own = self.own.iter().filter(|own| !own.is_empty());
         own.map(|own| own.iter().map(|place| x[*place]).collect())

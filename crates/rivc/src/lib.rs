@@ -1,8 +1,8 @@
 //! Refined instrumental variables in continuous time: SRIVC and RIVC, and in a loop CLSRIVC and CLRIVC.
 //!
 //! Model: `A(p) y = sum_j B_j(p) u_j(t - d_j) + offset + noise`, for any orders, with delays that are known or estimated, an integrator if
-//! there is one, several inputs and several records, each from a state of its own and with noise of its own size. The plant is stable, but for the integrator. In open loop the times may be uneven: everything is
-//! sampled exactly.
+//! there is one, several inputs and several records, each from a state of its own and with noise of its own size. The plant is stable, but
+//! for the integrator. In open loop the times may be uneven: everything is sampled exactly.
 //!
 //! | question | answer |
 //! |---|---|

@@ -1,8 +1,8 @@
 //! The input of a loop as its reference explains it: the first of two steps, which makes instruments without knowing the controller.
 //!
-//! Model: `u[k] = sum_i a_i u[k-i] + sum_i b_i r[k-i] + c + e[k]`, i to q, by least squares; the order q has the least
-//! `N log sum e^2 + k log N` of those that are stable. Its simulation from r alone is free of the noise, but for what k coefficients can fit
-//! of it, k/N of its power.
+//! Model: `u[k] = sum_i a_i u[k-i] + sum_i b_i r[k-i] + c + e[k]`, i to q, by least squares; the order q has the least `N log sum e^2 + k
+//! log N` of those that are stable. Its simulation from r alone is free of the noise, but for what k coefficients can fit of it, k/N of its
+//! power.
 //!
 //! Assumptions: r owes nothing to the noise; the loop is linear. A loop that is not, or noise that is, costs efficiency, and no bias.
 //!
@@ -25,7 +25,7 @@ const FAR: f64 = 30.0;
 #[derive(Debug, Clone)]
 pub(crate) struct LoopModel {
     order: usize,
-    /// Of u, of r from the present value on, and the constant, for signals about their means and of size 1.
+    /// Coefficients of u, of r from the present value on, and the constant, for signals that are centred and scaled to 1.
     coefficients: Vec<f64>,
     u: Scale,
     r: Scale,
@@ -58,7 +58,7 @@ impl LoopModel {
     /// Samples that the smallest model needs.
     pub(crate) const NEEDED: usize = SAMPLES_PER_COEFFICIENT * (2 * ORDERS[0] + 2) + ORDERS[0];
 
-    /// Nothing where no model is stable, or the record is too short for any.
+    /// `None` if no model is stable, or if the record is too short.
     pub(crate) fn fit(r: &[f64], u: &[f64]) -> Option<Self> {
         let scales = (Scale::of(u), Scale::of(r));
         let scaled = (scales.0.scaled(u), scales.1.scaled(r));
@@ -129,7 +129,7 @@ impl LoopModel {
         Some((model, squares))
     }
 
-    /// From the reference alone; before the record reference and input are taken to have been at their first values.
+    /// Simulation from the reference alone; before the record, reference and input are assumed to have their first values.
     pub(crate) fn simulate(&self, r: &[f64], first: f64) -> Vec<f64> {
         let first = (first - self.u.mean) / self.u.size;
         let mut simulated = self.of_scaled(&self.r.scaled(r), first);

@@ -8,16 +8,16 @@ use crate::{Error, Structure};
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Model {
     pub(crate) alpha: Vec<f64>,
-    /// Of all inputs, one after the other.
+    /// Coefficients of all inputs, one after the other.
     pub(crate) beta: Vec<f64>,
-    /// Of all inputs \[time\].
+    /// Delays of all inputs \[time\].
     pub(crate) delays: Vec<f64>,
-    /// Of each record: the offset, then `c_0 .. c_{n-1}`, as far as they are estimated.
+    /// For each record: the offset, then `c_0 .. c_{n-1}`, if they are estimated.
     pub(crate) of_records: Vec<Vec<f64>>,
 }
 
 impl Model {
-    /// From `[alpha, beta, change of each estimated delay, ..]` and what is each record's own.
+    /// From `[alpha, beta, change of each estimated delay, ..]` and each record's own unknowns.
     pub(crate) fn from_solution(
         structure: &Structure,
         x: &[f64],
@@ -32,7 +32,7 @@ impl Model {
         let mut delays = delays.to_vec();
         if estimate_delays {
             for (j, most) in structure.estimated_delays() {
-                // To the last digit within its limits.
+                // Exactly within its limits.
                 delays[j] = (delays[j] + x[0]).clamp(0.0, most);
                 x = &x[1..];
             }
@@ -60,7 +60,7 @@ impl Model {
         a.iter().all(|a| a.is_finite()) && ct_lti::is_hurwitz(&a)
     }
 
-    /// The same with all poles in the left half plane: those in the right one are mirrored.
+    /// The model with all poles in the left half plane: poles in the right half plane are reflected.
     pub(crate) fn stabilised(mut self, structure: &Structure) -> Result<Self, Error> {
         if self.is_stable(structure) {
             return Ok(self);
@@ -79,7 +79,7 @@ impl Model {
         Ok(self)
     }
 
-    /// Half way from another one to this one.
+    /// The mean of this model and another one.
     pub(crate) fn half_way_from(&self, other: &Self) -> Self {
         let half = |new: &[f64], old: &[f64]| -> Vec<f64> {
             new.iter().zip(old).map(|(a, b)| 0.5 * (a + b)).collect()
@@ -97,7 +97,7 @@ impl Model {
         }
     }
 
-    /// The same plant with one more pole, at `-rate`, for a structure whose order is larger by one: about the same output where the pole is
+    /// The plant with one more pole, at `-rate`, for a structure whose order is larger by one: the output is nearly the same if the pole is
     /// fast. `lower` is the structure of this model.
     pub(crate) fn with_pole(&self, rate: f64, lower: &Structure, structure: &Structure) -> Self {
         // (p + rate) times a polynomial whose leading coefficient may be left out.

@@ -1,17 +1,19 @@
-//! One pass over a record: regressors and instruments of every sample, from filters that run beside each other.
+//! One pass over a record: regressors and instruments of every sample, from parallel filters.
 //!
 //! Equations: with all signals through the same `1/E(p)`, E monic of degree n, and `c` the initial states,
 //! ```text
 //! p^n y_f = phi' x + e
 //! phi = [-p^i y_f, p^i u_f(t - d), change of the delays, 1_f, p^i pulse_f]
 //! ```
-//! The column of a delay is `-sum_i beta_i p^{i+1} u_f(t - d)`, the derivative of the equation. y runs on lines between samples. The
-//! Where a reading is missing, what the model says on the measured inputs stands for it in `y_f`, in a first regression, that has no model, the line between its neighbours, and the row
-//! does not count. At `E = A` the residual of every other row is `y - y^` whatever stands there, so that the equations hold where they are those of the readings that are
-//! there: those of output error (for white noise) or of generalised least squares over these readings, to which a missing one adds nothing.
+//! The column of a delay is `-sum_i beta_i p^{i+1} u_f(t - d)`, the derivative of the equation. y is interpolated linearly between samples.
+//! A missing reading is replaced in `y_f` by the model's output on the measured inputs, or by linear interpolation in a first regression
+//! without a model; the row is not used. At `E = A` the residual of every other row is `y - y^` whatever stands there, so that the
+//! equations hold where they are those of the readings that are there: those of output error (for white noise) or of generalised least
+//! squares over these readings, to which a missing one adds nothing.
 //!
-//! The instruments z are the same of an output that is simulated, and in a loop of an input that the reference explains. Where E is the A of
-//! that simulation, `p^n y_f - phi' x = y - y^` whatever y does between samples, so that the lines bias nothing once the estimates have converged.
+//! The instruments z are the same of an output that is simulated, and in a loop of an input that the reference explains. Where E is the A
+//! of that simulation, `p^n y_f - phi' x = y - y^` whatever y does between samples, so that the lines bias nothing once the estimates have
+//! converged.
 
 use crate::bank::Bank;
 use crate::grid::{Path, Stretch};
@@ -19,28 +21,28 @@ use crate::model::Model;
 use crate::prepared::{Paths, Prepared};
 use crate::{Error, Structure};
 
-/// Where the instruments come from.
+/// Source of the instruments.
 #[derive(Clone, Copy)]
 pub(crate) enum Instruments<'a> {
-    /// They are the regressors: least squares.
+    /// The regressors themselves: least squares.
     Regressors,
-    /// From a simulated output, one value for each sample from the first one on.
+    /// A simulated output, one value for each sample from the first one on.
     Simulated(&'a [f64]),
-    /// From the output of the model, whose A the filter is.
+    /// The output of the model, whose A is the denominator of the filter.
     Model,
 }
 
-/// What is known at a sample.
+/// Data at a sample.
 pub(crate) struct Row<'a> {
     pub(crate) z: &'a [f64],
     pub(crate) phi: &'a [f64],
     /// `p^n y_f`.
     pub(crate) target: f64,
-    /// Of [`Instruments::Model`]: the simulated output.
+    /// Simulated output for [`Instruments::Model`].
     pub(crate) simulated: f64,
-    /// The measured output, or what stands for it.
+    /// The measured output, or its replacement.
     pub(crate) y: f64,
-    /// The reading is missing: the row does not count.
+    /// The reading is missing: the row is not used.
     pub(crate) missing: bool,
 }
 
@@ -52,10 +54,10 @@ pub(crate) struct Pass<'a> {
     pub(crate) paths: &'a Paths,
     /// Index of the record.
     pub(crate) index: usize,
-    /// First sample that counts: there the filters begin.
+    /// First sample that is used: the filters begin there.
     pub(crate) first: usize,
     pub(crate) model: &'a Model,
-    /// Whether columns of the estimated delays are there.
+    /// Whether there are columns of the estimated delays.
     pub(crate) with_delays: bool,
 }
 
@@ -82,7 +84,7 @@ impl Pass<'_> {
         Ok(simulated)
     }
 
-    /// Shows every row.
+    /// Passes every row to a function.
     pub(crate) fn rows(&self, bank: &Bank, instruments: Instruments, mut see: impl FnMut(&Row)) {
         let see: &mut dyn FnMut(&Row) = &mut see;
         match self.structure.n {
@@ -164,7 +166,7 @@ impl Pass<'_> {
                     self.fill(&mut z, bank, (&zero, used, &of_one, &pulse), k);
                     simulated = match instruments {
                         Instruments::Simulated(values) => values[k - self.first],
-                        // Without terms of y, and with those of the delays at no change.
+                        // Without terms of y, and with zero change of the delays.
                         _ => self.output(&z),
                     };
                     if k > self.first {

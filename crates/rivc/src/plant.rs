@@ -1,4 +1,4 @@
-//! A plant that is known, on a record of its own: what it says from the inputs alone.
+//! Simulation of a known plant on another record from the inputs alone.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use crate::pass::{Instruments, Pass};
 use crate::prepared::{Means, Prepared};
 use crate::{Data, Delay, Error, Structure};
 
-/// Singular values below this share of the largest belong to nothing that the record shows.
+/// Singular values below this share of the largest belong to directions without influence on the record.
 const UNSEEN: f64 = 1e-9;
 
 /// `A(p) y = sum_j B_j(p) u_j(t - d_j)`.
@@ -23,7 +23,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Of one input without delay.
+    /// A plant with one input and no delay.
     pub fn new(a: Vec<f64>, b: Vec<f64>) -> Self {
         Self {
             a,
@@ -36,8 +36,8 @@ impl Plant {
     /// (least squares over the readings that are there). Before the first sample the inputs are taken to have stood.
     ///
     /// # Errors
-    /// [`Error::OrderZero`], [`Error::Improper`], [`Error::Length`], [`Error::NotFinite`], [`Error::NoReading`], [`Error::Time`]; [`Error::Diverges`] where the
-    /// output is not finite.
+    /// [`Error::OrderZero`], [`Error::Improper`], [`Error::Length`], [`Error::NotFinite`], [`Error::NoReading`], [`Error::Time`];
+    /// [`Error::Diverges`] where the output is not finite.
     pub fn fitted(&self, record: &Data) -> Result<Vec<f64>, Error> {
         let n = self.a.len().saturating_sub(1);
         let mut structure = Structure::new(
@@ -79,7 +79,7 @@ impl Plant {
             free.extend_from_slice(&row.z[row.z.len() - own..]);
         });
         let mut free = DMatrix::from_row_slice(forced.len(), own, &free);
-        // Each of size 1, so that none is lost beside another.
+        // Each column is scaled to 1, so that none is lost by rounding.
         for mut column in free.column_iter_mut() {
             let size = column.norm();
             if size > 0.0 {

@@ -15,11 +15,11 @@ pub(crate) const SAMPLES_PER_PARAMETER: usize = 3;
 #[derive(Debug, Clone)]
 pub(crate) struct Prepared {
     pub(crate) time: Vec<f64>,
-    /// Where the steps are even.
+    /// Step, if all steps are equal.
     pub(crate) step: Option<f64>,
     /// About its mean where an offset is estimated and the record need not begin at rest; on lines where readings are missing.
     pub(crate) y: Vec<f64>,
-    /// Of each sample whether its reading is missing; empty where none is.
+    /// For each sample whether its reading is missing; empty if none is missing.
     missing: Vec<bool>,
     pub(crate) inputs: Vec<Vec<f64>>,
     holds: Vec<Hold>,
@@ -27,18 +27,18 @@ pub(crate) struct Prepared {
     instrument: Option<Vec<f64>>,
     pub(crate) y_mean: f64,
     pub(crate) u_means: Vec<f64>,
-    /// It is a part of the record before.
+    /// Whether the record is a part of the preceding one.
     pub(crate) continues: bool,
 }
 
-/// What is subtracted from a record, or from the parts of one.
+/// Means that are subtracted from a record, or from the parts of one.
 pub(crate) struct Means {
     y: f64,
     inputs: Vec<f64>,
 }
 
 impl Means {
-    /// Of all parts together; 0 where they are not asked for.
+    /// Means of all parts together; 0 without centring.
     pub(crate) fn of(parts: &[Data], centre: bool) -> Self {
         let mean = |values: &mut dyn Iterator<Item = f64>| {
             let (sum, count) = values.fold((0.0, 0_usize), |(sum, n), v| (sum + v, n + 1));
@@ -107,12 +107,12 @@ impl Prepared {
         !self.missing.is_empty()
     }
 
-    /// Readings from a sample on that are there.
+    /// Number of present readings from a sample on.
     pub(crate) fn readings_from(&self, first: usize) -> usize {
         (first..self.len()).filter(|k| !self.is_missing(*k)).count()
     }
 
-    /// So many rows from the first one on.
+    /// The given number of first rows.
     pub(crate) fn first_rows(&self, rows: usize) -> Self {
         let rows = rows.min(self.len());
         let part = |values: &Vec<f64>| values[..rows].to_vec();
@@ -184,7 +184,7 @@ impl Prepared {
     }
 }
 
-/// All records, checked against the structure and each other.
+/// All records, after checks against the structure and against each other.
 pub(crate) fn prepare(records: &[Data], structure: &Structure) -> Result<Vec<Prepared>, Error> {
     structure.validate()?;
     let Some(first) = records.first() else {
@@ -308,8 +308,8 @@ fn needed_alone(structure: &Structure) -> usize {
 }
 
 impl Data {
-    /// Whether a record has readings enough for an offset and initial states of its own beside the largest delay, and, in a loop, samples enough for a model of
-    /// its input: a shorter part of a record is refused by [`estimate`](crate::estimate()), and says little.
+    /// Whether a record has enough readings for its offset and initial states with the largest delay, and, in a loop, enough samples for a
+    /// model of its input: a shorter part of a record is rejected by [`estimate`](crate::estimate()), and contains little information.
     pub fn is_long_enough(&self, structure: &Structure) -> bool {
         let largest = structure.largest_delay();
         let from = |t: f64| self.time.first().is_some_and(|first| t >= first + largest);
@@ -323,7 +323,7 @@ impl Data {
     }
 }
 
-/// Refuses a signal that stands still in all records.
+/// Refuses a signal that is constant in all records.
 fn moves(
     records: &[Data],
     of: impl Fn(&Data) -> Vec<f64>,

@@ -25,12 +25,12 @@ pub(crate) struct Problem<'a> {
 pub(crate) struct Delayed {
     pub(crate) delays: Vec<f64>,
     pub(crate) paths: Vec<Paths>,
-    /// First sample of each record that counts.
+    /// First sample of each record that is used.
     pub(crate) first: Vec<usize>,
 }
 
 impl Problem<'_> {
-    /// Paths of the inputs under these delays; samples count from where all inputs are known under delays of up to `largest`.
+    /// Inputs with these delays; samples are used from where all inputs are known for delays of up to `largest`.
     pub(crate) fn delayed(&self, delays: &[f64], largest: f64) -> Delayed {
         let first = |record: &Prepared| match self.structure.initial_states {
             true => record.first_known(largest).min(record.len() - 1),
@@ -101,7 +101,7 @@ impl Problem<'_> {
         Ok(equations)
     }
 
-    /// Solves equations with a filter of its own; instruments are those of a model, or, without one, the regressors: least squares.
+    /// Solves the equations with a given filter; the instruments are those of a model, or, without one, the regressors: least squares.
     pub(crate) fn solve_with_filter(
         &self,
         delayed: &Delayed,
@@ -135,8 +135,7 @@ impl Problem<'_> {
         Ok(self.model(&x, &delayed.delays, false))
     }
 
-    /// A few iterations at fixed delays, with models of the noise that stay: the best model on the way, with the mean square of its
-    /// output error.
+    /// A few iterations at fixed delays, with fixed noise models: the best iterate, with the mean square of its output error.
     pub(crate) fn follow(
         &self,
         delayed: &Delayed,

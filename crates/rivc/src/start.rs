@@ -1,4 +1,4 @@
-//! Where the refinement starts: regressions over a grid of bandwidths, and plants of lower order.
+//! Start values of the refinement: regressions over a grid of bandwidths, and plants of lower order.
 
 use ct_lti::Polynomial;
 use rayon::prelude::*;
@@ -7,20 +7,20 @@ use crate::model::Model;
 use crate::problem::{Delayed, Problem};
 use crate::{Error, Structure};
 
-/// Regressions with instruments under a filter that stays, and iterations from there.
+/// Regressions with instruments and a constant filter, followed by iterations.
 const THOROUGH: Effort = Effort {
     instruments: 1,
     iterations: 6,
 };
-/// The same on a grid of delays, where only the best point matters.
+/// Effort on a grid of delays, where only the best point matters.
 pub(crate) const ROUGH: Effort = Effort {
     instruments: 1,
     iterations: 3,
 };
-/// A pole that is added lies at this over the step.
+/// An added pole has this value divided by the step.
 const FAST: f64 = 2.0;
 
-/// How many passes a start is worth.
+/// Number of passes for a start.
 #[derive(Clone, Copy)]
 pub(crate) struct Effort {
     instruments: usize,
@@ -53,7 +53,7 @@ impl Problem<'_> {
         steps.fold(f64::INFINITY, f64::min)
     }
 
-    /// From one bandwidth; nothing where it leads to no stable plant.
+    /// Start from one bandwidth; none if it does not lead to a stable plant.
     fn of_bandwidth(
         &self,
         delayed: &Delayed,
@@ -112,8 +112,8 @@ impl Problem<'_> {
         Ok(starts)
     }
 
-    /// A start from the best plant of the next lower order, by one more pole that is fast: it fits as well, where starts of an order that the
-    /// record does not carry may lead nowhere.
+    /// A start from the best plant of the next lower order, by one more pole that is fast: it fits as well, where starts of an order that
+    /// the record does not carry may lead nowhere.
     fn of_lower_order(&self, delays: &[f64], bandwidths: &[f64]) -> Option<Start> {
         let n = self.structure.n.checked_sub(1).filter(|n| *n > 0)?;
         let lower = Structure {

@@ -1,4 +1,4 @@
-//! What is identified: orders, integrator, delays, offset, initial states.
+//! Model structure: orders, integrator, delays, offset, initial states.
 
 use crate::Error;
 use crate::bank::MOST;
@@ -24,7 +24,7 @@ pub struct Structure {
     pub m: Vec<usize>,
     /// `A(0) = 0`.
     pub integrator: bool,
-    /// One for each input.
+    /// One delay for each input.
     pub delays: Vec<Delay>,
     /// Whether an offset is estimated for each record.
     pub offset: bool,
@@ -33,7 +33,7 @@ pub struct Structure {
 }
 
 impl Structure {
-    /// Without integrator and delays, with offset and initial states.
+    /// Structure without integrator and delays, with offset and initial states.
     pub fn new(n: usize, m: impl Into<Vec<usize>>) -> Self {
         let m = m.into();
         Self {
@@ -46,14 +46,14 @@ impl Structure {
         }
     }
 
-    /// The same with an integrator.
+    /// Adds an integrator.
     #[must_use]
     pub fn with_integrator(mut self) -> Self {
         self.integrator = true;
         self
     }
 
-    /// The same with this delay of an input, from 0; an input that is not there is left alone.
+    /// Sets the delay of an input, counted from 0; a number without an input has no effect.
     #[must_use]
     pub fn with_delay(mut self, input: usize, delay: Delay) -> Self {
         if let Some(slot) = self.delays.get_mut(input) {
@@ -62,7 +62,7 @@ impl Structure {
         self
     }
 
-    /// The same for records of deviations that begin at rest.
+    /// For records of deviations that begin at rest.
     #[must_use]
     pub fn from_rest(mut self) -> Self {
         self.offset = false;

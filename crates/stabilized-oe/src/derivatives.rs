@@ -1,4 +1,4 @@
-//! Where the derivatives come from: a small interface, and schemes for it.
+//! Sources of derivatives: a small interface, and methods for it.
 
 /// Turns samples into what the estimator needs: the output, the inputs with their derivatives, and the derivatives of the
 /// output error.
@@ -6,7 +6,7 @@
 /// `N` is the model's order. A scheme is asked twice per sample: [`take`](Self::take), then, when the model's output is known,
 /// [`error`](Self::error).
 pub trait Derivatives<const N: usize> {
-    /// One sample of what is measured.
+    /// One sample of the measured signals.
     type Sample;
 
     /// Takes a sample, `since` seconds after the one before (0 for the first). Writes `u, u', .., u^(m)` to `inputs`, as many as it
@@ -15,8 +15,8 @@ pub trait Derivatives<const N: usize> {
     /// `None`, and nothing is changed, where the sample cannot be used at all.
     fn take(&mut self, sample: &Self::Sample, since: f64, inputs: &mut [f64]) -> Option<f64>;
 
-    /// The output at the sample taken last is missing, and the model has `y_m` and `(y_m', .., y_m^(n))` there. A scheme with filters of the output runs them
-    /// on what the model says instead.
+    /// The output at the sample taken last is missing, and the model has `y_m` and `(y_m', .., y_m^(n))` there. A scheme with filters of
+    /// the output runs them on what the model says instead.
     fn missed(&mut self, _y_m: f64, _model: &[f64; N]) {}
 
     /// `(e', .., e^(n))` at the sample taken last, from `e = y - y_m` and `model = (y_m', .., y_m^(n))` there.
@@ -53,14 +53,14 @@ pub struct LateDifference<const SPAN: usize> {
     last: f64,
     /// `e[k-2]` to `e[k-1-SPAN]`, a ring.
     before: [f64; SPAN],
-    /// Where the oldest one is.
+    /// Index of the oldest entry.
     oldest: usize,
     seen: usize,
     step: f64,
 }
 
 impl<const SPAN: usize> LateDifference<SPAN> {
-    /// Without a past.
+    /// Starts without a past.
     pub fn new() -> Self {
         const { assert!(SPAN > 0, "a difference needs a span of 1 or more") }
         Self {
@@ -102,7 +102,7 @@ impl<const SPAN: usize> Derivatives<1> for LateDifference<SPAN> {
         } else {
             0.0
         };
-        // a gap keeps the error that was there before
+        // during a gap the error keeps its last value
         let e = if e.is_finite() { e } else { self.last };
         self.before[self.oldest] = self.last;
         self.oldest = if self.oldest + 1 == SPAN {
@@ -120,7 +120,7 @@ impl<const SPAN: usize> Derivatives<1> for LateDifference<SPAN> {
     }
 }
 
-/// One sample with derivatives that are known: `U = m + 1` inputs.
+/// One sample with known derivatives: `U = m + 1` inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownSample<const N: usize, const U: usize> {
     /// `u, u', .., u^(m)`
@@ -131,7 +131,7 @@ pub struct KnownSample<const N: usize, const U: usize> {
     pub derivatives: [f64; N],
 }
 
-/// Derivatives that the caller knows: from sensors of their own, from other filters, or in a simulation.
+/// Derivatives that the caller knows: from other sensors, from other filters, or in a simulation.
 #[derive(Clone, Copy, Debug)]
 pub struct Known<const N: usize, const U: usize> {
     derivatives: [f64; N],
@@ -139,7 +139,7 @@ pub struct Known<const N: usize, const U: usize> {
 }
 
 impl<const N: usize, const U: usize> Known<N, U> {
-    /// For inputs that are held from sample to sample, or that run `smooth`ly.
+    /// For inputs that are held between samples, or that are `smooth`.
     pub fn new(smooth: bool) -> Self {
         Self {
             derivatives: [0.0; N],

@@ -1,16 +1,16 @@
-//! What can be wrong with a setting or a run: each message carries the numbers that disagree and the mend.
+//! Errors of settings and runs: each message contains the numbers that disagree and the correction.
 
 /// Everything this crate can refuse, and why a run has stopped.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// From the estimator of one block.
+    /// Error of the estimator of one block.
     #[error(transparent)]
     Rls(#[from] ct_rls::Error),
-    /// From the bounds.
+    /// Error of the bounds.
     #[error(transparent)]
     Constrained(#[from] ct_constrained::Error),
-    /// From a filter or the check of positive realness.
+    /// Error of a filter or of the check of positive realness.
     #[cfg(feature = "alloc")]
     #[error(transparent)]
     Lti(#[from] ct_lti::Error),
@@ -25,7 +25,7 @@ pub enum Error {
     /// An entry of a constant gain is out of range.
     #[error("c_lambda lambda[{index}] is {value}, but must be 0 to 1e40; 0 for none")]
     Lambda {
-        /// Which entry of `(theta, c)`, from 0.
+        /// Index of the entry of `(theta, c)`, from 0.
         index: usize,
         /// The value that was given.
         value: f64,
@@ -35,17 +35,17 @@ pub enum Error {
         "c is {theta} for theta and {filter} for the error filter, but a sum of gains has one c_p; put the ratio into P(0) and lambda"
     )]
     TwoGains {
-        /// Of theta's block.
+        /// Weight of theta's block.
         theta: f64,
-        /// Of the filter's block.
+        /// Weight of the filter's block.
         filter: f64,
     },
-    /// A row that says nothing of any parameter.
+    /// A row that contains no information about any parameter.
     #[error(
         "all coefficients of the row with chi = {chi} are 0, in theta and in c; give one that is not, or weight 0 to switch a row off"
     )]
     ZeroRow {
-        /// Its right-hand side.
+        /// Right-hand side of the row.
         chi: f64,
     },
     /// The estimates to start from lie outside their bounds.
@@ -53,29 +53,29 @@ pub enum Error {
     StartOutside {
         /// `theta` or `c`.
         what: &'static str,
-        /// Which entry, from 0.
+        /// Index of the entry, from 0.
         index: usize,
         /// The value that was given.
         value: f64,
-        /// Its lower bound.
+        /// Lower bound.
         lower: f64,
-        /// Its upper bound.
+        /// Upper bound.
         upper: f64,
     },
     /// A state of the model that is not finite.
     #[error("the model's state {index} is {value}; give a finite one, 0 for rest")]
     ModelState {
-        /// Which derivative of the output, from 0.
+        /// Index of the derivative of the output, from 0.
         index: usize,
         /// The value that was given.
         value: f64,
     },
-    /// The model's output left the range of numbers. The estimates from before are kept.
+    /// The model's output overflows. The estimates before the step are kept.
     #[error(
         "the model's output became {value} over a step of {dt} s; use ExactHold, shorten the step, or bound theta more closely"
     )]
     ModelDiverged {
-        /// What was reached.
+        /// Value that was reached.
         value: f64,
         /// The step, s.
         dt: f64,
@@ -85,7 +85,7 @@ pub enum Error {
         "a_{index} of the plausible plants reaches from {lower} to {upper}, but must be above 0 throughout; no stable plant has another sign"
     )]
     Plausible {
-        /// Which coefficient, from 1.
+        /// Index of the coefficient, from 1.
         index: usize,
         /// Lower end.
         lower: f64,

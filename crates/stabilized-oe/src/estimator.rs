@@ -8,8 +8,9 @@
 //! dtheta^/dt =  c_p P1 phi_m eps~       dP1/dt = eta1 P1 - gamma1 P1 phi_m phi_m' P1
 //! dc^/dt     = -c_p P2 e1 eps~          dP2/dt = eta2 P2 - gamma2 P2 e1 e1' P2
 //! ```
-//! The regressor is `(phi_m, -e1)`; with the `+` of [U] 4.9a and 4.11a every run of its experiment ends at the bound of `c^`
-//! (`cargo test -p stabilized-oe --test all printed_sign::`). Rows `F theta + F_c c = chi` or `<= chi` add their errors, [U] 4.14 to 4.18: [`CoupledRow`].
+//! The regressor is `(phi_m, -e1)`; with the `+` of [U] 4.9a and 4.11a every run of its experiment ends at the bound of `c^` (`cargo test
+//! -p stabilized-oe --test all printed_sign::`). Rows `F theta + F_c c = chi` or `<= chi` add their errors, [U] 4.14 to 4.18:
+//! [`CoupledRow`].
 //!
 //! Assumptions: the gain's step holds `phi_m`, `e` and `e1` over a sample, the model's runs the input as the scheme of derivatives says.
 //! `u` excites persistently. Noise on `y` is independent of `u`.
@@ -34,7 +35,7 @@ use crate::{CoupledRow, Derivatives, Error, Gain};
 /// Halvings of a step that would lose the stability of the model, before it is not made at all.
 const HALVINGS: u32 = 10;
 
-/// By default the shortest lag, beside the others of the start, is kept above this times `dt`.
+/// Default lower bound of the shortest lag, in addition to the other lags of the start: this factor times `dt`.
 const SHORTEST_LAG: f64 = 0.05;
 
 /// An output of the model beyond this has left any sense.
@@ -74,12 +75,12 @@ pub struct StabilizedOe<const N: usize, const P: usize, G, D, const R: usize = 0
     gain: G,
     derivatives: D,
     model: Model<N, P>,
-    /// As the gain has it.
+    /// Estimates of the gain.
     theta: SVector<f64, P>,
     theta_bounds: Option<Bounds<P>>,
-    /// Of the step they were made for: where none are given.
+    /// Step and its default bounds, which are used if no bounds are given.
     default_bounds: (f64, Bounds<P>),
-    /// Of all steps, s.
+    /// Shortest of all steps, s.
     shortest: f64,
     /// `a_{n-1}` of the start, 1 for n = 1.
     slower: f64,
@@ -90,7 +91,7 @@ pub struct StabilizedOe<const N: usize, const P: usize, G, D, const R: usize = 0
     bounded: Bounded,
 }
 
-/// How often the estimates had to be brought back, since the start.
+/// Number of corrections of the estimates by bounds since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bounded {
@@ -103,12 +104,12 @@ pub struct Bounded {
 }
 
 impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> StabilizedOe<N, P, G, D> {
-    /// An estimator with the start that its gain holds, a model at rest, and no bounds on `c^`.
+    /// An estimator with the start values of its gain, a model at rest, and no bounds on `c^`.
     ///
     /// `theta^` is kept where `A^` is Hurwitz, with `a_i` above a thousandth of `dt^i` and `a_n` above `dt^n` or `0.05 dt a_{n-1}(0)`,
-    /// whichever is less, for the shortest step so far. A lag below that cannot be seen; but the model's highest derivative is divided
-    /// by `a_n`, and where that comes near 0 a few samples make `P` so small that `theta^` stays where it is. Euler's rule loses a model
-    /// that is faster than a step: there `a_n >= dt^n`, with the step at hand.
+    /// whichever is less, for the shortest step so far. A shorter lag cannot be identified; but the model's highest derivative is divided
+    /// by `a_n`. If `a_n` comes near 0, a few samples make `P` so small that `theta^` does not change any more. With Euler's rule a model
+    /// that is faster than a step is unstable: there `a_n >= dt^n`, with the present step.
     ///
     /// # Errors
     /// [`Error::StartNotHurwitz`].
@@ -146,8 +147,8 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>> Stabilize
 impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: usize>
     StabilizedOe<N, P, G, D, R>
 {
-    /// Rows `F theta + F_c c` that act after each sample that is used, equalities first, in the place of those before; (4.14) to (4.18)
-    /// of the paper. Bounds come after them. Cost per row that acts: that of the gain's step.
+    /// Rows `F theta + F_c c` that act after each sample that is used, equalities first, instead of those before; (4.14) to (4.18) of the
+    /// paper. Bounds come after them. Cost per row that acts: that of the gain's step.
     ///
     /// # Errors
     /// [`ct_constrained::Error::NoCommonPoint`] for rows that contradict each other; those of weight 0 do not count.
@@ -193,7 +194,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         &self.rows
     }
 
-    /// By how much the estimates violate each row; unit of its `chi`.
+    /// Violation of each row by the estimates; unit of its `chi`.
     pub fn violations(&self) -> [f64; R] {
         let filter = self.gain.filter();
         self.rows.map(|row| row.violation(&self.theta, &filter))
@@ -209,7 +210,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         }
     }
 
-    /// S_theta: bounds on `theta^`, in the place of the default ones. `A^` is kept Hurwitz besides.
+    /// S_theta: bounds on `theta^` that replace the default ones. `A^` is kept Hurwitz in addition.
     ///
     /// # Errors
     /// [`Error::StartOutside`].
@@ -258,7 +259,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         &self.gain
     }
 
-    /// The gain: to start `P` again, or to project onto rows of one's own. What is changed in `theta^` counts from the next sample on.
+    /// The gain: to restart `P`, or to project onto other rows. Changes of `theta^` take effect from the next sample on.
     pub fn gain_mut(&mut self) -> &mut G {
         &mut self.gain
     }
@@ -273,7 +274,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         self.model.state[0]
     }
 
-    /// How often the estimates had to be brought back.
+    /// Number of corrections of the estimates by bounds.
     pub fn bounded(&self) -> Bounded {
         self.bounded
     }

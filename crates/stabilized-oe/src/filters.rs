@@ -4,12 +4,12 @@
 //! `A y_f = B u_f`, and the filters have the derivatives as their states. The parallel model is driven by `u_f`, so that
 //! `e^(i) = y_f^(i) - y_m^(i)` for `i = 0..n`.
 //!
-//! A reading that is missing is replaced by that of the model, `sum_i e_i y_m^(i)/e_0` with E the filter's polynomial, and no step is made: `e` and its
-//! derivatives are then those of readings whose residual is 0 where there is none. The readings that are there owe nothing to it where
-//! the model is right, so that no bias comes of it; where it is not, the error that shows is smaller, and convergence slower.
+//! A reading that is missing is replaced by that of the model, `sum_i e_i y_m^(i)/e_0` with E the filter's polynomial, and no step is made:
+//! `e` and its derivatives are then those of readings whose residual is 0 where there is none. The readings that are there owe nothing to
+//! it where the model is right, so that no bias comes of it; where it is not, the error that shows is smaller, and convergence slower.
 //!
-//! Assumption: the input is held between samples or runs on lines, the output runs on lines. Noise passes the filter: it no longer is white, and
-//! `c^` goes elsewhere; bounds on it matter all the same.
+//! Assumption: the input is held between samples or runs on lines, the output runs on lines. Noise passes the filter: it no longer is
+//! white, and `c^` goes elsewhere; bounds on it matter all the same.
 //!
 //! Accuracy: of second order in the step for `m < n`. For `m = n` the highest derivative of `u_f` jumps with `u`, and the line that the
 //! model takes it for is of first order: 1 % for n = 1 and a step of a fortieth of the time constant.
@@ -24,13 +24,13 @@ use crate::{Derivatives, Error, IoSample};
 pub struct StateVariableFilters<const N: usize> {
     u: StateVariableFilter,
     y: StateVariableFilter,
-    /// Since the filter of the output was moved last.
+    /// Time since the last update of the output's filter.
     since: f64,
 }
 
 impl<const N: usize> StateVariableFilters<N> {
-    /// `lambda^n/(s + lambda)^n`; `lambda` in 1/s, 2 to 10 times the bandwidth of what is identified: lower forgets the fast
-    /// dynamics, higher lets noise through. Both filters start at rest on their first sample.
+    /// `lambda^n/(s + lambda)^n`; `lambda` in 1/s, 2 to 10 times the bandwidth of what is identified: a lower value suppresses the fast
+    /// dynamics, a higher one passes noise. Both filters start at rest on their first sample.
     ///
     /// # Errors
     /// [`Error::Lti`] for a `lambda` that is not above 0 and finite.
@@ -38,7 +38,7 @@ impl<const N: usize> StateVariableFilters<N> {
         Self::with_input(lambda, Hold::Zero)
     }
 
-    /// The same for an input that is held between samples, or that runs on lines as the output does.
+    /// Filters for an input that is held between samples, or that is linear between samples like the output.
     ///
     /// # Errors
     /// As of [`new`](Self::new).

@@ -13,7 +13,7 @@ use crate::{CoupledRow, Error, Integrator};
 /// A gain over the `P` parameters of the model and the `N` of the error filter: [`BlockDiagonal`], [`Full`],
 /// [`AdaptivePlusConstant`](crate::AdaptivePlusConstant).
 pub trait Gain<const N: usize, const P: usize> {
-    /// What carries the estimates, and the model's states, over a step.
+    /// Integration of the estimates and of the model's states over a step.
     type Integrator: Integrator;
 
     /// `theta^ = (a_1, .., a_n, b_0, .., b_m)`
@@ -28,7 +28,7 @@ pub trait Gain<const N: usize, const P: usize> {
     /// `P` of `c^`.
     fn filter_covariance(&self) -> SMatrix<f64, N, N>;
 
-    /// One step with the regressor `(phi_m, -e1)` and the filtered error `eps~` held.
+    /// One step with constant regressor `(phi_m, -e1)` and filtered error `eps~`.
     fn advance(
         &mut self,
         phi: &SVector<f64, P>,
@@ -49,7 +49,7 @@ pub trait Gain<const N: usize, const P: usize> {
     /// Euler's rule takes equality rows by Euler's rule, and stops where `gamma h f'P f` is too large.
     fn take_row(&mut self, row: &CoupledRow<N, P>, dt: f64);
 
-    /// Replaces `theta^` and keeps the rest.
+    /// Replaces `theta^`; the other values do not change.
     ///
     /// # Errors
     /// As of [`ContinuousRls::set_theta`].
@@ -58,7 +58,7 @@ pub trait Gain<const N: usize, const P: usize> {
     /// `gamma/(2 c)` of the model's parameters: what `Re C^/A0` must exceed.
     fn positive_above(&self) -> f64;
 
-    /// How the estimator of `theta^` fares.
+    /// State of the estimator of `theta^`.
     ///
     /// # Errors
     /// Why the run has stopped, where it has.
@@ -78,8 +78,8 @@ pub struct BlockDiagonal<const N: usize, const P: usize, I: Integrator = ExactHo
 }
 
 impl<const N: usize, const P: usize, I: Integrator> BlockDiagonal<N, P, I> {
-    /// From the estimators of the two blocks, made by [`ContinuousRls::with_integrator`]: each with its start, its `P(0)`, its
-    /// [`Weights`] and its [`Guards`]. Take `eta = 0` for `c^`, or rely on its cap: its regressor vanishes where the model is right.
+    /// From the estimators of the two blocks, made by [`ContinuousRls::with_integrator`]: each with its start, its `P(0)`, its [`Weights`]
+    /// and its [`Guards`]. Take `eta = 0` for `c^`, or rely on its cap, because its regressor vanishes if the model is right.
     pub fn new(theta: ContinuousRls<P, I>, filter: ContinuousRls<N, I>) -> Self {
         Self {
             theta,
@@ -120,7 +120,7 @@ impl<const N: usize, const P: usize, I: Integrator> BlockDiagonal<N, P, I> {
         &self.filter
     }
 
-    /// Both estimators: to start `P` again, or to project onto rows of one's own.
+    /// Both estimators: to restart `P`, or to project onto other rows.
     pub fn blocks_mut(&mut self) -> (&mut ContinuousRls<P, I>, &mut ContinuousRls<N, I>) {
         (&mut self.theta, &mut self.filter)
     }
@@ -200,14 +200,14 @@ impl<const N: usize, const P: usize, I: Integrator> Gain<N, P> for BlockDiagonal
     }
 }
 
-/// One `P` over `(phi_m, -e1)`, (4.9) of the paper with the sign put right: `T = N + P` parameters.
+/// One `P` over `(phi_m, -e1)`, (4.9) of the paper with the sign corrected: `T = N + P` parameters.
 ///
 /// The adaptive gain with a proof: `dV/dt = -eta V - (2 c - gamma) eps~^2` without noise. With noise the paper expects bias, as
 /// `eps~` and `e1` are correlated: prefer it where noise is low.
 #[derive(Clone, Debug)]
 pub struct Full<const N: usize, const P: usize, const T: usize, I: Integrator = ExactHold> {
     rls: ContinuousRls<T, I>,
-    /// As of [`BlockDiagonal`].
+    /// As in [`BlockDiagonal`].
     silent: bool,
 }
 
@@ -307,7 +307,7 @@ impl<const N: usize, const P: usize, const T: usize, I: Integrator> Gain<N, P>
         let ([information, _], [ratio, _]) =
             row_step(row, ([self.rls.weights(); 2], [self.silent; 2]), dt);
         if ratio == 0.0 {
-            // exact whatever the rule
+            // exact for every rule
             self.rls.relax(&f, row.chi(), information);
         } else {
             self.rls.absorb_with(&f, row.chi(), information, ratio);
@@ -343,7 +343,7 @@ fn row_step<const N: usize, const P: usize>(
     }
 }
 
-/// Of either block, the time that counts of a row: see [`window`].
+/// For each block, the effective time of a row: see [`window`].
 pub(crate) fn windows(weights: [Weights; 2], silent: [bool; 2], dt: f64) -> [f64; 2] {
     core::array::from_fn(|i| {
         if silent[i] {
@@ -363,7 +363,7 @@ pub(crate) fn is_silent<const K: usize, I: Integrator>(
     phi.norm_squared() <= silent_below * silent_below.abs()
 }
 
-/// What an adaptive gain asks of the error transfer function: `Re H > gamma/(2 c)`.
+/// Condition of an adaptive gain on the error transfer function: `Re H > gamma/(2 c)`.
 fn positive_above(weights: Weights) -> f64 {
     weights.gamma() / (2.0 * weights.c())
 }

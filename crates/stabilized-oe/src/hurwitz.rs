@@ -3,7 +3,7 @@
 //! Unlike [`ct_lti::Polynomial::is_hurwitz`], which decides exactly and is for what is given once, this runs in every step and has to
 //! be right only on one side: what lies within rounding of the border is refused.
 
-/// An entry of the scheme counts as positive above this share of the terms it is the difference of.
+/// An entry of the scheme counts as positive above this share of the terms whose difference it is.
 const MARGIN: f64 = 1e-12;
 
 /// Whether `1 + a_1 s + .. + a_N s^N`, with `a` in front of `theta`, has all roots left of the imaginary axis.

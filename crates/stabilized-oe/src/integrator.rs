@@ -1,4 +1,4 @@
-//! How the model's states are carried over a step: exactly, or by Euler's rule to compare with.
+//! Integration of the model's states over a step: exact, or Euler's rule for comparison.
 //!
 //! Exact: `x' = A x + b w` with the companion matrix `A` of `A^` and `w = B^ u` held or on a line,
 //! ```text
@@ -21,10 +21,10 @@ impl Integrator for Euler {}
 
 pub(crate) mod sealed {
     pub trait ModelRule {
-        /// Whether a model that is stable stays so over any step. Otherwise its poles may not be faster than the step.
+        /// Whether a stable model stays stable for any step. Otherwise its poles may not be faster than the step.
         const ANY_STEP: bool;
 
-        /// One step of `dt` seconds of the model with the coefficients `a = (a_1, .., a_n)` and the drive from `w0` to `w1`.
+        /// One step of `dt` seconds of the model with the coefficients `a = (a_1, .., a_n)` and an input that changes from `w0` to `w1`.
         fn advance<const N: usize>(state: &mut [f64; N], a: &[f64; N], w: (f64, f64), dt: f64);
     }
 }
@@ -141,7 +141,7 @@ fn functions<const N: usize>(z: &Matrix<N>) -> (Matrix<N>, Matrix<N>) {
     for (i, row) in phi1.iter_mut().enumerate() {
         row[i] += 1.0;
     }
-    // e^Z - 1, which keeps the digits of slow modes beside fast ones
+    // e^Z - 1, without cancellation for slow modes next to fast ones
     let mut e = product(&z, &phi1);
     for _ in 0..doublings {
         let square = product(&phi1, &phi1);

@@ -14,8 +14,8 @@
 //! | A balance, a ratio or a bound that couples `theta` and `c^` | [`StabilizedOe::with_rows`] |
 //! | How does Euler's rule compare? | `BlockDiagonal::<N, P, Euler>` |
 //!
-//! The equations stand at the head of `estimator.rs`. With `default-features = false` an allocator is not needed either; the filters and
-//! the check of bounds, which come from `ct-lti`, are then left out.
+//! The equations are at the head of `estimator.rs`. With `default-features = false` an allocator is not needed either; the filters and the
+//! check of bounds, which come from `ct-lti`, are then left out.
 //!
 //! # Which gain
 //! | gain | without noise | with noise |
@@ -31,8 +31,8 @@
 //! ```text
 //! dV/dt = -eta V - (2 c (x + y)^2 - gamma x^2 - gamma y^2)
 //! ```
-//! which is indefinite for every `0 < gamma < 2 c`. And it is not a gap in the proof alone. `y'' + y' + y = u` without any noise, `u` of three
-//! sines (1.4, 2.2, 3.2 rad/s), `theta^(0) = (2, 2, 0.5)`, `c^(0) = (1, 1)`, `P(0) = I`, `eta = 0.01`, `c = gamma = 1`:
+//! which is indefinite for every `0 < gamma < 2 c`. And it is not a gap in the proof alone. `y'' + y' + y = u` without any noise, `u` of
+//! three sines (1.4, 2.2, 3.2 rad/s), `theta^(0) = (2, 2, 0.5)`, `c^(0) = (1, 1)`, `P(0) = I`, `eta = 0.01`, `c = gamma = 1`:
 //!
 //! | t, s | block-diagonal | full |
 //! |---|---|---|
@@ -43,15 +43,15 @@
 //! The truth is (1, 1, 1). An adaptive solver of the equations, at a tolerance of 1e-6 and with no code in common, ends at the same place:
 //! `cargo test -p stabilized-oe --test all convergence::`.
 //!
-//! Nor does a constant gain beside the adaptive one, (4.11a), make (4.13) and (C.2) true: `delta' Lambda^-1 P phi phi' delta` has no sign, as
-//! `Lambda^-1 P` is not symmetric. In this example `c_lambda Lambda = 0.001 I` ends at (2.29, 2.09, 2.25), with the paper's `V` 2.5 times its
-//! start: `cargo test -p stabilized-oe --test all summed::`.
+//! Nor does a constant gain beside the adaptive one, (4.11a), make (4.13) and (C.2) true: `delta' Lambda^-1 P phi phi' delta` has no sign,
+//! as `Lambda^-1 P` is not symmetric. In this example `c_lambda Lambda = 0.001 I` ends at (2.29, 2.09, 2.25), with the paper's `V` 2.5
+//! times its start: `cargo test -p stabilized-oe --test all summed::`.
 //!
 //! # Bounds on `c^`
 //! With noise `c^` does not go to the plant's `a`: for n = 1 to 0, for n = 2 to `(0, E v'^2/E v''^2)`, wherever that is. What is wanted is
-//! that it stays where `C^/A0 - gamma/(2 c)` is strictly positive real. The same plant with noise of a hundredth of the output's power, largest
-//! error of `theta^` over the last quarter of 1000 s, median (smallest to largest) of 20 seeds,
-//! `cargo test -p stabilized-oe --test all bounding:: -- --nocapture`:
+//! that it stays where `C^/A0 - gamma/(2 c)` is strictly positive real. The same plant with noise of a hundredth of the output's power,
+//! largest error of `theta^` over the last quarter of 1000 s, median (smallest to largest) of 20 seeds, `cargo test -p stabilized-oe --test
+//! all bounding:: -- --nocapture`:
 //!
 //! | bounds on `c^` | error |
 //! |---|---|
@@ -61,9 +61,9 @@
 //! | the same, a penalty of 1e3 | 0.07 (0.03 to 0.11) |
 //! | `[0.9, 3] x [0.7, 2]`, projected | 0.03 (0.02 to 0.09) |
 //!
-//! Without bounds the figure rests on what keeps `A^` alive; the estimates are lost either way. The wide set helps, but ensures
-//! nothing: at its corner (0.5, 3) `C^/A0` is not positive real. The last one is, for all plants within 10 % of the true one.
-//! [`check_filter_bounds`] tells them apart.
+//! Without bounds the figure rests on what keeps `A^` alive; the estimates are lost either way. The wide set helps, but ensures nothing: at
+//! its corner (0.5, 3) `C^/A0` is not positive real. The last one is, for all plants within 10 % of the true one. [`check_filter_bounds`]
+//! distinguishes them.
 //!
 //! The paper's own set, `-20 <= c_1 <= 20` for n = 1, is no such set; `c_1 >= 0` is for the constant gain, `c_1 > a_1/2` for least squares.
 //! Bounds do not replace a sensible memory: `1/eta` of 5 to 10 dominant time constants at least.

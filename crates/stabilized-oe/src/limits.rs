@@ -1,11 +1,11 @@
-//! Bounds where none are given, and whether a start lies inside its bounds.
+//! Default bounds, and the check whether a start is inside its bounds.
 
 use ct_constrained::Bounds;
 use nalgebra::SVector;
 
 use crate::Error;
 
-/// By default `a_i`, `i < n`, is kept above this times `dt^i`.
+/// Default lower bound of `a_i`, `i < n`: this factor times `dt^i`.
 const FLOOR: f64 = 1e-3;
 
 pub(crate) fn inside<const K: usize>(

@@ -16,7 +16,7 @@ pub(crate) struct Model<const N: usize, const P: usize> {
     held: Option<Held<P>>,
 }
 
-/// What the step that is under way began with.
+/// Values at the beginning of the current step.
 #[derive(Clone, Copy, Debug)]
 struct Held<const P: usize> {
     theta: [f64; P],
@@ -29,12 +29,12 @@ impl<const N: usize, const P: usize> Model<N, P> {
         Self { state, held: None }
     }
 
-    /// Length of the step under way, s; 0 before the first.
+    /// Length of the current step, s; 0 before the first.
     pub fn since(&self) -> f64 {
         self.held.map_or(0.0, |held| held.dt)
     }
 
-    /// Brings the states to the end of the step under way; `inputs` are those there, in the places of `b`.
+    /// Advances the states to the end of the current step; `inputs` are the inputs at the end, in the order of `b`.
     #[inline]
     pub fn advance<I: Integrator>(&mut self, inputs: &[f64; P], smooth: bool) {
         let Some(held) = &self.held else { return };
@@ -53,7 +53,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
         self.held = Some(Held { theta, inputs, dt });
     }
 
-    /// Makes the step under way `dt` seconds longer.
+    /// Extends the current step by `dt` seconds.
     pub fn extend(&mut self, dt: f64) {
         if let Some(held) = &mut self.held {
             held.dt += dt;

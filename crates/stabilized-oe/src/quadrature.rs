@@ -1,4 +1,4 @@
-//! What two adaptive blocks and a constant gain do to one error over a step: three integrals.
+//! Effect of two adaptive blocks and a constant gain on one error over a step: three integrals.
 
 use ct_rls::Weights;
 
@@ -36,14 +36,14 @@ const POINTS: [(f64, f64); 4] = [
     (0.408_282_678_752_175_1, 0.181_341_891_689_181),
 ];
 
-/// Beyond this exponent nothing is left of the error.
+/// Beyond this exponent the error is negligible.
 const GONE: f64 = 45.0;
 
 /// Pieces for each `e`-fold of `1 + (rates) t`: with 2 the integrals are right to 1e-9.
 const PIECES: f64 = 2.0;
 
-/// Over `dt` seconds, `int c_i e^{eta_i t}/d_i x dt` of both blocks and `int x dt`, where `x = eps(t)/eps(0)` and the constant gain lets the
-/// error decay at the rate `l`, 1/s.
+/// Over `dt` seconds, `int c_i e^{eta_i t}/d_i x dt` of both blocks and `int x dt`, where `x = eps(t)/eps(0)` and the constant gain lets
+/// the error decay at the rate `l`, 1/s.
 pub(crate) fn shares(blocks: [Block; 2], l: f64, dt: f64) -> [f64; 3] {
     let at = |t: f64| {
         let ((one, decay1), (two, decay2)) = (blocks[0].at(t), blocks[1].at(t));

@@ -17,8 +17,8 @@
 //! - Data and rows one after the other are a splitting of first order in `h`, stable for any `w h`. For the full gain with `gamma = c`
 //!   data and equality rows together are exact.
 //!
-//! Convergence: the full and the constant gain keep their proof where the true `(theta, a)` obeys the rows,
-//! `dV/dt <= -eta V - (2 c - gamma) eps~^2 - sum (2 w_i - gamma_i) eps_i^2`. The adaptive block-diagonal gain has none, with rows or without.
+//! Convergence: the full and the constant gain keep their proof where the true `(theta, a)` obeys the rows, `dV/dt <= -eta V - (2 c -
+//! gamma) eps~^2 - sum (2 w_i - gamma_i) eps_i^2`. The adaptive block-diagonal gain has none, with rows or without.
 //!
 //! Reference: A. J. Udink ten Cate, WP-85-54, IIASA, Laxenburg, 1985, section 4.
 
@@ -28,10 +28,10 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::Error;
 
-/// One linear statement about `theta = (a_1, .., b_m)` and `c = (c_1, .., c_n)`: a row of `F` and `F_c` in (4.14) of the paper.
+/// One linear constraint on `theta = (a_1, .., b_m)` and `c = (c_1, .., c_n)`: a row of `F` and `F_c` in (4.14) of the paper.
 ///
-/// `K = b_0` is such a row, and without noise `c_i = a_i`. With noise a row that couples the two draws `theta^` to where noise draws
-/// `c^`: `c_1 >= a_1/2` takes `a_1` from 10.3 (truth 10) to 1.8, where `c_1 >= 8` leaves 10.9 (`cargo test -p stabilized-oe --test all rows::`).
+/// `K = b_0` is such a row, and without noise `c_i = a_i`. With noise a row that couples the two draws `theta^` to where noise draws `c^`:
+/// `c_1 >= a_1/2` takes `a_1` from 10.3 (truth 10) to 1.8, where `c_1 >= 8` leaves 10.9 (`cargo test -p stabilized-oe --test all rows::`).
 /// Bound `c^` by rows with `f = 0`, or by [`Bounds`](ct_constrained::Bounds).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -87,7 +87,7 @@ impl<const N: usize, const P: usize> CoupledRow<N, P> {
         self.theta.weight()
     }
 
-    /// What the row says.
+    /// Equality or inequality.
     pub fn relation(&self) -> Relation {
         self.theta.relation()
     }
@@ -103,7 +103,8 @@ impl<const N: usize, const P: usize> CoupledRow<N, P> {
     }
 }
 
-/// `(1 - e^{-eta h})/eta`: what a row's weight is multiplied by where `P` has grown by `e^{eta h}` before it; `h` where nothing was forgotten.
+/// `(1 - e^{-eta h})/eta`: what a row's weight is multiplied by where `P` has grown by `e^{eta h}` before it; `h` where nothing was
+/// forgotten.
 pub(crate) fn window(weights: Weights, dt: f64) -> f64 {
     let x = weights.eta() * dt;
     if x < f64::EPSILON {
@@ -113,10 +114,10 @@ pub(crate) fn window(weights: Weights, dt: f64) -> f64 {
     }
 }
 
-/// What stands for no bound in the check.
+/// Value that means no bound in the check.
 const FAR: f64 = 1e90;
 
-/// Whether some `(theta, c)` obeys all rows.
+/// Whether some `(theta, c)` satisfies all rows.
 ///
 /// The shortest one, if there is one, is a combination of the rows, `x = sum mu_j m_j`; so the rows are feasible where those of their
 /// Gram matrix, in `mu`, are.

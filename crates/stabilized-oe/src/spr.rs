@@ -9,8 +9,8 @@
 //! E_C E + x O_C O - d (E^2 + x O^2) > 0
 //! ```
 //! At each frequency a box of coefficients makes `(E, O)` fill a rectangle, whose corners are Kharitonov's four polynomials at every
-//! frequency. The left side is linear in `(E_C, O_C)` and, for `d >= 0`, concave in `(E, O)`: it is lowest at corners. So 16 pairs decide for
-//! the whole of both boxes, and four polynomials for the stability of all `A0`; each by [`ct_lti::TransferFunction::exceeds`], exactly.
+//! frequency. The left side is linear in `(E_C, O_C)` and, for `d >= 0`, concave in `(E, O)`: it is lowest at corners. So 16 pairs decide
+//! for the whole of both boxes, and four polynomials for the stability of all `A0`; each by [`ct_lti::TransferFunction::exceeds`], exactly.
 //!
 //! For `d = 0`: n = 1, `c_1 >= 0`; n = 2, `c_2 >= 0` and `a_1 c_1 > (sqrt a_2 - sqrt c_2)^2`.
 //!
@@ -21,13 +21,13 @@ use ct_lti::{Polynomial, Positivity, TransferFunction};
 
 use crate::{Derivatives, Error, Gain, StabilizedOe};
 
-/// What the check of bounds on `c^` found. [`Display`](core::fmt::Display) says it in a sentence, which is the warning where it fails.
+/// Result of the check of bounds on `c^`. [`Display`](core::fmt::Display) gives it in a sentence, which is the warning if the check fails.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[must_use = "bounds that are no such set ensure nothing: print this, or look at hold()"]
+#[must_use = "bounds outside such a set guarantee nothing: print this result, or look at hold()"]
 pub enum FilterBounds<const N: usize> {
     /// `C^/A0 - d` is strictly positive real for every `c` and every plausible plant.
     PositiveReal,
-    /// It is not for these, a corner of the two boxes.
+    /// The transfer function is not positive real for these values, a corner of the two boxes.
     NotPositiveReal {
         /// `c_1` to `c_n`
         c: [f64; N],
@@ -35,12 +35,12 @@ pub enum FilterBounds<const N: usize> {
         a: [f64; N],
         /// A frequency where it fails, rad/s.
         frequency: f64,
-        /// `Re C^/A0 - d` there.
+        /// `Re C^/A0 - d` at this frequency.
         excess: f64,
         /// `d`
         above: f64,
     },
-    /// Not every plausible plant is stable; the corner `a_1` to `a_n` is not.
+    /// A plausible plant is unstable: the corner `a_1` to `a_n`.
     PlantUnstable {
         /// `a_1` to `a_n`
         a: [f64; N],
@@ -71,12 +71,12 @@ impl<const N: usize> core::fmt::Display for FilterBounds<N> {
                 above,
             } => write!(
                 f,
-                "the bounds on c do not ensure convergence: with c = {c:?} and a plant a = {a:?}, Re C/A0 is {:.3} at {frequency:.3e} rad/s, not above {above}; narrow the bounds on c, or what is plausible",
+                "the bounds on c do not guarantee convergence: with c = {c:?} and a plant a = {a:?}, Re C/A0 is {:.3} at {frequency:.3e} rad/s, not above {above}; narrow the bounds on c, or the plausible plants",
                 excess + above
             ),
             Self::PlantUnstable { a } => write!(
                 f,
-                "the bounds on c ensure nothing: the plausible plant a = {a:?} is unstable; narrow what is plausible"
+                "the bounds on c guarantee nothing: the plausible plant a = {a:?} is unstable; narrow the plausible plants"
             ),
         }
     }
@@ -175,7 +175,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         )
     }
 
-    /// As [`with_filter_bounds`](Self::with_filter_bounds), with the answer of [`check_filter_bounds`](Self::check_filter_bounds) to it.
+    /// As [`with_filter_bounds`](Self::with_filter_bounds), with the result of [`check_filter_bounds`](Self::check_filter_bounds).
     ///
     /// # Errors
     /// [`Error::StartOutside`], [`Error::Plausible`].

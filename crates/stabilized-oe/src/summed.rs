@@ -17,12 +17,12 @@
 //! ```text
 //! dV/dt = -c_p delta' Lambda^-1 P~ phi phi' delta - c_lambda eps~^2            (4.13), (C.2)
 //! ```
-//! and calls the first term negative semi-definite because its factors are. That is false: `Lambda^-1 P~ phi phi'` is not symmetric, and its
-//! symmetric part is indefinite unless `Lambda^-1 P~ phi` is a multiple of `phi`. Two parameters, `Lambda = I`, `phi = (1, 0)`,
-//! `P = [1 -0.9; -0.9 1]`, `delta = (1, 3)`, `c_p = 1`, `c_lambda = 0.1` give `dV/dt = 1.7 - 0.1 > 0`. Over a second of held random signals
-//! with `Lambda = I`, `c_p = 1`, `V` grows in 2204 of 5000 cases for `c_lambda = 0.1`, up to 3.9 times, and in 1023 for `c_lambda = 10`.
-//! The second-order example of the crate's front page ends after 2000 s at (2.29, 2.09, 2.25) for `c_lambda = 0.001`, `V` 2.5 times its
-//! start, at (1.15, 1.12, 1.14) for 0.1, at (1.00, 1.00, 1.00) for 10; the truth is (1, 1, 1). For `c_p = 0` it is the constant gain,
+//! and calls the first term negative semi-definite because its factors are. That is false: `Lambda^-1 P~ phi phi'` is not symmetric, and
+//! its symmetric part is indefinite unless `Lambda^-1 P~ phi` is a multiple of `phi`. Two parameters, `Lambda = I`, `phi = (1, 0)`, `P = [1
+//! -0.9; -0.9 1]`, `delta = (1, 3)`, `c_p = 1`, `c_lambda = 0.1` give `dV/dt = 1.7 - 0.1 > 0`. Over a second of held random signals with
+//! `Lambda = I`, `c_p = 1`, `V` grows in 2204 of 5000 cases for `c_lambda = 0.1`, up to 3.9 times, and in 1023 for `c_lambda = 10`. The
+//! second-order example of the crate's front page ends after 2000 s at (2.29, 2.09, 2.25) for `c_lambda = 0.001`, `V` 2.5 times its start,
+//! at (1.15, 1.12, 1.14) for 0.1, at (1.00, 1.00, 1.00) for 10; the truth is (1, 1, 1). For `c_p = 0` it is the constant gain,
 //! [`BlockDiagonal::constant`] with `P = Lambda`, and (4.13) a proof.
 //!
 //! Cost per update: that of [`BlockDiagonal`], `p^2 + n^2` multiplications, and 8 evaluations of the integrands for each piece, two pieces
@@ -38,17 +38,17 @@ use crate::gain::{is_silent, windows};
 use crate::quadrature::{Block, shares};
 use crate::{BlockDiagonal, CoupledRow, Error, Gain};
 
-/// The largest `c_lambda lambda_i`: as that of `c`, it keeps every number in range.
+/// The largest `c_lambda lambda_i`: like the limit of `c`, it avoids overflow.
 const MAX_LAMBDA: f64 = 1e40;
 
-/// A row with more information counts as one with this.
+/// Upper limit of a row's information; larger values are replaced by it.
 const MAX_INFORMATION: f64 = 1e60;
 
 /// `c_p P~ + c_lambda Lambda`, an adaptive block-diagonal gain and a constant diagonal one; the paper's (4.11a), (4.18a,b).
 ///
-/// The constant part goes on to learn where `P` has become small, for little: it has **no proof of convergence**. The paper's,
-/// (4.13) and (C.2), is wrong: its `V = delta' Lambda^-1 delta/2` may grow, with examples in `cargo test -p stabilized-oe --test all summed::`.
-/// With a proof: [`Full`](crate::Full) and [`BlockDiagonal::constant`].
+/// The constant part goes on to learn where `P` has become small, for little: it has **no proof of convergence**. The paper's, (4.13) and
+/// (C.2), is wrong: its `V = delta' Lambda^-1 delta/2` may grow, with examples in `cargo test -p stabilized-oe --test all summed::`. With a
+/// proof: [`Full`](crate::Full) and [`BlockDiagonal::constant`].
 ///
 /// Bounds act through `P` alone; rows through `P_i + (c_lambda/c_p) Lambda_i`.
 #[derive(Clone, Debug)]
@@ -143,16 +143,16 @@ impl<const N: usize, const P: usize> AdaptivePlusConstant<N, P> {
     }
 }
 
-/// What a step of data or of a row is made of.
+/// Parts of a step of data or of a row.
 struct Step {
-    /// Of either block, with the forgetting that takes place.
+    /// Weights of each block, with the actual forgetting.
     weights: [Weights; 2],
-    /// What the constant part is multiplied by.
+    /// Factor of the constant part.
     constant: f64,
     dt: f64,
 }
 
-/// The weights that a step takes place with: without forgetting where the block's guard finds its regressor silent.
+/// The actual weights of a step: without forgetting if the block's guard finds no excitation in its regressor.
 fn in_force<const K: usize>(rls: &ContinuousRls<K>, f: &SVector<f64, K>) -> Option<Weights> {
     let weights = rls.weights();
     if is_silent(rls, f) {
@@ -253,7 +253,7 @@ impl<const N: usize, const P: usize> Gain<N, P> for AdaptivePlusConstant<N, P> {
         self.blocks.set_theta(theta)
     }
 
-    /// That of the adaptive part; the constant one asks for less.
+    /// Condition of the adaptive part; that of the constant part is weaker.
     fn positive_above(&self) -> f64 {
         self.blocks.positive_above()
     }

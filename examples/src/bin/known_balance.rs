@@ -58,7 +58,7 @@ fn record(seed: u64) -> Vec<Sample<3>> {
     samples
 }
 
-/// What the estimator is told.
+/// Knowledge given to the estimator.
 #[derive(Clone, Copy)]
 enum Known {
     Nothing,
@@ -130,10 +130,10 @@ fn main() -> Result<(), ct_constrained::Error> {
     }
     println!();
     println!(
-        "The balance steadies the pumps' gains. The sign keeps the drain from running backwards: the penalty softly and"
+        "The balance reduces the variance of the pumps' gains. The sign keeps the drain from running backwards: the penalty softly and"
     );
     println!(
-        "all along the way, early estimates included that the data would have mended, which pushes a up; the projection"
+        "for all estimates, also for early ones that later data would have corrected, which pushes a up; the projection"
     );
     println!("once, at the end.");
     Ok(())

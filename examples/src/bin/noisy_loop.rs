@@ -1,8 +1,8 @@
 //! A plant in a loop with a slow disturbance: fitted from its own input, and as a whole loop from the reference.
 //!
-//! The controller answers the disturbance, so the input knows of it, and a fit that takes the input as given is biased,
-//! and its intervals hold the truth too seldom. The reference knows nothing of it. (A white disturbance would do no harm:
-//! what the input knows of it is its past, of which it keeps no trace.)
+//! The controller answers the disturbance, so the input knows of it, and a fit that takes the input as given is biased, and its intervals
+//! contain the true value too seldom. The reference knows nothing of it. (A white disturbance would do no harm: what the input knows of it
+//! is its past, of which it keeps no trace.)
 //!
 //! `cargo run --release -p ctid-examples --bin noisy_loop`
 
@@ -19,7 +19,7 @@ const GAIN: f64 = 6.0;
 const TAU: f64 = 110.0;
 const RUNS: u64 = 100;
 
-/// Estimates of the time constant and the gain over all runs, and how often their 95 % intervals hold the truth.
+/// Estimates of the time constant and the gain over all runs, and how often their 95 % intervals contain the true value.
 #[derive(Default)]
 struct Score {
     sums: [f64; 2],
@@ -53,7 +53,7 @@ fn main() -> Result<(), Error> {
     let r = excitation::prbs(3000, 300, -1.0, 1.0, 6)?;
     let (mut alone, mut whole) = (Score::default(), Score::default());
     for seed in 0..RUNS {
-        // It lasts for some 20 samples.
+        // Its correlation lasts about 20 samples.
         let w = noise::ar1(r.len(), 0.4, 0.95, &mut ChaCha8Rng::seed_from_u64(seed));
         let disturbed = Noise::InLoop(&w);
         let data = continuous_loop(&plant, &controller, 1.0, &r, Hold::Zero, disturbed)?;

@@ -27,11 +27,11 @@ const AREA: f64 = 154.0;
 const PUMP_GAIN: f64 = 9.0;
 const ALPHA: f64 = 11.0;
 
-/// How it is followed.
+/// Settings of the tracking.
 struct Tracking {
     /// Bandwidth of the filters \[rad/s\]: some times that of the tank.
     lambda: f64,
-    /// What is remembered \[s\]: some time constants, and short beside the wandering of the level.
+    /// Memory \[s\]: several time constants, and short compared with the drift of the level.
     memory: f64,
     /// First guess of the time constant \[s\]; how little is known of it, too.
     tau: f64,
@@ -45,7 +45,7 @@ fn torricelli(level: f64) -> [f64; 2] {
     [tau, PUMP_GAIN * tau / AREA]
 }
 
-/// What is believed at one sample.
+/// Estimate at one sample.
 struct Estimate {
     time: f64,
     level: f64,
@@ -97,7 +97,7 @@ fn track(record: &Record, tracking: &Tracking) -> Result<Vec<Estimate>, Box<dyn 
         memory,
         tau,
     } = *tracking;
-    // One filter for both, but the input is held between samples and the level is not.
+    // The same filter for both, but the input is held between samples and the level is not.
     let filter = |hold| StateVariableFilter::with_bandwidth(2, lambda, hold);
     let mut filter_u = filter(Hold::Zero)?.starting(Start::Rest);
     let mut filter_y = filter(Hold::First)?.starting(Start::Rest);
@@ -139,7 +139,7 @@ fn track(record: &Record, tracking: &Tracking) -> Result<Vec<Estimate>, Box<dyn 
 /// A record, what was estimated on it, and the law of its tank where it is known.
 struct Run {
     record: Record,
-    /// From two memories of the estimator on.
+    /// Estimates after two memories of the estimator.
     estimates: Vec<Estimate>,
     law: Option<TankLaw>,
 }

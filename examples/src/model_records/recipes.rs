@@ -1,4 +1,4 @@
-//! How each record is made.
+//! Recipes of the records.
 
 use ct_signals::excitation;
 use rand_chacha::ChaCha8Rng;
@@ -9,15 +9,15 @@ use crate::tour_records::Result;
 /// A column of a record.
 #[derive(Debug)]
 pub(super) struct Column {
-    /// Its head.
+    /// Header of the column.
     pub(super) head: &'static str,
-    /// How many of its units are one of the model's.
+    /// Number of the column's units in one of the model's.
     pub(super) per_unit: f64,
-    /// Digits behind the point.
+    /// Digits after the point.
     pub(super) digits: usize,
 }
 
-/// How the record of a model is made.
+/// Recipe of a model's record.
 #[derive(Debug)]
 pub(super) struct Recipe {
     pub(super) name: &'static str,
@@ -44,7 +44,7 @@ pub(super) const fn column(head: &'static str, digits: usize) -> Column {
     }
 }
 
-/// A measured disturbance that goes up and down slowly.
+/// A measured disturbance that rises and falls slowly.
 fn slow(rows: usize, mean: f64, swing: f64, period: f64) -> Vec<f64> {
     let at = |k: usize| mean + swing * (2.0 * PI * k as f64 / period).sin();
     (0..rows).map(at).collect()

@@ -3,8 +3,8 @@
 //! ```sh
 //! cargo run --release -p ctid-tests --example library_study -- --sample 60
 //! ```
-//! Every effect at every port, alone and in pairs, the candidates of a user's own beside decoys, nothing, and what neither the catalogue nor
-//! a candidate holds. The truth is the model's own text with parameters of its own and the effect; the noise is scaled so that what the
+//! Every effect at every port, alone and in pairs, the candidates of a user's own beside decoys, nothing, and what neither the catalogue
+//! nor a candidate holds. The truth is the model's own text with parameters of its own and the effect; the noise is scaled so that what the
 //! refitted believed model leaves of the noise-free record is 1 or 3 times the noise (root mean square over the outputs). The believed
 //! parameters are up to 40 % off; some records come in two parts, miss cells, or have a slower output.
 //!
@@ -28,19 +28,19 @@ struct Arguments {
     /// Records in a cell.
     #[arg(long, default_value_t = 1)]
     records: u64,
-    /// So many of all records, drawn at random.
+    /// Number of records, drawn at random.
     #[arg(long)]
     sample: Option<usize>,
-    /// Of these kinds: single, own, pair, clean, outside.
+    /// Kinds of records: single, own, pair, clean, outside.
     #[arg(long, value_delimiter = ',', default_values = ["single", "own", "pair", "clean", "outside"])]
     kinds: Vec<String>,
-    /// Of these models, all where none is given.
+    /// Names of the models; all if none is given.
     #[arg(long, value_delimiter = ',')]
     models: Vec<String>,
     /// Structural errors over the noise.
     #[arg(long, value_delimiter = ',', default_values_t = [1.0, 3.0])]
     ratios: Vec<f64>,
-    /// Only records whose name holds this.
+    /// Only records whose name contains this.
     #[arg(long, default_value = "")]
     only: String,
     /// Seed of everything.
@@ -70,7 +70,7 @@ fn main() {
             && job.name(&models).contains(&arguments.only)
     });
     if let Some(sample) = arguments.sample {
-        // As many of each kind.
+        // The same number of each kind.
         jobs.shuffle(&mut rng);
         let share = sample.div_ceil(arguments.kinds.len());
         let mut taken: BTreeMap<&str, usize> = BTreeMap::new();

@@ -6,9 +6,9 @@ pub struct Case {
     /// Paths below the folder of the records.
     pub fitted: Vec<String>,
     pub held_out: Vec<String>,
-    /// What is missing: of each, the names under which it counts as found.
+    /// Missing effects: for each, the names that count as found.
     pub missing: &'static [&'static [&'static str]],
-    /// What may be named besides: it is there too, and not each record shows it.
+    /// Effects that may be named in addition: they are present, but not visible in each record.
     pub allowed: &'static [&'static str],
     /// The fit error at the worst output that was reached by hand, in the unit of the outputs.
     pub error: Option<f64>,
@@ -18,7 +18,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// As `tclab/open_loop_mimo_599s, two_heaters`.
+    /// A name such as `tclab/open_loop_mimo_599s, two_heaters`.
     pub fn name(&self) -> String {
         let model = self.model.trim_end_matches(".toml");
         format!("{}, {model}", self.fitted[0].trim_end_matches(".csv"))
@@ -36,7 +36,7 @@ impl Case {
 /// Drag of any law: over so short a fall the two that are declared and the catalogue's differ little.
 const DRAG: &[&str] = &["drag", "linear_drag", "quadratic_drag(w)", "loss(w)"];
 const PAIRS: &[&str] = &["rc_pair", "second_rc_pair"];
-/// What a lag of the voltage is called, declared or not.
+/// Names of a lag of the voltage, declared or not.
 const RELAXES: &[&str] = &[
     "rc_pair",
     "second_rc_pair",
@@ -51,7 +51,7 @@ const TWO_HEATERS: &[&[&str]] = &[
     &["lag(y1)", "lag(Q1)"],
     &["lag(y2)", "lag(Q2)"],
 ];
-/// ... and runs in which a heater gets less power while the other is on.
+/// ... and runs in which a heater gets less power while the other one is on.
 const SAGGING: &[&[&str]] = &[
     &["coupling(T1,T2)"],
     &["lag(y1)", "lag(Q1)"],
@@ -77,7 +77,7 @@ fn file(folder: &str, name: &str) -> Vec<String> {
     vec![format!("{folder}/{name}.csv")]
 }
 
-/// All cases: what is expected stands here and nowhere else.
+/// All cases with their expected results, which are given only here.
 pub fn cases() -> Vec<Case> {
     let mut all = Vec::new();
     // By least squares, coupling and lags come to 0.21 and 0.20 degC on the first run, on the second to 0.41 and 0.72, and with a power

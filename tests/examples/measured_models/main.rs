@@ -5,7 +5,8 @@
 //! cargo build --release && cargo run --release -p ctid-tests --example measured_models [-- --effort thorough] [PART-OF-A-NAME...]
 //! ```
 //! Prints for each case the verdict, the groups, the simulation error on the fitted and on the held-out record model by model, and how long
-//! it took; then how many are right. The models and their model files are those of this folder; [`expected`] says what is looked for, and why.
+//! it took; then how many are right. The models and their model files are those of this folder; [`expected`] says what is looked for, and
+//! why.
 #![allow(clippy::unwrap_used)]
 
 mod expected;
@@ -23,9 +24,9 @@ use serde_json::Value;
 /// Diagnoses measured records with models of their own.
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// Only cases whose name holds one of these, as `tclab` or `ball_drops/golf`.
+    /// Only cases whose name contains one of these, as `tclab` or `ball_drops/golf`.
     parts: Vec<String>,
-    /// Of the search, as `ctid diagnose --effort` has it.
+    /// Effort of the search, as for `ctid diagnose --effort`.
     #[arg(long)]
     effort: Option<String>,
 }
@@ -77,7 +78,7 @@ fn main() {
     println!("{}", row("all", &all));
 }
 
-/// What `ctid diagnose` finds; its message where it refuses.
+/// Result of `ctid diagnose`, or its error message.
 fn diagnosed(
     program: &Path,
     arguments: &Arguments,

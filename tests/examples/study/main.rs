@@ -30,7 +30,7 @@ use serde_json::json;
 
 /// Structural error over noise.
 const RATIOS: [f64; 4] = [0.5, 1.0, 3.0, 10.0];
-/// The same of each effect of a pair alone.
+/// Ratios of each effect of a pair alone.
 const PAIR_RATIOS: [f64; 2] = [1.0, 3.0];
 
 /// A study of simulated records: how often an effect is seen, named, and named rightly.
@@ -42,7 +42,7 @@ struct Arguments {
     /// Effects, all where none is given.
     #[arg(long, value_delimiter = ',')]
     effects: Vec<String>,
-    /// Of two tanks both levels are measured, each with noise of its own; no other plants are drawn. Effects alone.
+    /// Of two tanks both levels are measured, each with separate noise; no other plants are drawn. Single effects only.
     #[arg(long)]
     both_levels: bool,
     /// Structural errors over the noise.
@@ -66,11 +66,11 @@ struct Arguments {
     /// Records that are diagnosed at a time, each on one core; all cores where none is given.
     #[arg(long)]
     threads: Option<usize>,
-    /// Only records whose name holds this, as `nothing 83` or `closed, coloured 4`.
+    /// Only records whose name contains this, as `nothing 83` or `closed, coloured 4`.
     #[arg(long, default_value = "")]
     only: String,
-    /// Of the records on which the effect is not in the group, also says whether an exhaustive refit that knows the noise's
-    /// colour names it.
+    /// For records whose effect is not in the group, also reports whether an exhaustive refit with the known noise spectrum names the
+    /// effect.
     #[arg(long)]
     mark: bool,
     /// Writes every record's outcome.

@@ -1,5 +1,5 @@
-//! The mark for a diagnosis: a refit of the true structure and of every single effect by the Bayesian information criterion,
-//! the noise's colour known.
+//! The mark for a diagnosis: a refit of the true structure and of every single effect by the Bayesian information criterion, the noise's
+//! spectrum known.
 
 use ct_signals::ArModel;
 use ctid_tests::Rig;
@@ -13,14 +13,14 @@ const STOPPING: Stopping = Stopping {
     cost: 1e-8,
 };
 
-/// What it says of a record.
+/// Result for a record.
 #[derive(Debug, Clone)]
 pub struct Mark {
     /// Fall of the criterion with the true structure, from its true values.
     pub truth: f64,
     /// The single effect with which the criterion falls most, and by how much.
     pub best: (&'static str, f64),
-    /// What the criterion falls by with the effect that was named first.
+    /// Fall of the criterion with the effect that was named first.
     pub named: Option<f64>,
 }
 
@@ -30,7 +30,7 @@ impl Mark {
     }
 }
 
-/// The noise's colour, of size one.
+/// The noise's spectrum, of size one.
 fn colour(rig: &Rig) -> Option<Noise> {
     let of_one = if rig.colour > 0.0 {
         ArModel::from_coefficients(&[rig.colour], 1.0).ok()?
@@ -63,8 +63,8 @@ fn believed<'a>(rig: &Rig, problem: &'a Problem, noise: &Noise) -> Option<(Setup
     Some((setup, base))
 }
 
-/// By how much the criterion is lower with both effects of a pair than with what the diagnosis added, each refitted with the colour
-/// known: the pair from its true values, the answer from where the diagnosis left it. `None` where a fit is not possible.
+/// Difference of the criterion between both effects of a pair and the result of the diagnosis, each refitted with the known noise model:
+/// the pair from its true values, the result from its estimates. `None` if a fit is not possible.
 pub fn pair(rig: &Rig, problem: &Problem, found: &Diagnosis) -> Option<f64> {
     let noise = colour(rig)?;
     let (setup, base) = believed(rig, problem, &noise)?;

@@ -1,4 +1,4 @@
-//! One record of the study: how it is made, and what the diagnosis says of it.
+//! One record of the study: its generation, and its diagnosis.
 
 use ct_signals::Record;
 use ctid_tests::{
@@ -30,7 +30,7 @@ pub enum Job {
     Effect {
         /// The effect.
         effect: &'static EffectInfo,
-        /// Which levels are measured.
+        /// Measured levels.
         levels: Levels,
         /// Structural error over noise.
         ratio: f64,
@@ -52,16 +52,16 @@ pub enum Job {
         /// Number in its cell.
         number: u64,
     },
-    /// Nothing is missing.
+    /// No effect is missing.
     Nothing {
         /// Which levels are measured.
         levels: Levels,
         /// Number of its kind.
         number: u64,
     },
-    /// Nothing is missing, but the noise is white beside a random walk, and the time stamps jitter.
+    /// No effect is missing, but the noise is white noise plus a random walk, and the time stamps jitter.
     Integrated(u64),
-    /// Something that no effect describes.
+    /// A disturbance that no effect describes.
     Unknown {
         /// Which.
         kind: usize,
@@ -70,12 +70,12 @@ pub enum Job {
     },
 }
 
-/// What came of a record.
+/// Result of a record.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// The answer; `None` where the effect can be given the size in no plant, or the diagnosis was refused.
     pub answer: Option<Answer>,
-    /// Why not.
+    /// Reason for the failure.
     pub refused: Option<String>,
 }
 
@@ -84,23 +84,23 @@ pub struct Outcome {
 pub struct Answer {
     pub plant: &'static str,
     pub drive: Drive,
-    /// What was hidden.
+    /// Hidden effects.
     pub hidden: Vec<&'static str>,
     pub verdict: Verdict,
     pub effects: Vec<String>,
     pub groups: Vec<Vec<String>>,
-    /// What an exhaustive refit says of a record whose effect is not in a group.
+    /// Result of an exhaustive refit for a record whose effect is not in a group.
     pub mark: Option<mark::Mark>,
-    /// Of a pair that is not named whole: by how much the criterion is lower with it than with the answer, both refitted.
+    /// For a pair that is not completely named: difference of the criterion between the result and the pair, both refitted.
     pub pair_falls: Option<f64>,
-    /// The command is said to answer to the noise.
+    /// Whether feedback was detected.
     pub feedback: bool,
     /// On one core.
     pub seconds: f64,
 }
 
 impl Answer {
-    /// Something of the catalogue is named.
+    /// Whether an effect of the catalogue is named.
     pub fn named(&self) -> bool {
         matches!(
             self.verdict,
@@ -108,13 +108,13 @@ impl Answer {
         )
     }
 
-    /// How many of the hidden effects are in groups.
+    /// Number of hidden effects in groups.
     pub fn found(&self) -> usize {
         let found = |effect: &&&str| self.named() && self.group(effect).is_some();
         self.hidden.iter().filter(found).count()
     }
 
-    /// The group that holds an effect.
+    /// The group that contains an effect.
     pub fn group(&self, effect: &str) -> Option<&Vec<String>> {
         let holds = |group: &&Vec<String>| group.iter().any(|member| member == effect);
         self.groups.iter().find(holds)
@@ -160,7 +160,7 @@ const STRANGE: [Strange; 3] = [
     ),
 ];
 
-/// How many kinds of unknown there are.
+/// Number of kinds of unknown disturbances.
 pub fn kinds_of_unknown() -> usize {
     OUTSIDE.len() + STRANGE.len()
 }
@@ -322,7 +322,7 @@ impl Job {
     }
 }
 
-/// What a kind of unknown is called.
+/// Name of a kind of unknown disturbance.
 pub fn unknown_name(kind: usize) -> String {
     const OUTSIDE_NAMES: [&str; OUTSIDE.len()] = [
         "a slow course of the reading",
@@ -356,7 +356,7 @@ fn colour(coloured: bool, number: u64) -> f64 {
     }
 }
 
-/// What the user knows: the plant, and the controller of a closed loop.
+/// Knowledge of the user: the plant, and the controller of a closed loop.
 fn problem(rig: &Rig, record: Record) -> Problem {
     Problem {
         controller: (rig.drive == Drive::Closed).then(|| rig.controller()),

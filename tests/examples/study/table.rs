@@ -31,9 +31,9 @@ struct Count {
     seen: usize,
     /// Something of the catalogue is named.
     named: usize,
-    /// What is hidden is in a group of what is named.
+    /// Number of records with the hidden effect in a named group.
     in_group: usize,
-    /// It is the one named first in its group.
+    /// Number of records with the hidden effect first in its group.
     first: usize,
     undecided: usize,
     partial: usize,
@@ -67,10 +67,10 @@ impl Count {
 
 /// A column of counts.
 struct Column {
-    /// Its name in a terminal, and how wide it is there.
+    /// Column name in a terminal, and the column's width.
     short: &'static str,
     width: usize,
-    /// Its name on a page, and what stands behind its figures there.
+    /// Column name on a page, and the text after its figures.
     long: &'static str,
     unit: &'static str,
     figure: fn(&Count) -> String,
@@ -188,7 +188,7 @@ fn cells(jobs: &[Job], outcomes: &[Outcome]) -> BTreeMap<Cell, Count> {
     cells
 }
 
-/// The counts of all cells that a rule puts together.
+/// Sums of the counts of all cells that a rule combines.
 fn together<K: Ord>(cells: &BTreeMap<Cell, Count>, key: impl Fn(&Cell) -> K) -> BTreeMap<K, Count> {
     let mut sums: BTreeMap<K, Count> = BTreeMap::new();
     for (cell, count) in cells {

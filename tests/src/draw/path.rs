@@ -1,4 +1,4 @@
-//! From a model without an effect to one with it, by its size.
+//! Path in parameter space from a model without an effect to one with it, by its size.
 
 use greybox::Setup;
 use plants::{ParameterInfo, Placed};
@@ -26,7 +26,7 @@ impl Path {
         structure.scales = setup.scales_at(&x).ok()?;
         let parameters = structure.effect_parameters(placed);
         let leading = parameters.first()?;
-        // Sine and cosine of a swing are one size, in a direction of their own.
+        // Sine and cosine of an oscillation are one size, in a direction of their own.
         let sized = |p: &ParameterInfo| p.unit == leading.unit && p.absent == leading.absent;
         let several = parameters.iter().filter(|p| sized(p)).count() > 1;
         let ends = parameters.iter().map(|p| {
@@ -46,7 +46,7 @@ impl Path {
                 };
                 (p.absent, p.absent + part * (end - p.absent))
             } else {
-                // A threshold, from a little beyond all that the believed model visits.
+                // A threshold starts slightly outside the range of the believed model.
                 let first = p.starts.iter().copied().fold(p.lower, f64::max);
                 let beyond = first + 0.2 * (first - p.lower);
                 (beyond.min(p.upper), p.lower)

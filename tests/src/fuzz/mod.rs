@@ -29,7 +29,7 @@ use std::time::Duration;
 pub use process::as_program;
 use source::Source;
 
-/// What is drawn at random.
+/// Kind of a random test case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A record, for `compare`, `diagnose`, `identify` and `design`.
@@ -75,26 +75,26 @@ impl FromStr for Kind {
     }
 }
 
-/// What happened in the cases of a kind.
+/// Results of the cases of a kind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// The kind.
     pub kind: Kind,
     /// Cases that were run.
     pub cases: u64,
-    /// Those that ended with a result, or were answered with one; the others were refused.
+    /// Number of cases that ended with a result; the others were rejected.
     pub accepted: u64,
     /// The longest processor time of a case \[s\].
     pub longest: f64,
     /// The largest memory of a process \[MB\].
     pub largest: f64,
-    /// What was said in the cases that were refused, with the case's number.
+    /// Messages of the rejected cases, with the case's number.
     pub refusals: Vec<(u64, String)>,
-    /// What must not happen and did, with the case's number.
+    /// Faults, with the case's number.
     pub faults: Vec<(u64, String)>,
 }
 
-/// How a case went.
+/// End of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Ended {
     pub accepted: bool,
@@ -102,13 +102,13 @@ pub(crate) struct Ended {
     pub seconds: f64,
     /// Largest memory \[MB\].
     pub megabytes: f64,
-    /// What was said where it was refused.
+    /// Message of a rejection.
     pub refusal: String,
     pub fault: Option<String>,
 }
 
 impl Ended {
-    /// Of a case that has no process of its own.
+    /// For a case without a separate process.
     fn without_process(accepted: bool, refusal: String, fault: Option<String>) -> Self {
         Self {
             accepted,

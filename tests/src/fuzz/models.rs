@@ -209,7 +209,7 @@ pub(super) fn case(source: &mut Source) -> Ended {
     folder.run(&records::command(source), None, &records::OUTPUTS)
 }
 
-/// What is added can be read, and taken back.
+/// The added entry can be read, and removed.
 fn edited(source: &mut Source, folder: &Folder) -> Ended {
     let id = CATALOGUE[source.below(CATALOGUE.len())].id;
     let before = folder.read("model.toml");

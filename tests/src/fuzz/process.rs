@@ -28,7 +28,7 @@ const LONGEST_ERROR: usize = 300;
 /// A process that still runs then hangs: the longest run ends long before, on a busy machine too.
 const PATIENCE: Duration = Duration::from_secs(150);
 
-/// Where this executable was called as the program, runs it to its exit code. Call it first.
+/// If this executable was started as the program, runs the program to its exit code. Call it first.
 #[must_use]
 pub fn as_program() -> Option<ExitCode> {
     let mut arguments = env::args_os().skip(1);
@@ -54,7 +54,7 @@ pub(super) struct Folder {
 /// Files by name.
 type Files = BTreeMap<PathBuf, Vec<u8>>;
 
-/// Without a folder there is nothing to say of the program.
+/// Without a folder the test cannot run.
 fn must<T, E: std::fmt::Display>(result: Result<T, E>, what: &str) -> T {
     result.unwrap_or_else(|error| {
         eprintln!("error: {what}: {error}");
@@ -157,7 +157,7 @@ impl Folder {
     }
 }
 
-/// As much of a refusal as is kept.
+/// The stored part of an error message.
 pub(super) fn shortened(text: &str) -> String {
     text.chars().take(LONGEST_ERROR).collect()
 }
@@ -193,7 +193,7 @@ pub(super) fn check_limits(ended: &Ended) -> Result<(), String> {
     Ok(())
 }
 
-/// What it may print; of a stream the monitor also says what it did before an error, and notes on standard error.
+/// Checks the output: the monitor may print results before an error, and notes on standard error.
 fn check_output(code: Option<i32>, out: &str, err: &str, stream: bool) -> Result<(), String> {
     if err.contains("panicked") {
         return Err(err.to_string());
@@ -238,7 +238,7 @@ fn not_finite(line: &str) -> bool {
     words.any(|word| ["NaN", "inf"].contains(&word))
 }
 
-/// A message for people is short, and shows no character that steers the terminal or cannot be seen.
+/// Checks that a message for people is short, and contains no control characters or invisible characters.
 pub(super) fn message(text: &str) -> Result<(), String> {
     if escaped(text) != text {
         return Err(format!("a character that cannot be seen in {text:?}"));
@@ -249,7 +249,7 @@ pub(super) fn message(text: &str) -> Result<(), String> {
     }
 }
 
-/// Keys of results that hold a number wherever they are.
+/// Keys of results that contain a number wherever they occur.
 const NUMBERS: [&str; 16] = [
     "rmse",
     "value",
@@ -269,7 +269,7 @@ const NUMBERS: [&str; 16] = [
     "bic_ahead",
 ];
 
-/// Whether keys that hold numbers hold them: what is NaN is written as null. The key that does not.
+/// Checks that keys for numbers contain numbers: NaN would be written as null. Returns the failing key.
 fn numbers(json: &Value) -> Result<(), &'static str> {
     let mut rest = vec![json];
     while let Some(value) = rest.pop() {
@@ -290,7 +290,7 @@ fn numbers(json: &Value) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// A file that was written holds numbers where it has to.
+/// Checks the numbers of a written file.
 pub(super) fn result(name: &str, bytes: &[u8]) -> Result<(), String> {
     if name.ends_with(".json") {
         let json: Value =

@@ -5,7 +5,7 @@ use super::models;
 use super::process::Folder;
 use super::source::Source;
 
-/// How the numbers of a file are written.
+/// Format of a file's numbers.
 struct Style {
     separator: char,
     decimal_comma: bool,
@@ -101,7 +101,7 @@ fn signals(source: &mut Source, rows: usize) -> [Vec<f64>; 2] {
     [command, answer]
 }
 
-/// What a sensor, a converter or a person may do to a signal.
+/// Distortions of a signal by a sensor, a converter or a person.
 fn distorted(source: &mut Source, values: &mut [f64]) {
     let factor = [-1.0, 1e-9, 1e9, 1e150, 1e-300, 0.0][source.below(6)];
     let at = source.below(values.len());
@@ -196,7 +196,7 @@ pub(super) fn text(source: &mut Source) -> Vec<u8> {
     }
 }
 
-/// Words of a command that takes a record.
+/// Arguments of a command with a record.
 pub(super) fn command(source: &mut Source) -> String {
     let with_model = "data.csv --model model.toml";
     match source.below(12) {
@@ -263,7 +263,7 @@ pub(super) fn command(source: &mut Source) -> String {
     }
 }
 
-/// What the commands write.
+/// Files that the commands write.
 pub(super) const OUTPUTS: [&str; 3] = ["out.json", "out.html", "out.csv"];
 
 /// A run on a record.

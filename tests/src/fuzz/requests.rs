@@ -153,7 +153,7 @@ fn asked(source: &mut Source, running: &Running) -> (&'static str, String, Vec<u
     )
 }
 
-/// What the page only reads.
+/// Requests of the page that only read.
 fn read(source: &mut Source, running: &Running) -> (&'static str, String, Vec<u8>) {
     let paths = [
         "/",

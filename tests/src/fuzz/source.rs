@@ -1,4 +1,4 @@
-//! What is drawn: numbers as people and loggers write them, names, and damage to a text.
+//! Random material: numbers in the formats of people and loggers, names, and damaged texts.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -28,7 +28,7 @@ const EDGES: &[&str] = &[
     "1000000",
 ];
 
-/// What is no number, but stands where one should.
+/// Words in place of a number.
 const WORDS: &[&str] = &[
     "",
     " ",
@@ -102,7 +102,7 @@ impl Source {
         self.0.random_range(low..high)
     }
 
-    /// From `low` to `high`, each power of ten as likely.
+    /// From `low` to `high`, each power of ten with equal probability.
     pub fn scale(&mut self, low: f64, high: f64) -> f64 {
         self.uniform(low.ln(), high.ln()).exp()
     }
@@ -127,7 +127,7 @@ impl Source {
         }
     }
 
-    /// What stands in a cell by mistake.
+    /// A word in a cell by mistake.
     pub fn word(&mut self) -> String {
         match self.below(4) {
             0 => self.number(),
@@ -162,7 +162,7 @@ impl Source {
         }
     }
 
-    /// One to three things done to a text; `separator` stands between its words.
+    /// One to three random changes of a text; `separator` separates its words.
     pub fn damaged(&mut self, text: &[u8], separator: char) -> Vec<u8> {
         let mut bytes = text.to_vec();
         for _ in 0..=self.below(3) {

@@ -107,7 +107,7 @@ fn forged(source: &mut Source, state: &[u8]) -> Vec<u8> {
     serde_json::to_vec(&file).unwrap_or_default()
 }
 
-/// A run that goes on from a state.
+/// A run that continues from a saved state.
 pub(super) fn case(source: &mut Source) -> Ended {
     let state = match written(source.below(ROWS.len())) {
         Ok(state) => state,

@@ -1,4 +1,4 @@
-//! What drives a model, and the records that it gives.
+//! Inputs of a model, and the resulting records.
 
 use ct_model::effects::Visited;
 use ct_model::{Model, ModelSpec, Simulation};
@@ -17,7 +17,7 @@ fn controller(model: &str) -> (usize, usize, f64, f64) {
         "mass-spring" => (0, 0, 4.0, 100.0),
         "house" => (0, 0, 1.5, 20.0),
         "bioreactor" => (0, 0, -0.02, 60.0),
-        // What is drawn lowers the voltage.
+        // A drawn current lowers the voltage.
         "battery" => (0, 0, -1.0, 200.0),
         _ => (0, 0, 0.3, 40.0),
     }

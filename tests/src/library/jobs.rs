@@ -7,8 +7,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Hidden, Job, outside, own};
 
-/// Records of the models of these names, or of all where none is given: in each what may be hidden in it, in white and coloured noise, in open
-/// and closed loop, with each of these structural errors over the noise. `records`: of each of them.
+/// Records of the models of these names, or of all where none is given: in each what may be hidden in it, in white and coloured noise, in
+/// open and closed loop, with each of these structural errors over the noise. `records`: of each of them.
 pub fn jobs(
     models: &[DrivenModel],
     of: &[String],
@@ -37,7 +37,7 @@ pub fn jobs(
         let both: Vec<&String> = effects.iter().chain(&own).collect();
         for _ in 0..both.len() {
             let a = both[rng.random_range(0..both.len())];
-            // As often as not one of them is of the user's own.
+            // In about half of the cases one of the two is a user's own candidate.
             let b = if rng.random::<f64>() < 0.4 && !own.is_empty() {
                 &own[rng.random_range(0..own.len())]
             } else {

@@ -1,4 +1,4 @@
-//! What is hidden in a record, and what is said of it, beside the truth.
+//! Comparison of the diagnosis of a record with the truth.
 
 use ct_model::effects::{Candidate, Role, apply, candidates, own_candidate, own_candidates};
 use ct_model::{Expression, Given};
@@ -20,13 +20,13 @@ use super::{
 /// The truth has to lower the criterion by this against what lacks (a part of) it, under the noise that made the record.
 const DETECTABLE: f64 = 14.0;
 
-/// Models whose criterion differs by less cannot be told apart.
+/// Models whose criterion differs by less cannot be distinguished.
 const SAME: f64 = 6.0;
 
-/// What comes from outside may be imitated: it counts where it is better than what was found by this.
+/// A disturbance from outside can resemble an effect: the record counts if the truth is better than the result by this.
 const BEYOND: f64 = 40.0;
 
-/// Makes a record and diagnoses it.
+/// Generates a record and diagnoses it.
 ///
 /// # Errors
 /// Why it does not count: it cannot be made so, it does not show what is hidden, or what was named imitates it.
@@ -63,7 +63,7 @@ pub fn outcome(
     let mut all = candidates(&spec, &visited);
     all.extend(own_candidates(&spec, &own).map_err(|error| error.to_string())?);
 
-    // What is hidden, and its size.
+    // The hidden effect and its size.
     let mut hidden: Vec<Candidate> = match &job.hidden {
         Hidden::Nothing => Vec::new(),
         Hidden::Effects(ids) => ids
@@ -176,7 +176,7 @@ pub fn outcome(
         }
     }
 
-    // What is believed.
+    // The believed model.
     let (known, priors) = side_measurements(driven.name);
     let mut believed = spec.clone();
     for parameter in &mut believed.parameters {
@@ -222,7 +222,7 @@ pub fn outcome(
         time_unit_name: driven.time_unit.1.to_string(),
     };
 
-    // What the noise that made it says of the truth and of what lacks a part of it.
+    // Results of the true noise model for the truth and for incomplete truths.
     let models_of_noise = sigma.iter().map(|sigma| {
         let innovation = sigma * (1.0 - correlation * correlation).sqrt();
         if correlation > 0.0 {

@@ -1,4 +1,4 @@
-//! What neither the catalogue nor a candidate holds: terms of a truth that are offered to no search.
+//! Terms of a true model that neither the catalogue nor a candidate contains.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -20,7 +20,7 @@ pub const KINDS: [&str; 8] = [
     "switched on and off",
 ];
 
-/// One of them, whose size is the parameter `size`, in a balance of the given size per state.
+/// One of these terms with the size parameter `size`, in a balance with the given scale per state.
 pub fn candidate(
     kind: usize,
     spec: &ModelSpec,

@@ -1,4 +1,4 @@
-//! What the page asks for, and what it is asked: the plant, where it alone is missing, and the best so far.
+//! Inputs that the page requests and questions to the page: the plant, if it alone is missing, and the best result so far.
 
 use ctid_tests::Rig;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -8,7 +8,7 @@ use crate::browser::Browser;
 use crate::click_path::{choose_plant, wait_for_models};
 use crate::server::{Tab, alone, csv, serve};
 
-/// A tank's record under a header that says nothing.
+/// A tank's record with a header without meaning.
 fn unnamed() -> String {
     let rig = Rig {
         samples: 300,
@@ -42,7 +42,7 @@ fn the_plant_is_asked_for_where_it_alone_is_missing() {
             .starts_with("Choose the plant")
     );
     browser.picture("plant-missing");
-    // Right below its field, both in the window, and said of the field to who does not see it.
+    // Directly below its field, both visible, and linked to the field for screen readers.
     let seen = browser.evaluate(
         "(() => { const [field, said] = ['plant', 'plant-missing'].map((id) => document.getElementById(id).getBoundingClientRect());
           return [field.top, field.bottom, said.top, said.bottom, innerHeight]; })()",
@@ -61,7 +61,7 @@ fn the_plant_is_asked_for_where_it_alone_is_missing() {
     browser.assert_quiet(&address);
 }
 
-/// What is asked of a search, and that its end can be asked for.
+/// The effort of a search, and its interruption.
 #[test]
 fn a_search_has_an_effort_and_an_end() {
     let _alone = alone();

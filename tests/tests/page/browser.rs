@@ -13,7 +13,7 @@ use tungstenite::{Message, WebSocket};
 /// Far longer than anything here takes on a machine that is not busy.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-/// One page in a browser of its own.
+/// One page in a separate browser.
 pub struct Browser {
     chromium: Child,
     socket: WebSocket<TcpStream>,
@@ -55,7 +55,7 @@ impl Browser {
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn();
-        // Where it is not installed the tests that need it are ignored.
+        // If it is not installed, the tests that need it are ignored.
         let chromium = started.unwrap();
         let (port, path) = debugger(&profile);
         let stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
@@ -148,7 +148,7 @@ impl Browser {
         }
     }
 
-    /// Where an element is, once it stands still and nothing covers it.
+    /// Position of an element, once it is constant and not covered.
     fn place(&mut self, selector: &str) -> (f64, f64) {
         let look = format!(
             "(() => {{ const e = document.querySelector({selector}); if (!e || e.disabled) return null;
@@ -240,7 +240,7 @@ impl Browser {
         );
     }
 
-    /// Goes from the element that has the focus by the tabulator until another has it, and presses Enter there.
+    /// Moves the focus with the tabulator to another element, and presses Enter there.
     pub fn tab_to_and_enter(&mut self, selector: &str) {
         for _ in 0..200 {
             if self.evaluate(&format!(
@@ -256,7 +256,7 @@ impl Browser {
         panic!("the tabulator never comes to {selector}");
     }
 
-    /// A picture of the page, where somebody wants to look: `CTID_PICTURES` names the folder.
+    /// Saves a picture of the page on request: `CTID_PICTURES` names the folder.
     pub fn picture(&mut self, name: &str) {
         let Some(folder) = std::env::var_os("CTID_PICTURES") else {
             return;
@@ -277,9 +277,9 @@ impl Browser {
         .unwrap();
     }
 
-    /// Nothing was asked for but from this server, and nothing was complained of.
+    /// Checks that only this server was contacted, and that the console has no errors.
     pub fn assert_quiet(&mut self, address: &str) {
-        // What was said until now has arrived once this is answered.
+        // Earlier messages have arrived once this is answered.
         self.evaluate("1");
         let mut requests = 0;
         for event in &self.heard {

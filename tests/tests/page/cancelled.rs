@@ -1,4 +1,4 @@
-//! What nobody waits for any more is not computed any more.
+//! Cancelled computations stop.
 
 use std::thread::sleep;
 use std::time::Duration;
@@ -72,13 +72,13 @@ fn what_is_cancelled_stops() {
         state["diagnosis"].is_null() && state["failure"].is_null(),
         "{state}"
     );
-    // One computation a tab: the next takes the place of the first.
+    // One computation per tab: the next one replaces the first.
     begin();
     tab.post("/api/run", br#"{"what": "compare"}"#);
     assert!(computing().is_none_or(|count| count <= 2));
     tab.post("/api/cancel", b"{}");
     gone("another took its place");
-    // A tab that is forgotten takes its computation with it.
+    // A dropped tab stops its computation.
     begin();
     let _others: Vec<Tab> = (0..8).map(|_| Tab::open(&page)).collect();
     assert_eq!(tab.get("/api/state").status, 410);

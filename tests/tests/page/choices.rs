@@ -1,4 +1,4 @@
-//! What the commands can be told by options: how a loop is treated, how many effects are added, and what is kept of the unexplained.
+//! Choices that the commands have as options: simulation of a loop, number of effects, and the unexplained error to keep.
 
 use ctid_tests::{Drive, Rig};
 use plants::{Fitted, Place, Term, Variable};
@@ -9,7 +9,7 @@ use crate::browser::Browser;
 use crate::click_path::{choose_measured_tank, wait_for_models};
 use crate::server::{Tab, alone, command, csv, serve};
 
-/// A tank in a loop, its model file with the controller, and what `ctid compare` says of them in either way.
+/// A tank in a loop, its model file with the controller, and the results of `ctid compare` with both settings.
 #[test]
 #[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn a_loop_is_treated_in_both_ways() {
@@ -86,7 +86,7 @@ fn wave(seed: u64) -> String {
     csv(&rig.run(&mut ChaCha8Rng::seed_from_u64(seed)))
 }
 
-/// The shape of what nothing explains is drawn, kept under a name, taken out and put back.
+/// The shape of the unexplained error is drawn, kept under a name, taken out and put back.
 #[test]
 #[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn the_unexplained_is_kept_by_name() {
@@ -130,7 +130,7 @@ fn the_unexplained_is_kept_by_name() {
     browser.evaluate("document.getElementById('any-effect').value = JSON.stringify({ effect: 'wave', place: null })");
     browser.click("#add-any");
     wait_for_models(&mut browser, 2);
-    // What was said to be wrong was said by the server, which the browser notes.
+    // The server reported the error, which the browser logs.
 }
 
 #[test]

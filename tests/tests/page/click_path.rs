@@ -43,7 +43,7 @@ pub fn trail(browser: &mut Browser) -> Vec<f64> {
     numbers
 }
 
-/// Fitted models in the trail, and the last one of them drawn.
+/// Waits for fitted models in the error ladder, with the last one drawn.
 pub fn wait_for_models(browser: &mut Browser, count: usize) {
     browser.until(&format!(
         "document.querySelectorAll('#trail .step').length === {count} && document.getElementById('plot-record-0')?.data?.length === {count} + 2 \
@@ -82,7 +82,7 @@ fn download(browser: &mut Browser) -> PathBuf {
     panic!("no model was downloaded");
 }
 
-/// What `ctid compare` says of a record and a model file.
+/// Result of `ctid compare` for a record and a model file.
 fn compared(record: &Path, test: Option<&Path>, model: &Path) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("out.json");
@@ -137,7 +137,7 @@ fn assert_same_figures(browser: &mut Browser, found: &Value) {
     }
 }
 
-/// Nothing is cut off or covered, in either scheme, on a desk and on a phone.
+/// Nothing is cut off or covered, in both colour schemes, on a desktop and on a phone.
 fn look_around(browser: &mut Browser, name: &str) {
     for (width, height) in [(1440, 900), (390, 844)] {
         for scheme in ["light", "dark"] {
@@ -227,7 +227,7 @@ fn the_bundled_record_with_the_mouse() {
     );
     browser.picture("tour-chains");
 
-    // Without the mouse: taken out, and added again.
+    // Without the mouse: removed, and added again.
     browser.evaluate("document.querySelector('#plant').focus()");
     browser.tab_to_and_enter("#effects button[aria-label='Remove overflow']");
     wait_for_models(&mut browser, 1);
@@ -237,7 +237,7 @@ fn the_bundled_record_with_the_mouse() {
     browser.assert_quiet(&address);
 }
 
-/// A record that leaves two lags open: the page proposes what tells them apart.
+/// A record that leaves two lags open: the page proposes what distinguishes them.
 #[test]
 #[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn two_undecided_effects_show_their_experiment() {
@@ -278,7 +278,7 @@ fn two_undecided_effects_show_their_experiment() {
         .filter_map(Value::as_f64)
         .collect();
     assert!(values.len() >= 300 && values.iter().all(|u| (1.5..=8.5).contains(u)));
-    // Of two that cannot be told apart one is in the model.
+    // Of two effects that cannot be distinguished, one is in the model.
     browser.click("#add-found-0");
     wait_for_models(&mut browser, 2);
     let first = browser.text("#effects code");
@@ -294,7 +294,7 @@ fn two_undecided_effects_show_their_experiment() {
     browser.assert_quiet(&address);
 }
 
-/// Page and commands edit one file, and its comments stay.
+/// Page and commands edit the same file, and its comments stay.
 #[test]
 #[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn page_and_commands_are_mixed() {
@@ -320,7 +320,7 @@ fn page_and_commands_are_mixed() {
     browser.assert_quiet(&address);
 }
 
-/// What a form has no field for yet stays in the file.
+/// Entries without a field in the form stay in the file.
 #[test]
 #[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn the_form_deletes_nothing_that_it_does_not_show() {
@@ -343,7 +343,7 @@ fn the_form_deletes_nothing_that_it_does_not_show() {
     browser.assert_quiet(&address);
 }
 
-/// The measured benchmark, where it lies beside the checkout: two effects, one after the other.
+/// The measured benchmark, if it is next to the checkout: two effects, one after the other.
 #[test]
 #[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 #[cfg_attr(

@@ -1,4 +1,4 @@
-//! Clients that hold connections and send or take nothing: others are answered meanwhile.
+//! Clients that hold connections without sending or reading: others are answered meanwhile.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -6,17 +6,17 @@ use std::time::{Duration, Instant};
 
 use crate::server::{Page, Tab, bundled, serve};
 
-/// As many as the page once took at all.
+/// The total number of connections that the page once accepted.
 const MANY: usize = 64;
 
-/// So many connections that send this and then do nothing.
+/// This number of connections that send a text and then do nothing.
 fn silent(page: &Page, sent: &str) -> Vec<TcpStream> {
     let one = |_| {
         let mut stream = TcpStream::connect(page.address).unwrap();
         stream
             .set_write_timeout(Some(Duration::from_secs(1)))
             .unwrap();
-        // The server may take only a part, or have closed it already.
+        // The server may read only a part, or have closed the connection already.
         let _ = stream.write_all(sent.as_bytes());
         stream
     };
@@ -62,7 +62,7 @@ fn connections_that_stand_still_keep_nobody_out() {
             "{MANY} connections that send {what}: two requests in {:?}",
             begun.elapsed()
         );
-        // They were there until now.
+        // They were open until now.
         drop(held);
     }
 }
@@ -81,7 +81,7 @@ fn an_upload_that_stands_still_delays_no_other() {
     let sent = tab.post("/api/record?name=tour.csv", &tour);
     println!("beside a silent upload: {:?}", begun.elapsed());
     assert_eq!(sent.status, 200);
-    // It was under way until now.
+    // The transfer was in progress until now.
     let still = silent.read(&mut [0]).unwrap_err();
     assert_eq!(still.kind(), std::io::ErrorKind::WouldBlock);
 }

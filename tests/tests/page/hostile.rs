@@ -1,4 +1,4 @@
-//! What other pages, other programs and unfortunate files send: it is refused, nothing breaks, and nothing grows.
+//! Requests from other pages and other programs, and damaged files: they are rejected, nothing fails, and memory does not grow.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
@@ -24,7 +24,7 @@ fn other_pages_are_refused() {
     let host = format!("Host: {address}\r\n");
     let home = format!("/{secret}/");
     let state = format!("{home}api/state?session={}", tab.session);
-    // As the page itself asks.
+    // As the page itself requests.
     let own = format!("{host}Origin: http://{address}\r\n");
     assert_eq!(ask("GET", &state, &own).status, 200);
     assert_eq!(
@@ -79,7 +79,7 @@ fn other_pages_are_refused() {
 fn it_listens_on_this_machine_alone() {
     let address = serve(&[]).address;
     assert!(address.ip().is_loopback());
-    // An address of this machine that others see; nothing is sent.
+    // An address of this machine that others can reach; nothing is sent.
     let socket = UdpSocket::bind("0.0.0.0:0").unwrap();
     let outside = socket
         .connect("192.0.2.1:9")
@@ -114,10 +114,10 @@ fn a_file_of_200_megabytes_is_refused_early() {
             "{answer:?}"
         );
     };
-    // Where its length is said, before anything of it is read.
+    // With a declared length, before any of it is read.
     let head = tab.head("POST", &path, 200 << 20) + "\r\n";
     refused(&exchange(page.address, head.as_bytes()));
-    // Where it is not, once it is too long.
+    // Without one, once it is too long.
     let before = resident();
     let mut stream = TcpStream::connect(page.address).unwrap();
     let head = tab
@@ -172,7 +172,7 @@ fn unfortunate_files_are_refused_with_the_mend() {
             "{needle}: {answer:?}"
         );
     }
-    // What is wrong further down is said of the record, which can be taken away again.
+    // An error further down is reported for the record, which can be removed.
     let answer = send("rows.csv", b"t,u,y\n0,1,2\n1,2,x\n");
     assert_eq!(answer.status, 200);
     assert!(
@@ -190,7 +190,7 @@ fn unfortunate_files_are_refused_with_the_mend() {
     assert_eq!(send("one.csv", &tour()).status, 200);
     let twice = tab.post("/api/record?name=two.csv&held_out=true", &tour());
     assert!(twice.error().contains("hold the same"), "{twice:?}");
-    // And requests that are none.
+    // And invalid requests.
     for (path, body) in [
         ("/api/settings", "{"),
         ("/api/settings", r#"{"plant": 7}"#),
@@ -256,7 +256,7 @@ fn no_parameter_reaches_the_file_system() {
             ..tab.clone()
         };
         assert!(other.get("/api/state").status >= 400);
-        // As the name of a record it is a name without folders.
+        // A record's name contains no folders.
         let answer = tab.post(&format!("/api/record?name={encoded}"), &tour());
         assert_eq!(answer.status, 200, "{path}: {answer:?}");
         let name = answer.json()["records"][0]["name"]
@@ -281,7 +281,7 @@ fn two_tabs_do_not_meet_and_the_oldest_of_many_goes() {
     assert_eq!(first.post("/api/record?name=tour.csv", &tour()).status, 200);
     assert_eq!(first.state()["records"].as_array().unwrap().len(), 1);
     assert_eq!(second.state()["records"], json!([]));
-    // The tab that is loaded again finds its work; one that is not known begins anew.
+    // The tab that is loaded again finds its work; one that is not known starts again.
     let body = json!({ "session": first.session }).to_string();
     assert_eq!(
         first.post("/api/session", body.as_bytes()).json()["session"],
@@ -296,7 +296,7 @@ fn two_tabs_do_not_meet_and_the_oldest_of_many_goes() {
     assert_eq!(tabs[7].get("/api/state").status, 200);
 }
 
-/// What two tabs write into one file at once stands there both.
+/// Changes of two tabs to one file at once are both kept.
 #[test]
 fn no_change_of_two_tabs_is_lost() {
     let folder = tempfile::tempdir().unwrap();
@@ -323,7 +323,7 @@ fn no_change_of_two_tabs_is_lost() {
     }
 }
 
-/// What the file holds is told again once it is there again, also where it is the same.
+/// The content of the file is reported again once it exists again, also if it did not change.
 #[test]
 fn a_model_file_that_was_away_is_no_failure_for_ever() {
     let folder = tempfile::tempdir().unwrap();
@@ -338,7 +338,7 @@ fn a_model_file_that_was_away_is_no_failure_for_ever() {
     assert!(tab.state()["failure"].is_null(), "{}", tab.state());
 }
 
-/// Names from files are text, whatever they hold.
+/// Names from files are displayed as text, whatever they contain.
 #[test]
 #[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn markup_in_names_is_text() {

@@ -37,7 +37,7 @@ fn only_for_the_owner(path: &Path) {
 #[cfg(not(unix))]
 fn only_for_the_owner(_: &Path) {}
 
-/// All that the page asks for, as somebody writes it who has seen the program and knows the session, but not the secret.
+/// All requests of the page, as written by somebody who knows the program and the session, but not the access key.
 fn requests(address: SocketAddr, session: &str) -> Vec<String> {
     let get = [
         "/".to_string(),

@@ -1,4 +1,4 @@
-//! A model of one's own with the mouse: an example, a mistake in its text that is mended, a record and a text that are dropped.
+//! A user's own model with the mouse: an example, a mistake in its text that is mended, a record and a text that are dropped.
 
 use serde_json::json;
 
@@ -121,7 +121,7 @@ fn a_text_and_a_record_are_dropped_and_the_columns_chosen() {
     browser.assert_quiet(&address);
 }
 
-/// What a plant has and a model of one's own has not yet is refused, and a model file names no file of the machine.
+/// What a plant has and a user's own model has not yet is refused, and a model file names no file of the machine.
 #[test]
 fn what_is_not_there_yet_is_refused() {
     let page = serve(&[]);
@@ -197,7 +197,7 @@ fn lagging() -> String {
     text
 }
 
-/// What is missing in a model of one's own is found at its port, added with its sizes, and the error falls.
+/// What is missing in a user's own model is found at its port, added with its sizes, and the error falls.
 #[test]
 #[cfg_attr(not(chromium), ignore = "chromium is not installed")]
 fn a_model_of_ones_own_is_diagnosed_and_mended() {

@@ -1,4 +1,4 @@
-//! The dual method: rows enter the active set, and those that are in their way leave it.
+//! Dual active-set method: rows enter the active set, and rows that block a step leave it.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -8,17 +8,17 @@ pub(super) struct Search<'a, const P: usize, const N: usize> {
     rows: &'a [Interval<P>; N],
     start: SVector<f64, P>,
     pub(super) theta: SVector<f64, P>,
-    /// What the rounding of the entries of `theta` is measured by. With a bound of 0 the entries themselves are no measure; what
-    /// they were made from is.
+    /// Scale for the rounding errors of `theta`. With a bound of 0 the entries themselves are no scale; the terms that they were computed
+    /// from are.
     entries: SVector<f64, P>,
-    /// How long the way from the start was, in the metric.
+    /// Distance from the start, in the metric.
     way: f64,
     /// `L`
     root: SMatrix<f64, P, P>,
     /// `sqrt(P_ii)`
     spread: SVector<f64, P>,
     active: [Active; P],
-    /// How many rows are active.
+    /// Number of active rows.
     count: usize,
     /// `Q`, by columns.
     q: [SVector<f64, P>; P],
@@ -92,7 +92,7 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
                 z -= q * part;
             }
             left = z.norm_squared();
-            // once more where much has gone, so that rounding is no part of what is left
+            // repeat the projection after strong cancellation, so that rounding errors do not dominate
             let again = left < 0.01 * before && left > DEPENDENT * DEPENDENT;
             if !again {
                 return (h, z, left);
@@ -120,7 +120,7 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
         self.count += 1;
     }
 
-    /// Lets a row go and goes back to the start.
+    /// Removes a row from the active set and restarts.
     fn remove(&mut self, j: usize) {
         let (active, count) = (self.active, self.count);
         self.count = j;
@@ -132,7 +132,7 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
         (self.theta, self.way) = (self.start, 0.0);
     }
 
-    /// Moves `theta` to where the active rows hold, by the shortest way.
+    /// Moves `theta` by the shortest distance onto the set where the active rows are satisfied.
     pub(super) fn move_onto_active(&mut self) {
         let (mut x, mut y) = (SVector::zeros(), [0.0; P]);
         for (j, active) in self.active().iter().enumerate() {
@@ -159,8 +159,8 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
         if scale > 0.0 { 1.0 / scale } else { 1.0 }
     }
 
-    /// Makes a row active whose bound on one side is exceeded, and lets others go that are in its way. `false` where no point obeys
-    /// this row and the active ones.
+    /// Makes a row active that is violated on one side, and removes rows that block the step. `false` if no point satisfies this row and
+    /// the active ones.
     pub(super) fn enter(&mut self, row: usize, sign: f64, excess: f64) -> bool {
         let unit = self.unit(row);
         let mut entering = Active {
@@ -175,7 +175,7 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
             let (h, z, slope) = self.split(&g);
             let r = self.combination(h);
             let shares = || self.active().iter().zip(r.map(f64::abs));
-            // An only row is measured by nothing but itself.
+            // For a single row, only the row itself is a scale.
             let least = if self.count == 0 {
                 0.0
             } else {

@@ -4,7 +4,7 @@ use ct_constrained::{Bounds, Error, Keep, Row, project_box};
 use ct_rls::{ContinuousRls, Euler, ExactHold, Integrator, RecursiveEstimator, Weights};
 use nalgebra::{SVector, matrix};
 
-/// Two correlated parameters, the first of them beyond 1.
+/// Two correlated parameters; the first one is above 1.
 fn outside<I: Integrator>() -> ContinuousRls<2, I> {
     let weights = Weights::least_squares(0.01).unwrap();
     let p = matrix![2.0, 1.0; 1.0, 3.0];
@@ -55,7 +55,7 @@ fn a_penalty_relaxes_as_its_row_does() {
         .unwrap()
         .penalize(&mut row, dt);
     assert!((rls.theta() - row.theta()).amax() < 1e-14);
-    // an infinite bound is none
+    // an infinite bound means no bound
     assert!(rls.theta()[1] > 0.0);
 }
 

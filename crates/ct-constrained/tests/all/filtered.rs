@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector};
 
 const THETA: [f64; 2] = [2.0, -0.7];
 
-/// The slow regressors, and a fast ripple that reaches the first of them and the output, but not by way of `theta`.
+/// The slow regressors, and a fast ripple that affects the first regressor and the output, but not through `theta`.
 fn sample(t: f64, ripple: f64) -> Sample<2> {
     let fast = ripple * (25.0 * t).sin();
     let phi = [(0.3 * t).sin() + fast, (0.5 * t + 1.0).cos()];
@@ -19,7 +19,7 @@ fn estimator() -> ConstrainedRls<2, 1> {
     ConstrainedRls::new(rls, [Row::equal([0.0; 2], 0.0, 0.0).unwrap()]).unwrap()
 }
 
-/// The largest error of the estimates after 400 s, and by how much the truth misses a row at most.
+/// The largest error of the estimates after 400 s, and the largest violation of a row by the true parameters.
 fn run(row: Option<(Filter, f64)>, ripple: f64) -> (f64, f64) {
     let (mut constrained, dt) = (estimator(), 0.02);
     let mut filtered = row.map(|(filter, weight)| FilteredRow::new(filter, weight).unwrap());
@@ -61,7 +61,7 @@ fn a_low_pass_keeps_a_fast_disturbance_out() {
     assert!(heavy < 0.03 * alone, "{heavy}");
 }
 
-/// Both filters against their closed responses to a step of 1, for steps of any length.
+/// Both filters against their analytic step responses, for steps of any length.
 #[test]
 fn filters_are_exact_for_held_signals() {
     let mut low = FilteredRow::<1>::new(Filter::LowPass { time: 2.0 }, 1.0).unwrap();

@@ -1,4 +1,5 @@
-//! The equality (3.8), `dV/dt = -eta V - eps' (2 W - Gamma) eps`, over a step, and `Gamma` apart from `W`: against a fine integration of (3.9).
+//! The equality (3.8), `dV/dt = -eta V - eps' (2 W - Gamma) eps`, over a step, and `Gamma` apart from `W`: against a fine integration of
+//! (3.9).
 
 use ct_constrained::{ConstrainedRls, Error, Row};
 use ct_rls::{ContinuousRls, Guards, RecursiveEstimator, Sample, Weights};
@@ -132,7 +133,7 @@ fn estimator<const P: usize, const R: usize>(
     (constrained, sample)
 }
 
-/// How far `V` after `steps` over 1 s is off `e^{-eta} V(0)` less the integral, relative to `V(0)`.
+/// Relative difference between `V` after `steps` over 1 s and `e^{-eta} V(0)` minus the integral.
 fn off<const P: usize, const R: usize>(
     start: &State<P>,
     rows: &[Entry<P>],
@@ -151,7 +152,7 @@ fn off<const P: usize, const R: usize>(
 proptest! {
     #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// With `Gamma = W` data and rows together are exact, whatever the step.
+    /// With `Gamma = W` the result with data and rows together is exact for any step.
     #[test]
     fn the_equality_holds_over_a_step_for_gamma_of_the_weight(
         seed: u64,
@@ -168,7 +169,7 @@ proptest! {
         prop_assert!(found < 1e-8, "{found:e}");
     }
 
-    /// With another `Gamma` data alone, and a row alone, are exact too.
+    /// With another `Gamma` the result with data alone, or with a row alone, is exact too.
     #[test]
     fn the_equality_holds_over_a_step_for_a_single_row(
         seed: u64,
@@ -186,7 +187,7 @@ proptest! {
         }
     }
 
-    /// With several, `V` falls over any step at least as without the data's and the rows' part.
+    /// With several rows, `V` falls over any step at least as much as without the part of data and rows.
     #[test]
     fn v_falls_over_any_step_where_gamma_is_below_twice_the_weight(
         seed: u64,
@@ -219,7 +220,7 @@ fn several_rows_with_another_gamma_are_of_first_order() {
     }
 }
 
-/// The condition is needed: with `gamma = 2.5 w` `V` grows in the equations, as (3.8) says, and the constructors refuse it.
+/// The condition is necessary: with `gamma = 2.5 w` `V` grows in the equations, as (3.8) states, and the constructors reject it.
 #[test]
 fn v_grows_where_gamma_is_above_twice_the_weight() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
@@ -261,7 +262,7 @@ fn a_gamma_out_of_range_is_refused_with_its_numbers() {
         penalty.with_gamma(3.0),
         Err(Error::PenaltyGamma { gamma: 3.0 })
     );
-    // least squares takes no other gamma, and says which constructor does
+    // least squares accepts no other gamma; the error names the constructor that does
     let weights = Weights::least_squares(0.0).unwrap();
     let rls = ContinuousRls::new(SVector::zeros(), SMatrix::identity(), weights).unwrap();
     let half = row.with_gamma(1.5).unwrap();

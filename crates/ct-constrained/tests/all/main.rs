@@ -1,4 +1,4 @@
-//! One program for all tests: each of its own would link the crate again.
+//! A single test program: separate programs would link the crate again.
 #![allow(clippy::unwrap_used)]
 
 mod bounds;

@@ -1,7 +1,7 @@
 //! Projections against every choice of active bounds, tried one by one.
 //!
-//! `PROBLEMS=100000 cargo test --release -p ct-constrained --test all oracle::` tries as many feasible problems of each kind, and a fifth as
-//! many that contradict themselves; without it, 4000.
+//! `PROBLEMS=100000 cargo test --release -p ct-constrained --test all oracle::` tries as many feasible problems of each kind, and a fifth
+//! as many that contradict themselves; without it, 4000.
 
 use ct_constrained::{Error, Row, project, project_box};
 use ct_rls::{ContinuousRls, RecursiveEstimator, Weights};
@@ -75,7 +75,7 @@ fn nearest_on<const P: usize>(
     Some(nearest)
 }
 
-/// Of the nearest points on all choices of bounds, the nearest that obeys every row.
+/// Among the nearest points for all sets of active bounds, the nearest one that satisfies every row.
 fn oracle<const P: usize>(
     theta: &SVector<f64, P>,
     p: &SMatrix<f64, P, P>,
@@ -174,7 +174,7 @@ fn rows_around<const P: usize, const R: usize>(
             }
             3 if !rows.is_empty() => {
                 let ((f, low, high), (g, lower, higher)) = (earlier(rng), earlier(rng));
-                // no row that is nothing but rounding
+                // excludes rows of rounding errors only
                 if (f + g).norm() < 1e-3 * f.norm() {
                     continue;
                 }
@@ -203,7 +203,7 @@ fn agrees<const P: usize>(
     (found - wanted).norm() <= 1e-9 * (1.0 + start.norm() + wanted.norm())
 }
 
-/// How many feasible problems were refused, and how many led to another point.
+/// Number of feasible problems that were rejected, and number of those with another result.
 fn with_rows<const P: usize>(problems: usize) -> (usize, usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(17);
     let (mut refused, mut other) = (0, 0);

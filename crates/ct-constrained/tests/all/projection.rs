@@ -122,7 +122,7 @@ fn a_box_may_have_a_fixed_entry() {
     assert_eq!(*rls.theta(), vector![0.0, 0.0]);
 }
 
-/// The difference of the entries is known to fourteen digits, their sum hardly.
+/// The difference of the entries is known to fourteen digits, their sum is nearly unknown.
 fn nearly_singular() -> ContinuousRls<2> {
     let weights = Weights::least_squares(0.0).unwrap();
     let mut rls = ContinuousRls::new(SVector::zeros(), SMatrix::identity(), weights).unwrap();
@@ -185,7 +185,7 @@ fn a_row_that_contradicts_an_equality_is_named_and_not_the_equality() {
     );
 }
 
-/// The third row is the difference of the others and says the same to their rounding, which is much by its own size.
+/// The third row is the difference of the others up to rounding, which is large compared with the row.
 #[test]
 fn a_row_that_others_imply_may_be_off_by_their_rounding() {
     let (a, b, little) = (3.3e7, 0.7e7, 1e-6);

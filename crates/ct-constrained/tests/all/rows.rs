@@ -35,7 +35,7 @@ fn estimator<const P: usize>(rng: &mut ChaCha8Rng, p0: f64, c: f64, eta: f64) ->
     ContinuousRls::new(normals(rng), spd::<P>(rng) * p0, weights).unwrap()
 }
 
-/// One step of all rows at once: `Q+ = e^{eta h} (Q - Q M' (M Q M' + (a W)^-1)^-1 M Q)` with the inverse that [U] asks for.
+/// One step of all rows at once: `Q+ = e^{eta h} (Q - Q M' (M Q M' + (a W)^-1)^-1 M Q)` with the inverse from [U].
 fn off_the_inverse<const P: usize, const R: usize>(seed: u64) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (c, eta) = (normal(&mut rng).exp(), [0.0, 0.02, 0.3][seed as usize % 3]);
@@ -82,7 +82,7 @@ fn off_the_inverse<const P: usize, const R: usize>(seed: u64) -> f64 {
 fn rows_one_at_a_time_agree_with_the_matrix_inverse() {
     let mut worst = 0.0_f64;
     for seed in 0..300 {
-        // also more rows than parameters
+        // also with more rows than parameters
         for off in [
             off_the_inverse::<1, 1>(seed),
             off_the_inverse::<2, 5>(seed),
@@ -204,7 +204,7 @@ fn a_row_counts_in_full_while_nothing_is_forgotten() {
     }
 }
 
-/// Whatever [`Row`] accepts is enforced: no weight is so large that the row is left out.
+/// Every weight that [`Row`] accepts is enforced: no weight is so large that the row is left out.
 #[test]
 fn a_row_of_any_weight_is_enforced() {
     for weight in [1e3, 1e40, 1e70, f64::MAX] {
@@ -265,7 +265,7 @@ fn bad_settings_are_refused_with_their_numbers() {
     );
 }
 
-/// A step's row counts by the forgetting of that step, whatever the last step's memory and length were.
+/// The effect of a row in a step depends on the forgetting and length of that step, and not on earlier steps.
 #[test]
 fn a_row_counts_by_the_memory_and_the_length_of_its_own_step() {
     let (weight, f) = (2.0, [1.0, 0.0]);
@@ -273,7 +273,7 @@ fn a_row_counts_by_the_memory_and_the_length_of_its_own_step() {
     let start = Weights::least_squares(0.0).unwrap();
     let rls = ContinuousRls::new(SVector::zeros(), SMatrix::identity(), start).unwrap();
     let mut constrained = ConstrainedRls::new(rls, [row]).unwrap();
-    // the data say nothing of the row's parameter
+    // the data contain no information about the row's parameter
     let sample = Sample::new([0.0, 1.0], 0.0);
     let mut information: f64 = 1.0;
     for (eta, dt) in [(0.5, 1.0), (2.0, 1.0), (2.0, 0.1), (2.0, 0.1), (0.1, 0.1)] {

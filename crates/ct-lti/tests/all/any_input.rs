@@ -1,4 +1,4 @@
-//! Nothing panics, whatever the numbers: the answer is a number, an error, or "no".
+//! For any input there is no panic: the result is a number, an error, or "no".
 
 use ct_lti::{
     Complex64, Hold, Polynomial, Simulator, StateSpace, StateVariableFilter, TransferFunction,

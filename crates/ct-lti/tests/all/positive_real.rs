@@ -39,7 +39,7 @@ fn least(g: &TransferFunction, d: f64) -> f64 {
     let x = Polynomial::p();
     let real = &(&e1 * &e2) + &(&x * &(&o1 * &o2));
     let size = &(&e2 * &e2) + &(&x * &(&o2 * &o2));
-    // Where N/|P2|^2 has no slope.
+    // Stationary points of N/|P2|^2.
     let slope = &(&real.derivative() * &size) - &(&size.derivative() * &real);
     let flat = slope.roots().unwrap();
     values.extend(
@@ -189,7 +189,7 @@ fn output_error_of_order_one() {
     );
 }
 
-/// N touches 0 without a change of sign: no grid sees that.
+/// N touches 0 without a change of sign: a grid of frequencies does not detect this.
 #[test]
 fn touching_is_failing() {
     // N = 1 + (a1 c1 - a2 - c2) x + a2 c2 x^2 with a2 = 1, c2 = 4, a1 c1 = 1: (1 - 2x)^2.
@@ -223,7 +223,7 @@ fn at_zero_and_at_infinity() {
             excess: 0.0
         }
     );
-    // G = d: nowhere above it. A gain alone is what it is.
+    // G = d: nowhere above it. For a constant gain the condition is a comparison of numbers.
     let same = tf(&[2.0, 2.0], &[1.0, 1.0]).exceeds(2.0).unwrap();
     assert_eq!(
         same,

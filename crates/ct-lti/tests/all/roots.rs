@@ -1,4 +1,4 @@
-//! Roots: backward error, known roots, and what is promised of their form.
+//! Roots: backward error, known roots, and the documented properties.
 
 use ct_lti::{Complex64, Polynomial};
 use proptest::prelude::*;
@@ -106,7 +106,7 @@ fn of_wilkinson() {
     assert!(distance(&ten.roots().unwrap(), &real(&expected[..10])) < 1e-9);
 }
 
-/// As documented: a root of multiplicity m is found to about 1e-16^(1/m), the mean of the m to rounding.
+/// A root of multiplicity m is accurate to about 1e-16^(1/m), and the mean of the m roots to rounding.
 #[test]
 fn with_multiplicity() {
     for m in [2_usize, 3, 4, 6] {
@@ -156,7 +156,7 @@ proptest! {
             prop_assert!(z.im == 0.0 || found.contains(&z.conj()));
         }
         prop_assert!(found.is_sorted_by(|a, b| a.re <= b.re));
-        // How much a coefficient's rounding can move a root: the product of relative distances to the others.
+        // Sensitivity of a root to rounding of a coefficient: the product of relative distances to the others.
         let apart = (0..expected.len()).flat_map(|i| (0..i).map(move |j| (i, j)))
             .map(|(i, j)| (expected[i] - expected[j]).norm() / expected[i].norm().max(expected[j].norm()))
             .fold(1.0, f64::min);

@@ -172,7 +172,7 @@ fn stable() -> impl Strategy<Value = Polynomial> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Two steps are one step of their length, as long as the input does in both what its hold says.
+    /// Two steps are equivalent to one step of their total length, if the input follows its hold in both.
     #[test]
     fn steps_compose(a in stable(), b in prop::collection::vec(-3.0..3.0_f64, 1..4), h1 in 0.01..2.0_f64, h2 in 0.01..2.0_f64, u0 in -2.0..2.0_f64, u1 in -2.0..2.0_f64) {
         let g = TransferFunction::new(Polynomial::new(b).unwrap(), a).unwrap();

@@ -14,7 +14,7 @@ fn derivatives_of_a_sinusoid() {
     let denominators = [
         Polynomial::new([1.5, 1.0]).unwrap(),
         Polynomial::new([2.0, 1.0]).unwrap().pow(3),
-        // Not of the usual form: a pair with damping 0.3 beside a lag, and another scale.
+        // Another form: a pole pair with damping 0.3 and a lag, and another time scale.
         &Polynomial::new([4.0, 1.2, 1.0]).unwrap() * &Polynomial::new([5.0, 3.0]).unwrap(),
         Polynomial::new([1.0, 1.0]).unwrap().pow(6),
     ];
@@ -154,7 +154,7 @@ fn systems() -> [(Vec<f64>, Vec<f64>, f64); 3] {
     ]
 }
 
-/// A held input that moves at random, every second.
+/// A held input that changes at random every second.
 fn input(t: f64) -> f64 {
     let k = (t + 1e-9).floor();
     if (12.9898 * k * k).sin() + 0.3 * (k / 9.0).sin() > 0.0 {
@@ -219,7 +219,7 @@ fn parameters_come_back() {
     }
 }
 
-/// With nothing lost between samples the regression is exact: y filtered along with the plant, in continuous time.
+/// If the signals between samples are known, the regression is exact: y is filtered together with the plant, in continuous time.
 #[test]
 fn filtered_alike_the_regression_is_exact() {
     for (a, b, lambda) in systems() {

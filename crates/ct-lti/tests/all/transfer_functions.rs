@@ -54,7 +54,7 @@ fn the_loop_of_a_lag_and_a_pi_controller() {
     assert_eq!(closed.dc_gain(), Some(1.0));
     assert!(closed.is_stable());
     assert_eq!(controller.dc_gain(), None);
-    // From a disturbance at the input of the plant: no gain left at rest.
+    // From a disturbance at the input of the plant: the static gain is zero.
     assert_eq!(plant.feedback(&controller).unwrap().dc_gain(), Some(0.0));
 }
 
@@ -141,7 +141,7 @@ proptest! {
         prop_assert!(close(g.feedback(&h).unwrap().at_frequency(w), one / loop_gain));
     }
 
-    /// The same connection of states gives the same step response.
+    /// Both connections of the same systems have the same step response.
     #[test]
     fn connections_of_states_are_those_of_polynomials(g in any_tf(), h in any_tf()) {
         prop_assume!((1.0 + g.direct_term() * h.direct_term()).abs() > 0.1);

@@ -9,7 +9,7 @@ use super::port::Port;
 use crate::expression::{Expression, Variable};
 use crate::spec::{About, Flow, ModelSpec, Output, State};
 
-/// Why effects cannot be added to a model.
+/// Reasons why effects cannot be added to a model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ApplyError {
@@ -19,8 +19,8 @@ pub enum ApplyError {
         /// The effect.
         id: String,
     },
-    /// Flows would depend on each other in a circle.
-    #[error("with {effects} these depend on each other in a circle: {}", names.join(" -> "))]
+    /// Flows would form an algebraic loop.
+    #[error("with {effects} these form an algebraic loop: {}", names.join(" -> "))]
     Circle {
         /// The effects.
         effects: String,
@@ -28,7 +28,7 @@ pub enum ApplyError {
         names: Vec<String>,
     },
     /// A candidate belongs to another model.
-    #[error("{id} is of another model: list the candidates of this one")]
+    #[error("{id} belongs to another model: use the candidates of this model")]
     OtherModel {
         /// The effect.
         id: String,
@@ -39,8 +39,9 @@ pub enum ApplyError {
 /// flows, limits, inputs (delay, nonlinearity, dead zone, saturation, drift of the gain, backlash, lag), outputs (lag, nonlinearity,
 /// saturation, hysteresis, drift, offset, quantisation).
 ///
-/// The candidates are those of this model. Their parameters follow its own, at their absent values, with their bounds; a [`super::Role::Choice`]
-/// is not fitted. What was an output keeps its name and its unit, and is the reading; what is measured is called `y_true`.
+/// The candidates are those of this model. Their parameters follow its own, at their absent values, with their bounds; a
+/// [`super::Role::Choice`] is not fitted. What was an output keeps its name and its unit, and is the reading; what is measured is called
+/// `y_true`.
 ///
 /// # Errors
 /// Where an effect is given twice, belongs to another model, or closes a circle.
@@ -84,7 +85,7 @@ pub fn apply(spec: &ModelSpec, candidates: &[&Candidate]) -> Result<ModelSpec, A
     Ok(spec)
 }
 
-/// Where an effect stands in the order of all.
+/// Position of an effect in the order of all effects.
 fn rank(candidate: &Candidate) -> (u8, usize) {
     let group = match (&candidate.fragment.action, candidate.port) {
         (Action::Add(terms), _) => {
@@ -103,9 +104,9 @@ fn rank(candidate: &Candidate) -> (u8, usize) {
 struct Mended {
     base: Counts,
     spec: ModelSpec,
-    /// What the outputs read before.
+    /// Variables that the outputs read before the effects are added.
     reads: Vec<Variable>,
-    /// Where the chain of a port ends by now.
+    /// Current end of the chain of effects of each port.
     ends: BTreeMap<Port, Variable>,
 }
 
@@ -135,7 +136,7 @@ impl Mended {
     fn add(&mut self, candidate: &Candidate) {
         let fragment = &candidate.fragment;
         let (base, now) = (self.base, Counts::of(&self.spec));
-        // What the effect stands behind: its port, or the effect before it.
+        // Predecessor of the effect: its port, or the effect before it in the chain.
         let (chain, port) = match candidate.port {
             Port::Input(u) => (Some(candidate.port), Some(Variable::Input(u))),
             Port::Output(y) | Port::OutputAnd(y, _) => {
@@ -248,7 +249,7 @@ impl Mended {
         }
     }
 
-    /// Puts one variable in the place of another, in everything that was there before the last effect.
+    /// Replaces one variable by another in all expressions that were there before the last effect.
     fn replace(&mut self, old: Variable, new: Variable, before: Counts) {
         let of =
             |variable: Variable| Expression::Variable(if variable == old { new } else { variable });
@@ -266,7 +267,7 @@ impl Mended {
         }
     }
 
-    /// The reading has the name of the output, and what is measured another one.
+    /// The reading keeps the name of the output, and the measured quantity gets another one.
     fn name_readings(&mut self, spec: &ModelSpec) {
         for (y, &measured) in self.reads.iter().enumerate() {
             let Variable::Flow(reading) = self.spec.outputs[y].variable else {
@@ -300,7 +301,7 @@ fn unbounded() -> About {
     }
 }
 
-/// Exchanges the places of flows that are outputs, so that they stand in the order of the outputs: a text has one order.
+/// Sorts the flows that are outputs in the order of the outputs: a text has a single order.
 fn outputs_in_order(spec: &mut ModelSpec) {
     let flow = |output: &Output| match output.variable {
         Variable::Flow(i) => Some(i),
@@ -340,7 +341,7 @@ fn outputs_in_order(spec: &mut ModelSpec) {
     }
 }
 
-/// A parameter that others define stays one only where all of these do not change with time.
+/// A parameter that depends on others stays a parameter only if none of them changes with time.
 fn of_parameters_still(spec: &mut ModelSpec) {
     for i in spec.order.clone() {
         let mut still = spec.flows[i].of_parameters;

@@ -18,40 +18,40 @@ use crate::text::is_reserved;
 /// A parameter of an effect at a port.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectParameter {
-    /// Its name in the model that the effect was added to: `lag_u_tau`.
+    /// Name of the parameter in the model that the effect was added to: `lag_u_tau`.
     pub name: String,
-    /// Its name in the effect: `tau`.
+    /// Name of the parameter in the effect: `tau`.
     pub short: String,
-    /// Its unit.
+    /// Unit of the parameter.
     pub unit: String,
-    /// What it is.
+    /// Description of the parameter.
     pub description: String,
-    /// What it is to a search.
+    /// Role of the parameter in a search.
     pub role: Role,
-    /// Its value where the effect is not there: of a [`Role::Shape`] the value does not matter.
+    /// Value at which the effect is absent. For a [`Role::Shape`] the value does not matter.
     pub absent: f64,
     /// Smallest and largest value.
     pub bounds: (f64, f64),
-    /// Where fits start; several parameters: every combination.
+    /// Start values of fits; with several parameters, every combination is used.
     pub starts: Vec<f64>,
 }
 
 /// An effect at a port of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// Its identifier: `lag(u)`, `varies_with(k,T)`, or the name of an own candidate.
+    /// Identifier of the effect: `lag(u)`, `varies_with(k,T)`, or the name of a user's own candidate.
     pub id: String,
-    /// Where it acts.
+    /// Port at which the effect acts.
     pub port: Port,
     /// The effect; `None` for a candidate of the model file.
     pub effect: Option<&'static Effect>,
-    /// Its parameters.
+    /// Parameters of the effect.
     pub parameters: Vec<EffectParameter>,
-    /// What of the record it is written in, by the names of its text ([`Effect::record_numbers`]): given again to [`candidates_keeping`] it
-    /// means the same beside another record.
+    /// Numbers of the record that the effect's equations contain, by their names in its text ([`Effect::record_numbers`]). If they are
+    /// passed to [`candidates_keeping`], the effect means the same for another record.
     pub record_numbers: BTreeMap<&'static str, f64>,
-    /// The candidate of the model file, by its identifier, that this one repeats with states and parameters of its own: a second RC pair. Alone
-    /// the two are the same.
+    /// Identifier of the candidate of the model file that this one repeats with its own states and parameters: a second RC pair. Alone the
+    /// two are equal.
     pub repeats: Option<String>,
     pub(super) fragment: Fragment,
     /// Names of its variables begin with this.
@@ -59,7 +59,7 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// [`Candidate::record_numbers`] as results keep them.
+    /// [`Candidate::record_numbers`] in the form of the results.
     #[must_use]
     pub fn numbers_of_record(&self) -> BTreeMap<String, f64> {
         let all = self.record_numbers.iter();
@@ -67,19 +67,20 @@ impl Candidate {
             .collect()
     }
 
-    /// Whether the outputs have a derivative by every size where the effect is not there: it can be scored there, over the starts of its
-    /// shapes.
+    /// Whether the outputs have a derivative with respect to every size at the absent value: then the effect can be scored there, over the
+    /// starts of its shape parameters.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
         let mut roles = self.parameters.iter().map(|parameter| parameter.role);
         roles.all(|role| matches!(role, Role::Size | Role::Shape))
     }
 
-    /// The candidate with a factor before every term, which is zero where the effect is not there and one where it is; `None` where the
+    /// The candidate with a factor before every term, which is zero if the effect is absent and one if it is present; `None` if the
     /// parameters of the candidate have such values themselves.
     ///
-    /// No values of resistance and capacity take an RC pair out of a model: only their limit does. The factor makes the score test possible; it
-    /// is not fitted, and stands in no model but that of the score. It is the last parameter, and may be negative where another one may.
+    /// No values of resistance and capacity take an RC pair out of a model: only their limit does. The factor makes the score test
+    /// possible; it is not fitted, and stands in no model but that of the score. It is the last parameter, and may be negative where
+    /// another one may.
     #[must_use]
     pub fn with_factor(&self, spec: &ModelSpec) -> Option<Self> {
         let mut roles = self.parameters.iter().map(|parameter| parameter.role);
@@ -132,21 +133,21 @@ impl Candidate {
         Some(candidate)
     }
 
-    /// How many parameters are fitted.
+    /// Number of fitted parameters.
     #[must_use]
     pub fn fitted(&self) -> usize {
         let roles = self.parameters.iter().map(|parameter| parameter.role);
         roles.filter(|role| *role != Role::Choice).count()
     }
 
-    /// Whether it goes with time and with nothing else: a drift, a step, a period. It can imitate any slow disturbance.
+    /// Whether the effect is a function of time alone: a drift, a step, a period. Such an effect can compensate for any slow disturbance.
     #[must_use]
     pub fn follows_time(&self) -> bool {
-        // What happens at an instant is written in the record's first one.
+        // The start of the record is an input of effects that happen at an instant.
         self.record_numbers.contains_key("begin")
     }
 
-    /// Whether it is a smooth function without physics, no candidate of a search ([`shapes_keeping`]).
+    /// Whether the effect is a smooth function without physics. Searches do not use it as a candidate ([`shapes_keeping`]).
     #[must_use]
     pub fn is_shape(&self) -> bool {
         self.effect
@@ -188,7 +189,7 @@ impl Candidate {
         for parameter in &mut fragment.parameters {
             parameter.about.name = named(&parameter.about.name);
         }
-        // Constants of the effect stand behind its parameters.
+        // Constants of the effect follow its parameters.
         for (own, parameter) in self.parameters.iter_mut().zip(&fragment.parameters) {
             own.name.clone_from(&parameter.about.name);
         }
@@ -221,8 +222,8 @@ pub fn candidates(spec: &ModelSpec, visited: &Visited) -> Vec<Candidate> {
     candidates_keeping(spec, visited, &BTreeMap::new())
 }
 
-/// The same; those that `kept` names, by their identifiers, are written in these numbers of an earlier record
-/// ([`Candidate::record_numbers`]) in place of those that `visited` gives.
+/// All effects that can act in a model. For the identifiers in `kept`, the numbers of an earlier record ([`Candidate::record_numbers`])
+/// replace those from `visited`.
 #[must_use]
 pub fn candidates_keeping(
     spec: &ModelSpec,
@@ -232,8 +233,8 @@ pub fn candidates_keeping(
     of_effects(all_effects(), spec, visited, kept)
 }
 
-/// Smooth functions of what the records visit, at all ports of a model: `shape(x,u)`, `course(x)`. They are no candidates of a search. `kept`: as
-/// [`candidates_keeping`] has it.
+/// Smooth functions of the variables, at all ports of a model: `shape(x,u)`, `course(x)`. They are no candidates of a search. `kept`: as in
+/// [`candidates_keeping`].
 #[must_use]
 pub fn shapes_keeping(
     spec: &ModelSpec,

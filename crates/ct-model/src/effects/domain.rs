@@ -1,4 +1,4 @@
-//! Which ports the effects of a domain have, from the units of states, inputs and readings.
+//! Ports of the effects of each physical domain, derived from the units of states, inputs and readings.
 
 use ct_signals::{Dimension, Unit};
 
@@ -24,7 +24,7 @@ fn is(spec: &ModelSpec, variable: Variable, unit: &str) -> bool {
     own.is_some_and(|own| own != Dimension::NONE) && own == dimension(unit)
 }
 
-/// Temperatures whose balance holds another temperature.
+/// Temperatures whose balance contains another temperature.
 fn thermal(spec: &ModelSpec) -> Vec<Port> {
     let inputs = (0..spec.inputs.len()).map(Variable::Input);
     let states = (0..spec.states.len()).map(Variable::State);

@@ -1,4 +1,4 @@
-//! What an effect is: a small model, and what its text cannot say.
+//! Definition of an effect: a small model, and settings that its text cannot contain.
 
 use std::collections::BTreeMap;
 
@@ -8,13 +8,13 @@ use crate::text::parse_effect;
 /// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Place {
-    /// Between an input and the model: the effect of `u` gives what the model receives.
+    /// Between an input and the model: the effect of `u` supplies the model's input.
     Input,
-    /// Between what is measured and the reading: the effect of `y` gives the reading.
+    /// Between the measured quantity and the reading: the effect of `y` supplies the reading.
     Output,
-    /// In the equation of a state `x`: added to its right-hand side, or, made of `rate`, in its place.
+    /// In the equation of a state `x`: an addition to its right-hand side or, as a function of `rate`, its replacement.
     Balance,
-    /// A parameter or a named flow `p`, in the place of which the effect stands.
+    /// A parameter or a named flow `p`, which the effect replaces.
     Parameter,
     /// A parameter or a named flow `p` that depends on a state or an input `x`.
     ParameterAndSignal,
@@ -36,26 +36,27 @@ pub enum Place {
     Terminal,
 }
 
-/// What a parameter of an effect is to a search.
+/// Role of an effect's parameter in a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// At its absent value the effect is not there, and the outputs have a derivative by it (from one side where a bound is there).
+    /// At the absent value the effect vanishes, and the outputs have a derivative with respect to the parameter (one-sided at a bound).
     Size,
-    /// It says when, where or how fast: without a size no output depends on it. A grid of starts covers it.
+    /// The parameter states when, where or how fast the effect acts. No output depends on it while the size of the effect is zero. A grid
+    /// of starts covers it.
     Shape,
-    /// At its absent value the effect is not there, but the outputs have no derivative by it there: a limit at the edge of what was
-    /// visited, a step of a converter. A grid of starts covers it.
+    /// At the absent value the effect vanishes, but the outputs have no derivative with respect to the parameter there: a limit at the edge
+    /// of the visited range, a quantisation step. A grid of starts is used.
     Threshold,
-    /// One of the starts, and nothing between them: upper or lower. It is not fitted.
+    /// The parameter takes one of its start values and no value in between: upper or lower. It is not fitted.
     Choice,
 }
 
-/// Where fits of a parameter start, as shares of what was visited.
+/// Start values of fits of a parameter, as shares of the visited range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Starts {
-    /// As they stand.
+    /// The values themselves.
     Values(&'static [f64]),
-    /// Quantiles of the signal, and at the same shares of its range where no quantiles are known.
+    /// Quantiles of the signal, or the same shares of its range if no quantiles are known.
     Quantiles(&'static [f64]),
     /// Shares of the width of the signal's range.
     Widths(&'static [f64]),
@@ -75,37 +76,37 @@ pub enum Starts {
 ///
 /// Its text is a model: the inputs are the port (their names say which part of it: [`Place`]), the output `v` is what the effect gives, the
 /// value of a parameter is the absent one, and a `final parameter` is a [`Role::Choice`]. Constants of these names take the values that the
-/// data visit: `low`, `high`, `middle`, `width`, `first` (of the signal), `begin`, `duration`, `interval` (of the record), `zero` (of a temperature's unit above absolute zero), `balance` (the
-/// largest term of the equation). In units `port` (or `signal`), `value`, `time` and `balance`
-/// stand for those of the signal, of the parameter or flow, of the time and of the equation.
+/// data visit: `low`, `high`, `middle`, `width`, `first` (of the signal), `begin`, `duration`, `interval` (of the record), `zero` (of a
+/// temperature's unit above absolute zero), `balance` (the largest term of the equation). In units `port` (or `signal`), `value`, `time`
+/// and `balance` stand for those of the signal, of the parameter or flow, of the time and of the equation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
-    /// Its name: `lag`.
+    /// Name of the effect: `lag`.
     pub id: &'static str,
-    /// Where it acts.
+    /// Where the effect acts.
     pub place: Place,
-    /// Its text.
+    /// Model text of the effect.
     pub text: &'static str,
     /// Role and starts of the parameters.
     pub parameters: &'static [(&'static str, Role, Starts)],
-    /// Its physics in a sentence.
+    /// Physics of the effect in a sentence.
     pub physics: &'static str,
-    /// Effects that leave similar traces, as `name(port)`.
+    /// Effects with similar signatures, as `name(port)`.
     pub confused_with: &'static [&'static str],
-    /// How a person confirms it at the plant.
+    /// How to confirm the effect at the plant.
     pub confirm: &'static str,
     /// Words that a person may describe it with.
     pub symptoms: &'static [&'static str],
 }
 
-/// What of a record the text of an effect may be written in.
+/// Numbers of a record that the text of an effect may contain.
 const RECORD_NUMBERS: [&str; 10] = [
     "low", "high", "middle", "width", "first", "begin", "zero", "duration", "interval", "balance",
 ];
 
 impl Effect {
-    /// The constants of its text that take their values from what the data visit: `low`, `duration`. With them the effect means the same on
-    /// another record.
+    /// Constants of the text whose values come from the range of the data: `low`, `duration`. With the same constants the effect means the
+    /// same on another record.
     #[must_use]
     pub fn record_numbers(&self) -> Vec<&'static str> {
         // A test reads every text.

@@ -7,7 +7,7 @@ use crate::expression::{Expression, Operator, Variable};
 use crate::spec::{Flow, Given, ModelSpec, Parameter, State};
 use crate::text::{TextError, parse_effect};
 
-/// Variables whose positions are below the counts of the model are the model's, the others are own ones.
+/// Variables with positions below the counts of the model are the model's; the others belong to the effect.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Fragment {
     pub parameters: Vec<Parameter>,
@@ -16,14 +16,14 @@ pub(super) struct Fragment {
     pub action: Action,
 }
 
-/// What it does.
+/// Action of an effect on the model.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Action {
-    /// Its result, an own flow, stands in the place of the input, output, parameter or flow of its port.
+    /// The effect's output replaces the input, output, parameter or flow of its port.
     Stand(Variable),
-    /// This is added to the equations of states, to flows, or to readings, by position in the outputs.
+    /// The effect's output is added to state equations, to flows, or to readings (by position in the outputs).
     Add(Vec<(Target, Expression)>),
-    /// Its result stands in the place of the right-hand side, for which this flow of its own is kept.
+    /// The effect's output replaces the right-hand side of a state equation. The flow `rate` stores the original right-hand side.
     Govern { result: Variable, rate: Variable },
 }
 
@@ -34,7 +34,7 @@ pub(super) enum Target {
     Output(usize),
 }
 
-/// How many variables of each kind the model has.
+/// Number of variables of each kind in the model.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Counts {
     pub parameters: usize,
@@ -72,7 +72,7 @@ pub(super) fn instance(
         flows: Vec::new(),
         action: Action::Add(Vec::new()),
     };
-    // Parameters first, then the constants that equations use; a pure number stands where it is used.
+    // Parameters first, then the constants of the equations; a pure number is written into its expression.
     let mut own: Vec<Expression> = small.parameters.iter().map(|p| signed(p.value)).collect();
     for constants in [false, true] {
         for (i, parameter) in small.parameters.iter().enumerate() {
@@ -90,7 +90,7 @@ pub(super) fn instance(
             }
         }
     }
-    // The right-hand side is a flow of its own, behind those of the effect.
+    // The right-hand side becomes an additional flow after the flows of the effect.
     let rate = Variable::Flow(counts.flows + small.flows.len());
     let of = |variable: Variable| match variable {
         Variable::Parameter(i) => own[i].clone(),

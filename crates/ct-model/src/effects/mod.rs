@@ -55,7 +55,7 @@ pub use port::{Port, Ports};
 pub use shape::bells;
 pub use visited::{Span, Visited};
 
-/// All effects, by place; those of a chain in its order.
+/// All effects, sorted by place; effects of a chain are in the order of the chain.
 pub fn all_effects() -> impl Iterator<Item = &'static Effect> {
     const GROUPS: [&[Effect]; 9] = [
         &input::EFFECTS,

@@ -12,40 +12,41 @@ use crate::expression::{Expression, Variable};
 use crate::spec::{About, Given, ModelSpec, Parameter, State};
 use crate::text::{Scope, TextError, is_reserved};
 
-/// Parameters of an effect that is absent only in a limit start so many times smaller and larger too: a time constant that is a product or a
-/// quotient of two is then scored over four decades.
+/// Parameters of an effect that is absent only in a limit also start at values smaller and larger by this factor: a time constant that is a
+/// product or a quotient of two parameters is then scored over four decades.
 const DECADE: f64 = 10.0;
 
-/// A candidate as the model file has it.
+/// A candidate as written in the model file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OwnCandidate {
-    /// Its parameters, by name.
+    /// Parameters of the candidate, by name.
     pub parameters: BTreeMap<String, OwnParameter>,
-    /// States that it brings, by name.
+    /// Additional states, by name.
     pub states: BTreeMap<String, OwnState>,
-    /// What is added: to the right-hand side of the equation of a state, to a named flow, or to an output, by their names.
+    /// Terms to add: to the right-hand side of a state equation, to a named flow, or to an output. The key is the name of the state, flow
+    /// or output.
     pub terms: BTreeMap<String, String>,
 }
 
 /// A parameter of a candidate.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OwnParameter {
-    /// Its unit; empty where none is given.
+    /// Unit of the parameter; empty if none is given.
     pub unit: String,
-    /// Its smallest value.
+    /// Lower bound.
     pub min: Option<f64>,
-    /// Its largest value.
+    /// Upper bound.
     pub max: Option<f64>,
-    /// Where a fit starts.
+    /// Start value of a fit.
     pub start: f64,
 }
 
 /// A state of a candidate.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OwnState {
-    /// Its unit; empty where none is given.
+    /// Unit of the state; empty if none is given.
     pub unit: String,
-    /// Where its initial value starts.
+    /// Start value of the initial state.
     pub start: f64,
     /// The initial value is known, and not fitted.
     pub fixed: bool,
@@ -53,21 +54,21 @@ pub struct OwnState {
     pub equation: String,
 }
 
-/// A candidate of the model file that is refused.
+/// Error of a candidate of the model file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}: {what}", place.join("."))]
 pub struct OwnError {
     /// The keys below `candidates`: the candidate's name, `terms`, `T`.
     pub place: Vec<String>,
-    /// What is wrong and the mend; of an expression with line and column in it.
+    /// The error and the correction; for an expression, with line and column inside it.
     pub what: String,
 }
 
-/// Reads candidates of the model file in the scope of a model, and refuses two that are the same. One that brings a state may stand there
-/// again, under another name: two RC pairs are more than one ([`Candidate::repeats`]).
+/// Reads candidates of the model file in the scope of a model, and rejects two equal ones. A candidate with a state may be repeated under
+/// another name: two RC pairs are more than one ([`Candidate::repeats`]).
 ///
 /// # Errors
-/// The place in the model file and in the expression, what is wrong and the mend.
+/// The place in the model file and in the expression, what is wrong and the correction.
 pub fn own_candidates(
     spec: &ModelSpec,
     all: &BTreeMap<String, OwnCandidate>,
@@ -102,7 +103,7 @@ pub fn own_candidates(
 /// Reads a candidate of the model file in the scope of a model.
 ///
 /// # Errors
-/// The place in the model file and in the expression, what is wrong and the mend.
+/// The place in the model file and in the expression, what is wrong and the correction.
 pub fn own_candidate(
     spec: &ModelSpec,
     name: &str,
@@ -134,7 +135,7 @@ pub fn own_candidate(
             return Err(error(&[kind, key], what));
         }
         if is_reserved(key) {
-            let what = format!("`{key}` has a meaning of its own: choose another name");
+            let what = format!("`{key}` is a reserved word: choose another name");
             return Err(error(&[kind, key], what));
         }
         Ok(())
@@ -229,7 +230,7 @@ pub fn own_candidate(
             "it has no parameter: give it one that makes its terms vanish at zero, as a factor";
         return Err(error(&[], what.to_string()));
     }
-    // Without such values every parameter is a shape: the effect is absent only in a limit ([`Candidate::with_factor`]).
+    // If no such values exist, every parameter is a shape: the effect is absent only in a limit ([`Candidate::with_factor`]).
     let sizes = sizes(&scope, counts, &states, &terms);
     let in_limit = sizes.is_none();
     let sizes = sizes.unwrap_or_else(|| vec![false; own.parameters.len()]);
@@ -238,7 +239,8 @@ pub fn own_candidate(
         sizes[i] && (about.min > 0.0 || about.max < 0.0)
     }) {
         let key = &scope.parameters[counts.parameters + i].about.name;
-        let what = "at zero the effect is not there, but its bounds leave zero out: widen them";
+        let what =
+            "its bounds exclude zero, but the value zero has to switch the effect off: widen them";
         return Err(error(&["parameters", key], what.to_string()));
     }
     let mut parameters = scope.parameters[counts.parameters..].to_vec();
@@ -303,7 +305,7 @@ fn about(name: &str, unit: &str, min: Option<f64>, max: Option<f64>) -> About {
     }
 }
 
-/// What a term is added to.
+/// The variable that a term is added to.
 fn target(spec: &ModelSpec, name: &str) -> Result<Target, String> {
     let output = spec
         .outputs
@@ -327,8 +329,8 @@ fn target(spec: &ModelSpec, name: &str) -> Result<Target, String> {
     }
 }
 
-/// Which parameters are zero where the effect is not there: one alone that makes all terms vanish, else all of those that do so together.
-/// Terms vanish too where the states of the candidate stay at their start and they vanish there.
+/// Parameters that are zero when the effect is absent: one parameter that alone makes all terms vanish, else all parameters that do so
+/// together. The states of the candidate may stay at their start, if the terms vanish there too.
 fn sizes(
     scope: &ModelSpec,
     counts: Counts,
@@ -350,7 +352,7 @@ fn sizes(
                     Variable::State(i) => (2, i),
                     Variable::Flow(i) => (3, i),
                 };
-                // Numbers with nothing in common, of either sign.
+                // Unrelated numbers of either sign.
                 let turn = 1.7 + f64::from(trial) * 2.39 + f64::from(kind) * 1.13 + i as f64 * 0.71;
                 let size = 1.5 + turn.sin();
                 if kind > 0 && trial.is_multiple_of(2) {
@@ -377,14 +379,14 @@ fn sizes(
     };
     let alone: Vec<bool> = (0..count).map(|i| vanish(&|own| own == i)).collect();
     if alone.iter().any(|is| *is) {
-        // One is enough: the first, where several are factors.
+        // One such parameter is enough; with several factors, the first one is used.
         let first = alone.iter().position(|is| *is);
         return Some((0..count).map(|i| Some(i) == first).collect());
     }
     if !vanish(&|_| true) {
         return None;
     }
-    // All but those that the others can do without.
+    // Start from all parameters, and drop each one that is not needed.
     let mut zero = vec![true; count];
     for i in 0..count {
         zero[i] = false;

@@ -20,25 +20,26 @@ pub enum Port {
     Between(usize, usize),
     /// An input, and the equation of a state.
     InputAndBalance(usize, usize),
-    /// The equation of a state, and another variable that takes part.
+    /// The equation of a state, and another variable in the effect.
     BalanceAnd(usize, Variable),
-    /// An output, and another variable that takes part.
+    /// An output, and another variable in the effect.
     OutputAnd(usize, Variable),
     /// Several places: a candidate of the model file.
     Own,
 }
 
-/// What of a model has ports.
+/// Parts of a model that have ports.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ports {
-    /// Inputs, outputs and the equations of states that are balances: not those that only say that one state is another's speed.
+    /// Inputs, outputs and the balance equations of states. An equation that only defines a velocity as the derivative of a position is not
+    /// a balance.
     pub single: Vec<Port>,
     /// Parameters that are fitted, and named flows that no fitted parameter scales alone.
     pub values: Vec<Port>,
 }
 
 impl Port {
-    /// Its names, as they stand in an identifier: `u`, `k,T`.
+    /// Names of the port's variables, as in an identifier: `u`, `k,T`.
     #[must_use]
     pub fn names(self, spec: &ModelSpec) -> String {
         let of = |variable| spec.about(variable).name.as_str();
@@ -63,7 +64,7 @@ impl Port {
 }
 
 impl ModelSpec {
-    /// Its ports.
+    /// Ports of the model.
     #[must_use]
     pub fn ports(&self) -> Ports {
         let inputs = (0..self.inputs.len()).map(Port::Input);
@@ -93,17 +94,18 @@ impl ModelSpec {
         }
     }
 
-    /// An expression, or what a flow that stands alone is equal to: of an output that shows a state that state.
+    /// Resolves an expression that is a single flow to the definition of the flow; for an output that equals a state, the result is that
+    /// state.
     #[must_use]
     pub fn behind<'a>(&'a self, mut expression: &'a Expression) -> &'a Expression {
-        // Flows are sorted: no circle.
+        // Flows are sorted, so there is no loop.
         while let Expression::Variable(Variable::Flow(i)) = expression {
             expression = &self.flows[*i].value;
         }
         expression
     }
 
-    /// How often a variable stands in the equations.
+    /// Number of times that a variable occurs in the equations.
     pub(super) fn occurrences(&self, of: Variable) -> usize {
         let mut count = 0;
         for expression in self.expressions() {
@@ -112,7 +114,7 @@ impl ModelSpec {
         count
     }
 
-    /// Whether a flow is more than a reading, another name, and a product with a fitted parameter that stands nowhere else.
+    /// Whether a flow is more than a reading, an alias, or a product with a fitted parameter that occurs nowhere else.
     fn is_own_flow(&self, i: usize) -> bool {
         let flow = &self.flows[i];
         let variable = Variable::Flow(i);
@@ -137,13 +139,13 @@ impl ModelSpec {
         !factors.iter().any(scales)
     }
 
-    /// Whether the equation of a state holds a variable, flows looked through.
+    /// Whether the equation of a state contains a variable, directly or through flows.
     pub(super) fn depends_on(&self, state: usize, on: Variable) -> bool {
         let mut seen = vec![false; self.flows.len()];
         self.holds(&self.states[state].right, on, &mut seen)
     }
 
-    /// Whether an output holds a variable, without a state between.
+    /// Whether an output contains a variable without a state in between.
     pub(super) fn is_read_directly(&self, variable: Variable) -> bool {
         let mut seen = vec![false; self.flows.len()];
         let mut outputs = self.outputs.iter();

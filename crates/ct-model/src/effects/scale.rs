@@ -67,7 +67,7 @@ impl<'a> Scales<'a> {
     }
 }
 
-/// The unit of a state's equation, from a flow that is a term of it, or from the state and its coefficient; empty where neither says it.
+/// The unit of a state's equation, from a flow that is a term of it, or from the state and its coefficient; empty if it is not known.
 pub(super) fn balance_unit(spec: &ModelSpec, state: usize, time: &str) -> String {
     let state = &spec.states[state];
     let mut units = Vec::new();

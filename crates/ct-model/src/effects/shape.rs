@@ -1,14 +1,14 @@
-//! Smooth functions of what a model visits: no physics, but the shape of a term that no effect of the catalogue holds.
+//! Smooth functions of the model's variables: without physics, for the shape of a term that no effect of the catalogue has.
 //!
-//! `shape` depends on a state or an input, `course` on time. A function is a sum of bells (Gaussian radial basis) at equal distances over the
-//! visited range, as wide as their distance: linear in its parameters, smooth, and of any form that is not much narrower than a bell. These
-//! are no candidates of a search: one of them bends to whatever there is.
+//! `shape` depends on a state or an input, `course` on time. A function is a sum of bells (Gaussian radial basis) at equal distances over
+//! the visited range, as wide as their distance: linear in its parameters, smooth, and of any form that is not much narrower than a bell.
+//! These are no candidates of a search: one of them bends to whatever there is.
 //!
 //! **Reference**: S. Chen, S. A. Billings, P. M. Grant, Int. J. Control 55 (1992) 1051-1070 (radial basis functions in identification).
 
 use super::{Effect, Place, Role, Starts};
 
-/// The value of a sum of bells at a share of the range, of their heights in order.
+/// The value of a sum of Gaussian bells at a share of the range, given their heights in order.
 #[must_use]
 pub fn bells(heights: &[f64], share: f64) -> f64 {
     let z = share * heights.len().saturating_sub(1) as f64;
@@ -16,7 +16,7 @@ pub fn bells(heights: &[f64], share: f64) -> f64 {
     heights.iter().enumerate().map(bell).sum()
 }
 
-/// Heights of bells as parameters, of a unit and within a bound.
+/// Heights of bells as parameters, with a unit and a bound.
 macro_rules! heights {
     ($unit:literal, $bound:literal, $($name:literal),+) => {
         concat!($(
@@ -25,7 +25,7 @@ macro_rules! heights {
     };
 }
 
-/// A function of the signal `x` (or `u`): where it begins, the unit and bound of its heights, and what stands before and behind the sum.
+/// A shape function of the signal `x` (or `u`): its interval, the unit and bound of its heights, and the text before and after the sum.
 macro_rules! of_signal {
     ($inputs:literal, $x:literal, $unit:literal, $bound:literal, $before:literal, $behind:literal) => {
         concat!(
@@ -46,7 +46,7 @@ macro_rules! of_signal {
     };
 }
 
-/// The same of time, from the beginning of the record to its end.
+/// Shape functions of time, from the beginning of the record to its end.
 macro_rules! of_time {
     ($inputs:literal, $unit:literal, $bound:literal, $before:literal, $behind:literal) => {
         concat!(
@@ -71,7 +71,7 @@ const NAMES: [&str; 12] = [
     "h0", "h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11",
 ];
 
-/// The first so many heights, with their starts.
+/// The given number of first heights, with their starts.
 const fn heights<const N: usize>(starts: Starts) -> [(&'static str, Role, Starts); N] {
     let mut all = [("", Role::Size, starts); N];
     let mut k = 0;
@@ -91,9 +91,9 @@ const OF_EQUATION: Effect = Effect {
     place: Place::BalanceAndSignal,
     text: of_signal!("  input Real x;\n", "x", "balance", "20*balance", "", ""),
     parameters: &heights::<7>(OF_BALANCE),
-    physics: "A term of this equation that depends on the signal in some smooth way.",
+    physics: "A term of this equation that is a smooth function of the signal.",
     confused_with: &["loss(x)", "varies_with(p,x)"],
-    confirm: "Look at its shape, and write the physics that has it as a candidate of your own.",
+    confirm: "Look at the shape of the function, and write the physical law with this shape as a candidate in the model file.",
     symptoms: &["nobody knows what it is"],
 };
 
@@ -101,7 +101,7 @@ const OF_INPUT: Effect = Effect {
     place: Place::Input,
     text: of_signal!("  input Real u;\n", "u", "port", "3*width", "u + ", ""),
     parameters: &heights::<7>(OF_WIDTH),
-    physics: "What the actuator gives is another function of the command.",
+    physics: "The output of the actuator is another function of the command than the model's.",
     ..OF_EQUATION
 };
 
@@ -110,9 +110,9 @@ const EQUATION_IN_TIME: Effect = Effect {
     place: Place::Balance,
     text: of_time!("  input Real x;\n", "balance", "20*balance", "", ""),
     parameters: &heights::<12>(OF_BALANCE),
-    physics: "A disturbance of this balance that follows time in some smooth way.",
+    physics: "A disturbance of this balance that is a smooth function of time.",
     confused_with: &["periodic(x)", "step(x)", "constant(x)"],
-    confirm: "Hold its course against the log of the plant: what happened when it changes?",
+    confirm: "Compare the estimated disturbance with the log of the plant: what happened when it changed?",
     symptoms: &["nobody knows what it is"],
 };
 
@@ -120,17 +120,17 @@ const INPUT_IN_TIME: Effect = Effect {
     place: Place::Input,
     text: of_time!("  input Real u;\n", "port", "3*width", "u + ", ""),
     parameters: &heights::<12>(OF_WIDTH),
-    physics: "What acts is the input and a disturbance that follows time.",
+    physics: "A disturbance that is a function of time adds to the input.",
     ..EQUATION_IN_TIME
 };
 
-/// All of them: of a balance, an input, an output, and a parameter or a named flow.
+/// All shape effects: in a balance, at an input, at an output, and at a parameter or a named flow.
 pub(super) const EFFECTS: [Effect; 8] = [
     OF_EQUATION,
     OF_INPUT,
     Effect {
         place: Place::Output,
-        physics: "What the sensor gives is another function of what it measures.",
+        physics: "The reading is another function of the measured quantity than the model's.",
         ..OF_INPUT
     },
     Effect {
@@ -144,21 +144,21 @@ pub(super) const EFFECTS: [Effect; 8] = [
             ")"
         ),
         parameters: &heights::<7>(RELATIVE),
-        physics: "It is no constant, but some smooth function of the signal.",
+        physics: "The parameter is not constant, but a smooth function of the signal.",
         ..OF_EQUATION
     },
     EQUATION_IN_TIME,
     INPUT_IN_TIME,
     Effect {
         place: Place::Output,
-        physics: "The reading is off by an error that follows time.",
+        physics: "The reading has an error that is a function of time.",
         ..INPUT_IN_TIME
     },
     Effect {
         place: Place::Parameter,
         text: of_time!("  input Real p;\n", "1", "3", "p*(1 + ", ")"),
         parameters: &heights::<12>(RELATIVE),
-        physics: "It changes over time in some smooth way.",
+        physics: "The parameter is a smooth function of time.",
         ..EQUATION_IN_TIME
     },
 ];

@@ -1,13 +1,13 @@
 //! Quotients of units as texts: `m/s2` over `m/s` is `1/s`.
 //!
-//! A unit is a product of symbols with whole powers, and what two have in common cancels. Symbols are not converted into each other: `m/s` over
-//! `h` is `m/(s.h)`. In a quotient a temperature is a difference, so `degC` is `K`.
+//! A unit is a product of symbols with whole powers, and what two have in common cancels. Symbols are not converted into each other: `m/s`
+//! over `h` is `m/(s.h)`. In a quotient a temperature is a difference, so `degC` is `K`.
 
-/// Symbols with their powers, in the order in which they were met.
+/// Symbols with their powers, in the order of their first occurrence.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Powers(Vec<(String, i32)>);
 
-/// One unit over another, in the notation of Modelica: `W` over `degC` is `W/K`, `m/s` over `m/s` is `1`. Empty where one is not known or is
+/// Quotient of two units in the notation of Modelica: `W` over `degC` is `W/K`, `m/s` over `m/s` is `1`. Empty if a unit is unknown or is
 /// not a product of powers.
 pub(super) fn quotient(a: &str, b: &str) -> String {
     composed(a, b, -1)
@@ -60,7 +60,7 @@ impl Powers {
     }
 }
 
-/// What is left of a unit's text.
+/// The part of a unit's text that is not read yet.
 struct Reader<'t> {
     rest: &'t str,
 }
@@ -179,14 +179,14 @@ mod tests {
             all.join(".")
         });
         (product.clone(), prop::option::of(product)).prop_map(|(above, below)| match below {
-            // A product below a stroke would need brackets, and there are none in brackets.
+            // A product in the denominator would need nested brackets, which are not supported.
             Some(below) => format!("{above}/{}", below.replace('.', "/")),
             None => above,
         })
     }
 
     proptest! {
-        /// The quotient measures what it stands for, no symbol stands in it twice, and it times the divisor is what was divided.
+        /// The quotient has the right dimension, contains no symbol twice, and its product with the divisor is the dividend.
         #[test]
         fn a_quotient_is_one_and_is_reduced(a in unit(), b in unit()) {
             let found = quotient(&a, &b);

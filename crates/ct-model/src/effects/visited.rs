@@ -1,4 +1,5 @@
-//! What the data visit, or the simulation of the model without effects: ranges, from which bounds and starts follow.
+//! Ranges of the variables in the data, or in the simulation of the model without effects. Bounds and start values of effects follow from
+//! these ranges.
 
 use std::collections::BTreeMap;
 
@@ -6,24 +7,24 @@ use crate::expression::Variable;
 use crate::simulation::{Model, NoSolution, Simulation};
 use crate::spec::{ModelSpec, Output};
 
-/// Quantiles that are kept of a signal, at equal distances.
+/// Number of stored quantiles of a signal, at equal distances.
 const QUANTILES: usize = 101;
 
-/// Which values a variable took, in its unit.
+/// Range of the values of a variable, in its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Span {
     /// The smallest.
     pub low: f64,
     /// The largest.
     pub high: f64,
-    /// That of the first row.
+    /// Value in the first row.
     pub first: f64,
     /// Quantiles at equal distances from the smallest to the largest; empty where they are not known.
     pub quantiles: Vec<f64>,
 }
 
 impl Span {
-    /// Of values, of which those that are no numbers are left out; `None` where none is left.
+    /// Range of values; values that are not finite are ignored. `None` if no value is finite.
     #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
@@ -39,7 +40,7 @@ impl Span {
         })
     }
 
-    /// How far it ranges; of one that does not, its size or one: a width is never zero.
+    /// Width of the range. For a constant variable, its absolute value, or one if this is zero: a width is never zero.
     #[must_use]
     pub fn width(&self) -> f64 {
         let width = self.high - self.low;
@@ -53,7 +54,7 @@ impl Span {
         }
     }
 
-    /// The value below which this share of all lies.
+    /// The quantile for this share.
     #[must_use]
     pub fn quantile(&self, share: f64) -> f64 {
         let Some(last) = self.quantiles.len().checked_sub(1) else {
@@ -85,14 +86,14 @@ impl Span {
     }
 }
 
-/// What was visited.
+/// Ranges of all variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Visited {
-    /// Inputs, states, flows (and with them outputs) that are known; of others a range from zero to one is taken.
+    /// Ranges of the known inputs, states and flows (including outputs); for others a range from zero to one is assumed.
     pub spans: BTreeMap<Variable, Span>,
     /// Begin of the records on the clock that `time` of the model follows \[its unit\].
     pub begin: f64,
-    /// From the first row to the last \[unit of the model's time\].
+    /// Time from the first row to the last \[unit of the model's time\].
     pub duration: f64,
     /// Between two rows \[unit of the model's time\].
     pub interval: f64,
@@ -101,7 +102,7 @@ pub struct Visited {
 }
 
 impl Visited {
-    /// Where nothing is known: a thousand rows, a second apart, ranges from the bounds and values of the text.
+    /// Default without data: a thousand rows with a step of one second; ranges from the bounds and values in the text.
     #[must_use]
     pub fn nominal(spec: &ModelSpec) -> Self {
         let of = |variable: Variable| {
@@ -186,7 +187,7 @@ impl Visited {
         })
     }
 
-    /// The range of another record beside that of this one.
+    /// Joins the range of another record to this one.
     pub fn join(&mut self, other: &Self) {
         for (variable, span) in &other.spans {
             let joined = self.spans.get(variable).map(|own| own.joined(span));

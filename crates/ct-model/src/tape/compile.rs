@@ -1,4 +1,4 @@
-//! From a model's expressions to operations on registers: the same subexpression is one operation.
+//! Compiles a model's expressions to operations on registers: a repeated subexpression becomes one operation.
 
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -28,7 +28,7 @@ struct Compiler<'a> {
 
 impl Tape {
     pub fn compile(spec: &ModelSpec) -> Self {
-        // How many numbers and delays there are decides where registers stand: counted first.
+        // The positions of registers depend on the number of constants and delays: count them first.
         let (numbers, delays, plays) = (Cell::new(1), Cell::new(0), Cell::new(0));
         let starts = spec.states.iter().map(|state| &state.start);
         for expression in spec.expressions().chain(starts) {
@@ -117,7 +117,7 @@ impl Tape {
         tape
     }
 
-    /// Moves what parameters alone define to the front.
+    /// Moves operations on parameters alone to the front.
     fn parameters_first(&mut self, fixed: &[bool]) {
         let mut order: Vec<usize> = (0..self.operations.len()).collect();
         order.sort_by_key(|&i| !fixed[i]);
@@ -180,7 +180,7 @@ impl Compiler<'_> {
         register
     }
 
-    /// By what parameters alone define: times its reciprocal, which is computed once.
+    /// Division by an expression of parameters alone: multiplication by its reciprocal, which is computed once.
     fn divided(&mut self, a: Register, b: Register) -> Register {
         if !self.is_fixed(b) || self.is_fixed(a) {
             return self.operation(Operation::Divide(a, b));

@@ -1,4 +1,4 @@
-//! Guards, whose signs decide on branches, and what a branch makes of their answers.
+//! Guards: signs that select branches, and branch conditions on these signs.
 
 use super::Register;
 use crate::expression::Comparison;
@@ -12,7 +12,7 @@ pub(crate) struct Guard {
 }
 
 impl Guard {
-    /// Its answer where the difference has this value.
+    /// Answer of the guard for this difference.
     pub fn holds(self, difference: f64) -> bool {
         match self.comparison {
             Comparison::Less => difference < 0.0,
@@ -24,12 +24,12 @@ impl Guard {
         }
     }
 
-    /// Whether the difference has left the side for which the answer was given.
+    /// Whether the difference has left the side of the given answer.
     pub fn is_crossed(self, answer: bool, difference: f64) -> bool {
         let positive = match self.comparison {
             Comparison::Less | Comparison::LessOrEqual => !answer,
             Comparison::Greater | Comparison::GreaterOrEqual => answer,
-            // Two numbers that change with time are equal at an instant alone.
+            // Two numbers that change with time are equal only at an instant.
             Comparison::Equal | Comparison::NotEqual => return false,
         };
         if positive {
@@ -40,7 +40,7 @@ impl Guard {
     }
 }
 
-/// When a branch is taken, over the answers of guards.
+/// Condition for a branch, in terms of the answers of guards.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Branch {
     Constant(bool),

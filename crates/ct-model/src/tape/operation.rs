@@ -13,10 +13,10 @@ pub(super) enum Operation {
     Divide(Register, Register),
     /// Times a number without derivatives.
     Scale(Register, Register),
-    /// One by it.
+    /// Reciprocal of a register.
     Reciprocal(Register),
     Power(Register, Register),
-    /// To a whole number.
+    /// Power with a whole exponent.
     WholePower(Register, i32),
     Sqrt(Register),
     Exp(Register),
@@ -28,13 +28,13 @@ pub(super) enum Operation {
     Tanh(Register),
     Atan2(Register, Register),
     Quantise(Register, Register),
-    /// One of two, by a condition.
+    /// One of two registers, selected by a condition.
     Select(usize, Register, Register),
-    /// The one that a condition has chosen.
+    /// The register selected by a condition.
     Copy(Register),
 }
 
-/// `f(a)` of this value and slope. Where the slope is infinite, as that of a root at zero, it is left out: there a limit holds the argument.
+/// `f(a)` from this value and slope. An infinite slope, such as that of a root at zero, is set to zero: a limit keeps the argument there.
 fn slope<T: Scalar>(a: T, value: f64, slope: f64) -> T {
     T::with_slopes(value, [(a, if slope.is_infinite() { 0.0 } else { slope })])
 }
@@ -43,7 +43,7 @@ fn power<T: Scalar>(a: T, b: T) -> T {
     let (x, n) = (a.value(), b.value());
     let value = x.powf(n);
     let finite = |slope: f64| if slope.is_finite() { slope } else { 0.0 };
-    // Below zero only whole powers are numbers, and these do not change.
+    // Below zero only whole powers are defined, and these do not depend on the branch.
     let by_power = if x > 0.0 { value * x.ln() } else { 0.0 };
     T::with_slopes(value, [(a, finite(n * x.powf(n - 1.0))), (b, by_power)])
 }
@@ -74,7 +74,7 @@ fn whole_power<T: Scalar>(a: T, n: i32) -> T {
 }
 
 impl Operation {
-    /// Its result. `extended`: roots, powers and logarithms of what is negative are zero.
+    /// Result of the operation. `extended`: roots, powers and logarithms of negative numbers are zero.
     #[inline(always)]
     pub(super) fn result<T: Scalar>(self, values: &[T], extended: bool) -> T {
         let no_value = |x: f64| extended && x < 0.0;
@@ -121,12 +121,12 @@ impl Operation {
                 T::with_slopes(y.atan2(x), of)
             }
             Self::Quantise(a, b) => {
-                // What is rounded rises as what goes in, on the whole; its steps have no derivative.
+                // A rounded value rises with its argument on average; its steps have no derivative.
                 let value = quantised(values[a].value(), values[b].value());
                 slope(values[a], value, 1.0)
             }
             Self::Copy(a) => values[a],
-            // Which of the two is decided before it is computed.
+            // The condition selects the branch before the branch is computed.
             Self::Select(_, a, _) => values[a],
         }
     }
@@ -158,7 +158,7 @@ impl Operation {
         }
     }
 
-    /// The same with its registers moved.
+    /// The operation with its registers renumbered.
     pub(super) fn with(self, moved: impl Fn(Register) -> Register) -> Self {
         match self {
             Self::Negative(a) => Self::Negative(moved(a)),

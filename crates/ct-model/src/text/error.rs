@@ -1,4 +1,4 @@
-//! What is wrong with a model's text, and where.
+//! Errors in a model's text, with their position.
 
 /// A place in a text, counted from one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,19 +9,19 @@ pub struct Position {
     pub column: usize,
 }
 
-/// A model's text that is refused: one line that says where, what and the mend.
+/// Error in a model's text: one line with the position, the error and the correction.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}:{}: {what}", position.line, position.column)]
 pub struct TextError {
-    /// Where the words begin that are refused.
+    /// Start of the rejected words.
     pub position: Position,
-    /// What is wrong, with the words of the source and the mend.
+    /// The error, with the words of the source and the correction.
     pub what: String,
     /// The line of the source.
     pub source_line: String,
 }
 
-/// Longest piece of the source that a message shows \[characters\].
+/// Longest quotation of the source in a message \[characters\].
 const LONGEST: usize = 60;
 
 impl TextError {

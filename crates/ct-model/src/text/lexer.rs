@@ -8,14 +8,14 @@ pub(crate) enum Word {
     /// A name or a keyword.
     Name(String),
     Number(f64),
-    /// What stands between quotes.
+    /// Text between quotes.
     Text(String),
     /// An operator or a bracket.
     Sign(&'static str),
     End,
 }
 
-/// A word and where it stands \[bytes\].
+/// A word and its position \[bytes\].
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Token {
     pub(crate) word: Word,
@@ -104,7 +104,7 @@ fn refused_character(rest: &str) -> String {
         '\'' => "names in quotes are outside the subset: use letters, digits and `_`",
         '!' | '&' | '|' => "write `not`, `and`, `or`, `<>`",
         _ => {
-            "delete it; names have letters, digits and `_`, other characters may stand in descriptions and comments"
+            "delete it; names have letters, digits and `_`, other characters are allowed in descriptions and comments"
         }
     };
     format!(
@@ -136,7 +136,7 @@ fn number(text: &str) -> usize {
     end
 }
 
-/// What stands between the quotes that a text begins with, and the length with them; `None` where they are not closed.
+/// The text between the quotes at the beginning of `text`, and the length including the quotes; `None` if they are not closed.
 fn quoted(text: &str) -> Option<(String, usize)> {
     let mut all = String::new();
     let mut characters = text.char_indices().skip(1);

@@ -48,12 +48,12 @@ impl ModelSpec {
     /// Reads a model from its text, a flat subset of Modelica (the crate's head says which).
     ///
     /// # Errors
-    /// One line with the place in the text, what is wrong and the mend.
+    /// One line with the place in the text, what is wrong and the correction.
     pub fn parse(text: &str) -> Result<Self, TextError> {
         resolve::resolve(text, parser::parse(text)?)
     }
 
-    /// The same, of a model that is to be simulated from its declared starts: a division by a state that starts at zero is refused.
+    /// Parses a model that is to be simulated from its declared starts: a division by a state that starts at zero is an error.
     ///
     /// # Errors
     /// As [`ModelSpec::parse`].

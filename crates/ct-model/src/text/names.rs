@@ -1,4 +1,4 @@
-//! What each name of a text stands for: parameter, input, state or flow.
+//! Meaning of each name of a text: parameter, input, state or flow.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,22 +12,22 @@ use crate::spec::ModelSpec;
 /// Names that a variable cannot have.
 const RESERVED: [&str; 6] = ["time", "delay", "noEvent", "smooth", "Real", "der"];
 
-/// Whether a name has a meaning of its own.
+/// Whether a name is reserved.
 pub(crate) fn is_reserved(name: &str) -> bool {
     RESERVED.contains(&name) || Function::ALL.iter().any(|f| f.name() == name)
 }
 
-/// What a name stands for. Flows are in the order of the text until they are sorted.
+/// Meanings of names. Flows have the order of the text until they are sorted.
 pub(super) struct Names {
     pub(super) all: BTreeMap<String, Variable>,
     /// Declarations that are flows, and those that are states, by position.
     pub(super) flows: Vec<usize>,
     pub(super) states: Vec<usize>,
-    /// How many flows, the first ones, are of parameters alone.
+    /// Number of flows, at the beginning, that depend on parameters alone.
     pub(super) tied: usize,
 }
 
-/// What the value of a parameter depends on.
+/// Dependence of the value of a parameter.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Tied {
     /// On numbers, constants and measured parameters: it has a value.
@@ -54,7 +54,7 @@ fn each_name<'a>(node: &'a Node, each: &mut impl FnMut(&'a str)) {
     }
 }
 
-/// The variable of `der(x)` where a node is that.
+/// The variable x if a node is `der(x)`.
 fn derivative(node: &Node) -> Option<&str> {
     match &node.kind {
         Kind::Call(function, arguments) if function == "der" => match arguments.as_slice() {
@@ -121,10 +121,7 @@ impl Names {
             let name = declaration.name.as_str();
             let at = |what: String| TextError::at(text, declaration.from, what);
             if is_reserved(name) {
-                let what = format!(
-                    "{} has a meaning of its own: choose another name",
-                    shown(name)
-                );
+                let what = format!("{} is a reserved word: choose another name", shown(name));
                 return Err(at(what));
             }
             let of_fitted = || {
@@ -179,7 +176,7 @@ impl Names {
     }
 }
 
-/// Two names that may be one with a slip: a letter more, less or another, or another case.
+/// Two names that may differ by a typing error: one letter more, less or different, or another case.
 pub(super) fn is_near(a: &str, b: &str) -> bool {
     if a.eq_ignore_ascii_case(b) {
         return true;

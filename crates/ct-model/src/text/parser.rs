@@ -24,7 +24,7 @@ use super::{
     syntax::{Attribute, Declaration, Equation, Kept, Kind, Node, Syntax},
 };
 
-/// Expressions that are deeper than so many operators and brackets are refused.
+/// Expressions with deeper nesting of operators and brackets are rejected.
 const DEEPEST: usize = 200;
 /// The longest text \[bytes\], and the most words in it.
 const LONGEST: usize = 1024 * 1024;
@@ -52,12 +52,12 @@ pub(crate) fn parse(text: &str) -> Result<Syntax, TextError> {
     .model()
 }
 
-/// An expression that stands alone.
+/// Parses a single expression.
 pub(crate) fn parse_expression(text: &str) -> Result<Node, TextError> {
     parse_part(text, |parser| parser.expression())
 }
 
-/// An equation that stands alone, with or without its `;`.
+/// Parses a single equation, with or without its `;`.
 pub(crate) fn parse_equation(text: &str) -> Result<Equation, TextError> {
     parse_part(text, |parser| {
         let (left, right) = parser.sides()?;
@@ -83,14 +83,14 @@ fn parse_part<T>(
     Ok(part)
 }
 
-/// What an operator makes of the parts beside it.
+/// Builds the node of an operator from its two operands.
 type Joins = fn(Box<Node>, Box<Node>) -> Kind;
 
 struct Parser<'a> {
     text: &'a str,
     tokens: Vec<Token>,
     at: usize,
-    /// Expressions within each other.
+    /// Depth of nested expressions.
     brackets: usize,
 }
 
@@ -139,7 +139,7 @@ impl Parser<'_> {
         Err(TextError::at(self.text, self.from(), what))
     }
 
-    /// The word that stands here does not belong here.
+    /// Error: the present word is not allowed here.
     fn unexpected<T>(&self, wanted: &str) -> Result<T, TextError> {
         let found = match self.word() {
             Word::End => "the end of the text".to_string(),
@@ -152,7 +152,7 @@ impl Parser<'_> {
         }
         if self.is_sign("[") || self.is_sign("{") {
             return self.error(format!(
-                "{found}: arrays are outside the subset; give each element a name of its own"
+                "{found}: arrays are outside the subset; declare each element as a separate variable"
             ));
         }
         if self.is_sign(":=") {

@@ -19,12 +19,12 @@ pub(crate) fn resolve(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError
     resolve_with(text, syntax, true, false)
 }
 
-/// The same, and what cannot be simulated from its declared starts is refused.
+/// Resolves a model for simulation: models that cannot be simulated from their declared starts are an error.
 pub(crate) fn resolve_to_simulate(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
     resolve_with(text, syntax, true, true)
 }
 
-/// The text of an effect: it may declare what it does not use.
+/// The text of an effect: unused declarations are allowed.
 pub(crate) fn resolve_effect(text: &str, syntax: Syntax) -> Result<ModelSpec, TextError> {
     resolve_with(text, syntax, false, false)
 }
@@ -60,15 +60,15 @@ struct Builder<'a> {
     text: &'a str,
     names: Names,
     used: BTreeSet<Variable>,
-    /// What is declared has to be used.
+    /// Whether every declared variable has to be used.
     all_used: bool,
-    /// A simulation has to begin at the declared starts.
+    /// The simulation has to begin at the declared starts.
     begins: bool,
     spec: ModelSpec,
 }
 
 impl ModelSpec {
-    /// The flows that each flow needs; a delayed one too, as its present value goes into the delay.
+    /// For each flow, the flows that it depends on; a delay depends on the present value of its argument.
     fn needs(&self) -> Vec<Vec<usize>> {
         let of = |flow: &Flow| {
             let mut needed = Vec::new();
@@ -84,19 +84,19 @@ impl ModelSpec {
         self.flows.iter().map(of).collect()
     }
 
-    /// Sorts the flows anew, after equations have changed; the flows of a circle where there is one.
+    /// Sorts the flows again after a change of equations; returns the flows of a loop if there is one.
     pub(crate) fn sort_flows(&mut self) -> Result<(), Vec<usize>> {
         self.order = sorted(&self.needs())?;
         Ok(())
     }
 }
 
-/// What an expression may hold.
+/// Kinds of variables that an expression may contain.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Holds {
-    /// Numbers and parameters that stand before it; these are not used by it.
+    /// Constants and earlier parameters; the parameters do not count as used.
     Numbers,
-    /// Numbers and parameters that stand before it.
+    /// Constants and earlier parameters.
     Parameters,
     Everything,
 }
@@ -114,7 +114,7 @@ impl Builder<'_> {
     ) -> Result<ModelSpec, TextError> {
         let mut initial = self.initial(initial)?;
         let (mut assigned, mut differential) = self.matched(declarations, &equations)?;
-        // Parameters first: what is declared above may stand in what is declared below.
+        // Parameters first: a later declaration may use an earlier one.
         for declaration in declarations {
             match self.names.all[&declaration.name] {
                 Variable::Parameter(_) => self.parameter(declaration)?,
@@ -124,7 +124,7 @@ impl Builder<'_> {
         }
         for index in self.names.states.clone() {
             let declaration = &declarations[index];
-            // A state is what a derivative is taken of.
+            // A variable with a derivative is a state.
             let Some((coefficient, right)) = differential.remove(&declaration.name) else {
                 continue;
             };
@@ -190,7 +190,7 @@ impl Builder<'_> {
         Ok(self.spec)
     }
 
-    /// A simulation has to begin: no state that starts at zero may be a divisor.
+    /// For a simulation, no state that starts at zero may be a divisor.
     fn starts(&self, declarations: &[Declaration]) -> Result<(), TextError> {
         let Some(division) = start_division(&self.spec) else {
             return Ok(());
@@ -280,7 +280,7 @@ impl Builder<'_> {
             let Kind::Name(name) = &left.kind else {
                 return self.error(
                     left.from,
-                    "on the left stands one variable, or `der(x)`, or `c*der(x)`: solve the equation for it",
+                    "the left side must be one variable, or `der(x)`, or `c*der(x)`: solve the equation for it",
                 );
             };
             match self.names.all.get(name) {
@@ -316,7 +316,7 @@ impl Builder<'_> {
         Ok((assigned, differential))
     }
 
-    /// What is declared and has no part in anything is a mistake more often than not.
+    /// A declared variable that is not used is usually a mistake.
     fn unused(&self, declarations: &[Declaration]) -> Result<(), TextError> {
         for declaration in declarations {
             let variable = self.names.all[&declaration.name];
@@ -347,7 +347,7 @@ impl Builder<'_> {
                     .collect();
                 names.push(names[0]);
                 let what = format!(
-                    "{} depend on each other in a circle: make one of them a state, or solve the equations for it",
+                    "{} form an algebraic loop: make one of them a state, or solve the equations for it",
                     names.join(" -> ")
                 );
                 self.error(froms[circle[0]], what)

@@ -1,6 +1,6 @@
 //! An order in which assignments can be computed.
 
-/// An order in which each comes after what it needs, the first of the text first; or a circle.
+/// A topological order that keeps the order of the text where possible; or a cycle.
 pub(super) fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
     #[derive(Clone, Copy, PartialEq)]
     enum Mark {
@@ -10,7 +10,7 @@ pub(super) fn sorted(needs: &[Vec<usize>]) -> Result<Vec<usize>, Vec<usize>> {
     }
     let mut marks = vec![Mark::New; needs.len()];
     let mut order = Vec::with_capacity(needs.len());
-    // Each with how many of its needs have been looked at: a stack of our own, as a chain may be long.
+    // Each node with the number of its dependencies that are visited. An explicit stack is used because a chain may be long.
     let mut path: Vec<(usize, usize)> = Vec::new();
     for first in 0..needs.len() {
         if marks[first] == Mark::New {

@@ -12,8 +12,8 @@ pub(super) struct StartDivision {
     pub quotient: String,
 }
 
-/// The first division by zero at the declared starts, where a state that starts at zero stands in the divisor. Inputs are not known: what
-/// depends on them is not zero, and of an `if` that depends on them no branch is looked at.
+/// The first division by zero at the declared starts, with a state that starts at zero in the divisor. Inputs are not known: expressions of
+/// inputs count as not zero, and the branches of an `if` that depends on inputs are not checked.
 pub(super) fn start_division(spec: &ModelSpec) -> Option<StartDivision> {
     let parameter = |variable: Variable| match variable {
         Variable::Parameter(i) => spec.parameters[i].value,

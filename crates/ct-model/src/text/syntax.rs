@@ -1,4 +1,4 @@
-//! What a text says, before names are looked up.
+//! Syntax of a model text, before names are resolved.
 
 use crate::expression::{Comparison, Operator};
 
@@ -7,7 +7,7 @@ use crate::expression::{Comparison, Operator};
 pub(crate) struct Node {
     pub(crate) kind: Kind,
     pub(crate) from: usize,
-    /// Nodes above each other, this one included.
+    /// Depth of the tree including this node.
     pub(crate) depth: usize,
 }
 
@@ -45,7 +45,7 @@ impl Node {
     }
 }
 
-/// What a variable is declared as.
+/// Kind of a declared variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kept {
     Constant,
@@ -68,7 +68,7 @@ pub(crate) enum Attribute {
 pub(crate) struct Declaration {
     pub(crate) kept: Kept,
     pub(crate) name: String,
-    /// Where the name stands \[bytes\].
+    /// Position of the name \[bytes\].
     pub(crate) from: usize,
     /// Name, place and value.
     pub(crate) attributes: Vec<(String, usize, Attribute)>,
@@ -76,14 +76,14 @@ pub(crate) struct Declaration {
     pub(crate) description: String,
 }
 
-/// Two sides that are equal.
+/// An equation with its two sides.
 #[derive(Debug, Clone)]
 pub(crate) struct Equation {
     pub(crate) left: Node,
     pub(crate) right: Node,
 }
 
-/// A model as it stands.
+/// Syntax of a model.
 #[derive(Debug, Clone)]
 pub(crate) struct Syntax {
     pub(crate) name: String,

@@ -1,4 +1,4 @@
-//! Units of a text that are no units.
+//! Check of the units in a text.
 
 use ct_signals::Unit;
 
@@ -6,7 +6,7 @@ use super::error::{TextError, shown};
 use super::parser;
 use super::syntax::Attribute;
 
-/// Units that are known as words beside those that are converted. Prefixes of the SI may stand before them.
+/// Units that are known as words, in addition to those that can be converted. SI prefixes are allowed.
 const OTHER: [&str; 33] = [
     "H", "S", "T", "Wb", "F", "C", "cd", "lm", "lx", "Bq", "Gy", "Sv", "kat", "sr", "dB", "B",
     "pH", "mmHg", "inHg", "Torr", "torr", "mmH2O", "inH2O", "mH2O", "cal", "BTU", "Btu", "eV", "M",
@@ -16,8 +16,8 @@ const PREFIXES: [&str; 14] = [
     "da", "n", "u", "\u{b5}", "\u{3bc}", "m", "c", "d", "h", "k", "M", "G", "T", "p",
 ];
 
-/// The words in units of a model's text that are no units, with their places: a slip of the pen as a rule. Such a unit fits everything, so that
-/// nothing is checked or converted by it.
+/// The unknown words in units of a model's text, with their places: usually typing errors. Such a unit is compatible with everything, so it
+/// is not checked or converted.
 ///
 /// # Errors
 /// As [`crate::ModelSpec::parse`].
@@ -44,14 +44,14 @@ pub fn unknown_units(text: &str) -> Result<Vec<TextError>, TextError> {
     Ok(unknown.collect())
 }
 
-/// The first word of a unit that is none.
+/// The first unknown word of a unit.
 fn unknown_word(unit: &str) -> Option<&str> {
     if Unit::parse(unit).is_some() || unit.trim().is_empty() {
         return None;
     }
     let is_letter = |c: char| c.is_alphabetic() || "%°‰_".contains(c);
     let words = unit.split(|c: char| !is_letter(c) && !c.is_ascii_digit());
-    // A power stands behind its unit: `m2`.
+    // A power follows its unit: `m2`.
     let words = words.map(|word| {
         let word = word.trim_start_matches(|c: char| c.is_ascii_digit());
         (word, word.trim_end_matches(|c: char| c.is_ascii_digit()))

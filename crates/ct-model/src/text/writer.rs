@@ -6,7 +6,7 @@ use std::fmt::{self, Display, Formatter};
 use crate::expression::{Comparison, Condition, Expression, Operator, Variable};
 use crate::spec::{About, Given, ModelSpec};
 
-/// How tightly an expression holds together; one that holds less than its place asks for is put in brackets.
+/// Binding strength of an expression; an expression with less strength than its place needs is put in brackets.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Binding {
     Choice,
@@ -20,11 +20,11 @@ enum Binding {
     Primary,
 }
 
-/// An expression or a condition within a model.
+/// An expression or a condition with its model, for printing.
 struct Written<'a, T> {
     spec: &'a ModelSpec,
     part: &'a T,
-    /// What its place asks for.
+    /// Binding strength that the place needs.
     at_least: Binding,
 }
 
@@ -70,7 +70,7 @@ impl Condition {
     }
 }
 
-/// A number as Modelica reads it: the shortest that is the same.
+/// A number in Modelica notation: the shortest text with the same value.
 fn number(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e15 {
         return format!("{value:.0}");
@@ -182,7 +182,7 @@ fn quoted(text: &str) -> String {
     format!("\"{escaped}\"")
 }
 
-/// A description behind a blank; nothing where there is none.
+/// A description after a blank; empty if there is none.
 fn description(text: &str) -> String {
     if text.is_empty() {
         return String::new();
@@ -191,7 +191,7 @@ fn description(text: &str) -> String {
 }
 
 impl ModelSpec {
-    /// States and flows in an order that keeps that of the states, that of the flows and that of the outputs.
+    /// States and flows in an order that is consistent with the orders of states, flows and outputs.
     fn declared(&self) -> Vec<Variable> {
         let states = (0..self.states.len()).map(Variable::State);
         let of_time = |i: &usize| !self.flows[*i].of_parameters;
@@ -251,7 +251,7 @@ impl Display for ModelSpec {
                 Variable::Parameter(i) => self.parameters[i].value,
                 _ => f64::NAN,
             };
-            // A value that was changed is no longer what the text computes.
+            // A changed value no longer equals the formula in the text.
             let same = |definition: &&Expression| definition.value(0.0, &of) == parameter.value;
             let value = match parameter.definition.as_ref().filter(same) {
                 Some(definition) => self.write(definition),

@@ -1,5 +1,5 @@
-//! Effects at the ports of models: every one at every port is added, gives the outputs of the model without it where it is absent, and has
-//! the derivatives that differences have.
+//! Effects at the ports of models: every effect at every port is added, gives the outputs of the original model at its absent value, and
+//! has derivatives that agree with differences.
 
 mod driven;
 
@@ -69,7 +69,7 @@ fn all_candidates_are_listed_with_their_ports() {
     assert!((40..=200).contains(&tanks.len()), "{}", tanks.len());
     assert!(tanks.iter().any(|c| c.id == "coupling(h1,h2)"));
     assert!(tanks.iter().any(|c| c.id == "input_to(u,h2)"));
-    // A position has no balance, but an end stop.
+    // A position has no balance, but it can have an end stop.
     let spring = Driven::all()[1].candidates();
     let has = |all: &[Candidate], id: &str| all.iter().any(|c| c.id == id);
     assert!(has(&spring, "coulomb(v)") && !has(&spring, "coulomb(s)"));
@@ -91,7 +91,7 @@ fn an_absent_effect_changes_nothing() {
         for candidate in driven.with_shapes() {
             let mended = Model::new(apply(&driven.spec, &[&candidate]).unwrap());
             let with = driven.run(&mended, &mended.parameters());
-            // Steps follow their error, to which new states and branches contribute.
+            // The step size depends on the estimated error, to which new states and branches contribute.
             let exact = [&base, &mended].map(|model| driven.method(model) == Method::Exact);
             let allowed = if exact == [true, true] { 1e-12 } else { 1e-9 };
             let difference = largest_difference(&with, &without) / range(&without);
@@ -170,7 +170,7 @@ fn check_derivatives(driven: &Driven, candidate: &Candidate, at: &[f64], toleran
             .collect();
         let exact = driven.run(&model, &duals);
         let typical = own.starts.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        // Of a limit a row may be near: a short step.
+        // Near a limit, a short step.
         let share = if own.role == Role::Threshold {
             1e-5
         } else {
@@ -228,7 +228,7 @@ fn derivatives_where_the_effect_is_absent_are_those_of_differences() {
     }
 }
 
-/// Some of all pairs: those of the first candidates of every place with all others.
+/// A selection of pairs: the first candidates of every place with all others.
 #[test]
 fn effects_compose_in_any_order() {
     for driven in Driven::all() {
@@ -335,7 +335,7 @@ fn every_number_of_a_record_that_a_text_is_written_in_is_known() {
         let expected: Vec<&str> = names.into_iter().filter(written).collect();
         assert_eq!(effect.record_numbers(), expected, "{}", effect.id);
     }
-    // By its begin an effect is known to follow time.
+    // The start of the record among its numbers marks an effect as a function of time.
     let spec = ModelSpec::parse(BLOCK).unwrap();
     let all = candidates(&spec, &Visited::nominal(&spec));
     for (id, follows) in [
@@ -369,7 +369,7 @@ fn an_effect_keeps_the_numbers_of_the_record_that_it_was_written_in() {
         find(all.clone(), "drift(y)").record_numbers["duration"],
         250.0
     );
-    // Half the kept duration behind the kept begin it has moved by half of its change, whatever this record visits.
+    // At the kept start plus half of the kept duration, half of the change is reached, whatever range this record visits.
     let reading = |candidate: &Candidate| {
         let mut mended = apply(&spec, &[candidate]).unwrap();
         let change = mended

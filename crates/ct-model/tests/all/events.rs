@@ -1,4 +1,4 @@
-//! What changes its branch: outputs against an adaptive solver or a fine reference, derivatives against central differences.
+//! Models with branches: outputs against an adaptive solver or a fine reference, derivatives against central differences.
 
 use ct_model::{Dual, Method, Scalar};
 
@@ -25,7 +25,7 @@ equation
   der(s) = ({term}) - 0.2*s;
 end Swinging;"#
     );
-    // Held for a second and a bit, so that rows and turning points are at different times.
+    // Held for slightly more than a second, so that rows and turning points are at different times.
     Case::new(&text, 60, 1.13, |k| {
         vec![f64::from(u8::from(k / 9 % 2 == 0))]
     })
@@ -72,11 +72,12 @@ end Behind;"#;
     case.check_derivatives(1e-5);
 }
 
-/// `tau x' = K u(t - d) - x`, `4 w' = x(t - e) - w - 0.1 w^2` by the classical Runge-Kutta method in steps that divide rows and both delays.
+/// `tau x' = K u(t - d) - x`, `4 w' = x(t - e) - w - 0.1 w^2` by the classical Runge-Kutta method in steps that divide rows and both
+/// delays.
 fn late_reference(inputs: &[f64], parts: usize, (d, e): (usize, usize)) -> Vec<f64> {
     let h = 1.0 / parts as f64;
     let (k, tau) = (2.0, 7.0);
-    // Half steps, so that the middle of a step is there.
+    // Half steps, so that the middle of a step is available.
     let (mut x, mut w) = (vec![1.0_f64], 1.0_f64);
     let input = |half: isize| {
         let row = half.div_euclid(2 * parts as isize).max(0) as usize;
@@ -132,7 +133,7 @@ end Late;"#;
     }
 }
 
-/// Time constants of 1 ms and of 1000 s side by side, rows at the pace of each: both have a closed form.
+/// Time constants of 1 ms and of 1000 s together, with rows at both rates: both have an analytic solution.
 #[test]
 fn fast_and_slow_side_by_side() {
     let text = r#"
@@ -213,7 +214,7 @@ fn drive(k: usize) -> f64 {
     0.9 * (0.11 * k as f64).sin() + if k % 40 < 20 { 0.4 } else { 0.0 }
 }
 
-/// The arm from turning point to turning point, between which it swings about one side's equilibrium.
+/// The arm between its turning points, where it oscillates about the equilibrium of one side.
 fn arm_reference(inputs: &[f64], step: f64) -> Vec<[f64; 2]> {
     let (f, k, j) = (0.5, 0.8, 0.7);
     let omega = f64::sqrt(k / j);
@@ -270,7 +271,8 @@ fn an_arm_that_friction_holds() {
     case.check_derivatives(1e-5);
 }
 
-/// What slides along a guard of any kind: at rest from the start, along an input that moves, along a curve, behind a delay, on two at once.
+/// Sliding modes along guards of any kind: at rest from the start, along an input that changes, along a curve, after a delay, on two guards
+/// at once.
 #[test]
 fn states_that_slide() {
     let frame = |more: &str, equations: &str, outputs: &str| {
@@ -324,7 +326,7 @@ fn states_that_slide() {
         ),
     ] {
         println!("{name}");
-        // By differences of a longer step where the model is stiff.
+        // With differences of a longer step if the model is stiff.
         let share = if name == "a fast sensor" { 2e-4 } else { 1e-5 };
         let text = frame(more, equations, plain);
         for lines in [false, true] {

@@ -1,4 +1,4 @@
-//! What the subset means.
+//! Meaning of the language subset.
 
 use ct_model::{Expression, Given, Linearity, Model, ModelSpec, Simulation, Variable};
 
@@ -128,7 +128,7 @@ fn parameters_that_others_define_follow_them() {
          final parameter Real A = pi*d^2/4; parameter Real h = 2; parameter Real h2 = 3*h;
          final parameter Real V = A*h; input Real u; output Real y = u*V + h2;",
     );
-    // Of measured ones a value, of fitted ones an expression.
+    // A measured parameter is a value, a fitted one an expression.
     assert!((spec.parameters[2].value - 3.25 * 0.01).abs() < 1e-12);
     assert_eq!(
         (spec.parameters[4].value, spec.parameters[4].given),
@@ -197,8 +197,8 @@ fn linear_models_are_told_from_their_text() {
     assert_ne!(spec.linearity(), Linearity::Linear);
 }
 
-/// Each parameter reads the one before twice: what is computed anew at each reading takes twice as long with each line, and a test of 200 lines
-/// would not end.
+/// Each parameter uses the preceding one twice: computing it again for each use would double the time with each line, and a test of 200
+/// lines would not end.
 #[test]
 fn a_long_chain_of_parameters_is_compiled_in_one_pass() {
     let chain: String = (1..=200)

@@ -1,4 +1,4 @@
-//! The models that users begin from, driven as in their records: against an adaptive solver, and their derivatives.
+//! The example models with the inputs of their records: compared with an adaptive solver, and their derivatives with differences.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! One program for all tests.
+//! A single test program.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod effects;

@@ -1,4 +1,4 @@
-//! Plays, rounding, and states that the first row settles.
+//! Backlash, rounding, and states whose initial value follows from the first row.
 
 use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation, SimulationNumber};
 
@@ -40,9 +40,9 @@ fn a_play_follows_at_a_distance() {
     let u = [2.0, 2.5, 4.0, 3.0, 2.0, 1.5, 6.0];
     let (y, _) = run(&play, &[1.0], &u, false);
     assert_eq!(y, [2.0, 2.0, 3.0, 3.0, 3.0, 2.5, 5.0]);
-    // Of no width it is not there, ...
+    // With width zero the backlash is absent, ...
     assert_eq!(run(&play, &[0.0], &u, false).0, u);
-    // ... and the derivative says on which side it is in contact.
+    // ... and the derivative shows the side of contact.
     let (y, _) = run(&play, &[Dual::<2>::variable(1.0, 0)], &u, false);
     let slopes: Vec<f64> = y.iter().map(|y| y.eps[0]).collect();
     assert_eq!(slopes, [0.0, 0.0, -1.0, -1.0, -1.0, 1.0, -1.0]);
@@ -57,7 +57,7 @@ fn a_play_meets_its_contact_within_an_interval() {
     equation
       der(x) = play(u, b) + 0*x^2;
     end Wheel;";
-    // From 0 to 3 in a straight line: contact at u = 1, after a third of the interval; back to 0: at u = 1 again.
+    // From 0 to 3 in a straight line: contact at u = 1, after a third of the interval; back to 0: contact at u = 1 again.
     let u = [0.0, 3.0, 0.0];
     let (x, method) = run(&model(text), &[1.0], &u, true);
     assert_eq!(method, Method::Explicit);
@@ -113,7 +113,7 @@ end Lag;
     for x in x {
         assert!((x - 15.0).abs() < 1e-12, "{x}");
     }
-    // It moves with the parameters that it is made of.
+    // The contact depends on the parameters of its expression.
     let parameters = [Dual::<2>::variable(3.0, 0), Dual::constant(2.0)];
     let (x, _) = run(&own, &parameters, &[5.0, 5.0], false);
     assert!((x[0].eps[0] - 5.0).abs() < 1e-12 && (x[1].eps[0] - 5.0).abs() < 1e-12);

@@ -55,7 +55,7 @@ const PIECES: [&str; 32] = [
     "output ",
 ];
 
-/// A cut, a doubled part, or a piece put in, at a place.
+/// A deletion, a duplication, or an insertion at a place.
 fn change() -> impl Strategy<Value = (u8, f64, usize, usize)> {
     (0..3_u8, 0.0..1.0, 1..12_usize, 0..PIECES.len())
 }

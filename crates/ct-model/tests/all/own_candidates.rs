@@ -130,7 +130,7 @@ fn the_size_is_found_where_it_is_hidden() {
         &[("loss", "u*T/(2 + T + ki*T^2) - u*T/(2 + T)")],
     );
     assert_eq!(sizes(&inhibited), ["ki"]);
-    // ... several terms with one each, ...
+    // ... several terms with one size each, ...
     let two = own(
         &[("a", 1.0), ("b", 2.0), ("p", 3.0)],
         &[("T", "a*u*p + b*(T - Ta)")],
@@ -206,7 +206,7 @@ fn what_is_wrong_is_said_with_its_place() {
     store.states.insert("Tw".to_string(), state);
     refused(
         &store,
-        "radiation.states.Tw.equation: 1:1: on the left of this equation stands `der(Tw)`",
+        "radiation.states.Tw.equation: 1:1: the left side of this equation must be `der(Tw)`",
     );
     let error = own_candidate(&block(), "lag(u)", &own(&e, &[("T", "-e*T")])).unwrap_err();
     assert!(error.to_string().contains("letters, digits"), "{error}");
@@ -226,7 +226,7 @@ fn two_candidates_that_are_the_same_are_refused() {
     assert_eq!(own_candidates(&block(), &all).unwrap().len(), 1);
 }
 
-/// A store whose exchange with the block has no values at which it is absent: its resistance is a divisor.
+/// A store whose exchange with the block has no absent value: its resistance is a divisor.
 fn pair() -> OwnCandidate {
     let mut pair = own(&[("C1", 100.0), ("R1", 2.0)], &[("y", "-v1")]);
     let state = OwnState {
@@ -248,7 +248,7 @@ fn a_candidate_whose_absence_is_a_limit_is_scored_with_a_factor() {
     let factor = &scored.parameters[2];
     assert_eq!((factor.role, factor.absent), (Role::Size, 0.0));
     assert_eq!(factor.bounds, (0.0, f64::INFINITY));
-    // The factor is in the model of the score alone.
+    // The factor is only in the model for the score.
     let text = apply(&block, &[&scored]).unwrap().to_string();
     assert!(
         text.contains("y = y_true + pair_factor*(-pair_v1);"),
@@ -257,7 +257,7 @@ fn a_candidate_whose_absence_is_a_limit_is_scored_with_a_factor() {
     let text = apply(&block, &[&candidate]).unwrap().to_string();
     assert!(text.contains("y = y_true - pair_v1;"), "{text}");
     assert!(!text.contains("factor"), "{text}");
-    // What its own parameters take out of the model needs none.
+    // A parameter that removes a part of the model needs no size.
     let size = own(&[("e", 1.0)], &[("T", "-e*T")]);
     let size = own_candidate(&block, "radiation", &size).unwrap();
     assert_eq!(size.with_factor(&block), None);

@@ -1,4 +1,4 @@
-//! What is refused: one line with place, words and mend.
+//! Rejected texts: one line with position, words and correction.
 
 use ct_model::ModelSpec;
 
@@ -83,10 +83,10 @@ fn definitions() {
     refuses(
         "  Real a = b; Real b = c; Real c = a;",
         8,
-        "a -> b -> c -> a depend on each other",
+        "a -> b -> c -> a form an algebraic loop",
         "make one of them a state",
     );
-    refuses("  Real a = a;", 8, "a -> a depend on each other", "");
+    refuses("  Real a = a;", 8, "a -> a form an algebraic loop", "");
     refuses(
         "  parameter Real p = 1;",
         18,
@@ -124,7 +124,7 @@ fn definitions() {
     );
     refuses_text(
         "model M\n input Real u;\n output Real y;\nequation\n y + u = 1;\nend M;",
-        "5:2: on the left stands one variable",
+        "5:2: the left side must be one variable",
         "solve the equation for it",
     );
     refuses_text(

@@ -6,7 +6,7 @@ use ct_model::{
 };
 use proptest::prelude::*;
 
-/// How many of each kind there are, and which flows an expression may hold.
+/// Number of variables of each kind, and the flows that an expression may contain.
 #[derive(Debug, Clone, Copy)]
 struct Site {
     parameters: usize,
@@ -156,7 +156,7 @@ fn model() -> impl Strategy<Value = ModelSpec> {
                             about,
                             value,
                             definition: None,
-                            // What flows of parameters depend on is fitted.
+                            // Parameters on which flows of parameters depend are fitted.
                             given: if i == 0 { Given::Fitted } else { given },
                         }
                     },
@@ -178,7 +178,7 @@ fn model() -> impl Strategy<Value = ModelSpec> {
                         fixed,
                     })
             };
-            // Each holds those before it.
+            // Each flow contains the earlier ones.
             let flow = move |i: usize| {
                 let of_parameters = i < tied;
                 let value = if of_parameters {
@@ -195,7 +195,7 @@ fn model() -> impl Strategy<Value = ModelSpec> {
                 (about(format!("q{i}")), value).prop_map(move |(about, value)| Flow {
                     about,
                     value: if of_parameters {
-                        // It depends on a fitted one whatever else it holds.
+                        // The expression depends on a fitted parameter, whatever else it contains.
                         let own = Expression::Variable(Variable::Parameter(0));
                         Expression::Binary(Operator::Add, own.into(), value.into())
                     } else {
@@ -215,7 +215,7 @@ fn model() -> impl Strategy<Value = ModelSpec> {
                 last,
             )
                 .prop_map(move |(parameters, inputs, states, mut flows, last)| {
-                    // The output holds everything, so that nothing is unused.
+                    // The output contains everything, so that nothing is unused.
                     let count = flows.len();
                     let all = (0..parameters.len())
                         .map(Variable::Parameter)

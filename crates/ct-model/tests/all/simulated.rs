@@ -96,7 +96,7 @@ equation
   der(v) = -w2*sin(phi) - c*v - 0.02*v*abs(v) + b*u;
 end Pendulum;"#;
 
-/// Linear, and the derivative of one state is another one alone.
+/// A linear model in which the derivative of one state is another state.
 const SPRING: &str = r#"model Spring
   parameter Real g = 0.8;
   parameter Real c = 0.4;
@@ -172,12 +172,12 @@ fn a_root_or_a_power_above_a_limit_that_is_crossed_goes_on() {
                der(x) = u - 0.4*x - a*{term};
              end Hole;"
         );
-        // Over the limit from above and from below, again and again.
+        // The signal crosses the limit from above and from below repeatedly.
         let case = Case::new(&text, 60, 0.7, |k| vec![[0.2, 0.9][k / 6 % 2]]);
         let (rows, _) = case.plain();
         let low = rows.iter().map(|y| y[0]).fold(f64::INFINITY, f64::min);
         assert!(low < 0.8 && low > 0.0, "{term}: {low}");
-        // Steps follow the error of the values; the slope of a root is infinite where it ends.
+        // The step size depends on the error of the values; the slope of a root is infinite at its end.
         case.check_derivatives(if term.contains("1.5") { 1e-6 } else { 1e-3 });
     }
 }
@@ -200,7 +200,7 @@ fn functions_of_held_inputs_and_readings_of_any_kind_are_exact() {
     let (exact, method) = case.plain();
     assert_eq!(method, Method::Exact);
     case.check_derivatives(1e-6);
-    // The same in steps, with a state that is not linear and plays no part.
+    // The same with held inputs, and an additional nonlinear state without influence.
     let steps = text.replace(
         "equation",
         "Real z(start=0.1); equation der(z) = -z^2 - k*z; ",
@@ -210,7 +210,7 @@ fn functions_of_held_inputs_and_readings_of_any_kind_are_exact() {
     for (own, other) in exact.iter().zip(&rows) {
         assert!((own[0] - other[0]).abs() < 1e-8, "{own:?} {other:?}");
     }
-    // In straight lines they are not, and steps go on.
+    // With linear inputs they are not exact, and the simulation takes steps.
     case.lines = true;
     let (_, method) = case.plain();
     assert_eq!(method, Method::Explicit);
@@ -327,7 +327,7 @@ fn a_delay_lets_jumps_through_when_they_are_due() {
         let expected = if k > 12 { -1.0 } else { 0.0 };
         assert!((row[0].eps[0] - expected).abs() < 1e-12, "row {k}");
     }
-    // No delay at all has the same derivative.
+    // A delay of zero has the same derivative.
     let (rows, _) = case.run(&[Dual::<2>::variable(0.0, 0)], &[Dual::constant(0.0)]);
     assert!((rows[20][0].re - 10.0).abs() < 1e-12 && (rows[20][0].eps[0] + 1.0).abs() < 1e-12);
 }

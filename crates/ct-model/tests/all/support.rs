@@ -3,7 +3,7 @@
 use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation, SimulationNumber};
 use ode_solvers::{DVector, Dopri5, System, dop_shared::OutputType};
 
-/// A model and what drives it: rows of inputs, held or in straight lines.
+/// A model with its inputs: rows, held or linear between them.
 pub struct Case {
     pub model: Model,
     pub time: Vec<f64>,
@@ -63,8 +63,8 @@ impl Case {
         self.check_derivatives_by(1e-5, tolerance);
     }
 
-    /// The same by differences of another share of each entry: the outputs of a stiff model are good to 1e-10, and a shorter step shows
-    /// their error; through events a longer one moves one across a row.
+    /// Checks derivatives with differences of another share of each entry: the outputs of a stiff model are accurate to 1e-10, and a
+    /// shorter step would show their error; a longer step would move an event across a row.
     pub fn check_derivatives_by(&self, share: f64, tolerance: f64) {
         const LANES: usize = 15;
         let parameters = self.model.parameters();
@@ -96,7 +96,7 @@ impl Case {
                     (8.0 * (p[k][output] - m[k][output]) - (p2[k][output] - m2[k][output]))
                         / (12.0 * step)
                 };
-                // What acts by less than a tenth when it doubles shows the error of the outputs alone.
+                // If doubling an entry changes the output by less than a tenth, the difference shows only the error of the outputs.
                 let visited = exact.iter().map(|y| y[output].re.abs()).fold(0.0, f64::max);
                 let largest = (0..exact.len())
                     .map(|k| difference(k).abs())
@@ -181,7 +181,7 @@ fn outside(case: &Case) -> Vec<Vec<f64>> {
         } else {
             held
         };
-        // Its test for stiffness takes corners for it: it is switched off.
+        // The solver's stiffness test reacts to corners: it is switched off.
         let (h, most) = ((end - begin) / 20.0, 200_000);
         let mut solver = Dopri5::from_param(
             system(rise),

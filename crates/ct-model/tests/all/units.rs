@@ -4,7 +4,7 @@ use std::path::Path;
 
 use ct_model::{ModelSpec, unit_warnings};
 
-/// What is said of a heated block with these words changed.
+/// Warnings for a heated block after a replacement in its text.
 fn said(from: &str, to: &str) -> Vec<String> {
     let text = r#"model Block
   parameter Real C(unit="J/K") = 50;
@@ -31,7 +31,7 @@ end Block;"#;
 #[test]
 fn units_that_fit_are_not_spoken_of() {
     assert_eq!(said("C", "C"), Vec::<String>::new());
-    // What has no unit fits everything, and sizes may differ.
+    // A variable without unit fits everything, and sizes may differ.
     assert_eq!(said("k(unit=\"W/K\")", "k"), Vec::<String>::new());
     assert_eq!(
         said("k(unit=\"W/K\")", "k(unit=\"bananas\")"),
@@ -69,7 +69,7 @@ fn both_sides_are_named() {
     );
 }
 
-/// The models beside the checkout are read, written, read again, and their units fit.
+/// The models next to the checkout are read, written and read again, and their units are consistent.
 #[test]
 fn models_of_the_domains() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/domains/public");

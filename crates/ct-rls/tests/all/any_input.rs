@@ -1,4 +1,4 @@
-//! Whatever numbers come in, the estimates stay finite and `P` positive definite.
+//! For any input, the estimates stay finite and `P` positive definite.
 
 use ct_rls::{
     BlockIntegrator, ContinuousRls, Directional, Error, Euler, ExactHold, Guards, Integrator,
@@ -94,7 +94,7 @@ fn sound<const P: usize, I: Integrator>(
     }
     match rls.health() {
         Ok(health) => prop_assert!(health.smallest_pivot > 0.0, "{health:?}"),
-        // the two rules that are there to compare with say so
+        // the two rules for comparison may report this
         Err(Error::EulerLimit { .. } | Error::LostDefiniteness { .. }) => {
             let name = std::any::type_name::<I>();
             prop_assert!(name.ends_with("Euler") || name.ends_with("Rk4"));

@@ -26,7 +26,7 @@ impl System<f64, State<f64, 5>> for Shares {
     }
 }
 
-/// How far `theta_i` moves along `k_i`, by an adaptive solver.
+/// Change of `theta_i` along `k_i`, by an adaptive solver.
 fn reference(weights: [Weights; 2], s: [f64; 2], epsilon: f64, dt: f64) -> [f64; 2] {
     let start = State::<f64, 5>::from([epsilon, s[0], s[1], 0.0, 0.0]);
     let rate: f64 = (0..2)
@@ -73,7 +73,7 @@ fn worst(weights: [Weights; 2], size: [f64; 2], dt: f64) -> f64 {
         let innovation = update_blocks((&mut one, &phi1), (&mut two, &phi2), epsilon, dt);
         assert!(innovation.outcome.used());
         assert!((innovation.s - size[0] - size[1]).abs() < 1e-9 * innovation.s);
-        // P moves as that of a block alone
+        // P changes as for a single block
         alone.update(&ct_rls::Sample { phi: phi1, y: 0.0 }, dt);
         assert_eq!(alone.factor(), one.factor());
         alone2.update(&ct_rls::Sample { phi: phi2, y: 0.0 }, dt);

@@ -266,7 +266,7 @@ fn a_weak_regressor_does_not_raise_p_above_the_cap() {
     )
     .and_then(|rls| rls.with_guards(guards))
     .unwrap();
-    // 0.1/50 = 0.002 is the squared length that the cap asks for
+    // 0.1/50 = 0.002 is the squared length at the cap
     for k in 0..200_000 {
         let truth = 1.0 + f64::from(k) * 1e-5;
         let outcome = rls.update(&Sample::new([1.0, 0.0], truth), 0.5).outcome;

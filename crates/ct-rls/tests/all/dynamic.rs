@@ -1,4 +1,4 @@
-//! The twin for sizes known at run time gives the same numbers.
+//! The variant for sizes known at run time gives the same numbers.
 
 use crate::support::{normal, normals, rng, spd};
 use ct_rls::{
@@ -155,7 +155,7 @@ fn estimates_can_be_replaced() {
     assert_eq!(rls.theta().as_slice(), [3.0, 4.0]);
 }
 
-/// A parameter that walks and is not excited is held by the cap for sizes known at run time too.
+/// A parameter with a random walk and without excitation is limited by the cap for sizes known at run time too.
 #[test]
 fn a_walk_grows_to_the_cap_and_no_further() {
     let weights = Weights::least_squares(0.0).unwrap();

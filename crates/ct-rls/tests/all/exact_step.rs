@@ -155,7 +155,7 @@ fn reaches_the_closed_form() {
     assert!(off < 1e-10, "P: {off:e}");
 }
 
-/// The general gain runs into that for `gamma = c` and for `gamma = 0` without a seam.
+/// The general formula is continuous at `gamma = c` and at `gamma = 0`.
 #[test]
 fn gains_have_no_seam() {
     let run = |gamma: f64, size: f64| {

@@ -133,7 +133,7 @@ fn a_reset_follows_a_jump() {
     assert!(learn(&mut rls, jumped, 20) < 1e-3);
 }
 
-/// After a jump, and without a reset, old data count for less and less: `V` falls to `e^{-eta t}` of what the jump made it.
+/// After a step change without a reset, old data are forgotten: `V` falls to `e^{-eta t}` of its value after the step.
 #[test]
 fn forgetting_follows_a_jump() {
     let mut rng = rng(12);
@@ -313,7 +313,7 @@ fn a_relaxation_beyond_the_floating_point_range_is_refused() {
     assert_eq!(rls.relax(&SVector::zeros(), 1.0, 1.0), Some(1.0));
 }
 
-/// Below the rounding of its entries a pivot is no number: positive, and yet nothing that is known of the matrix.
+/// Below the rounding error of its entries, a pivot is positive but has no significant digits.
 #[test]
 fn a_start_that_is_singular_to_rounding_is_refused() {
     let weights = Weights::least_squares(0.0).unwrap();
@@ -340,7 +340,7 @@ fn a_forgetting_factor_is_the_same_memory_in_seconds() {
     }
 }
 
-/// The cap holds whatever the rule that `P` is integrated by.
+/// The cap is enforced for every integration rule of `P`.
 #[test]
 fn the_trace_stays_at_its_cap_for_the_textbooks_rules_too() {
     fn capped<I: ct_rls::Integrator>() {

@@ -5,7 +5,7 @@ use ct_rls::{ContinuousRls, Error, Guards, RecursiveEstimator, Sample, UdFactor,
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
-/// One step: `V` before, after, and as it is predicted; and what rounding can do to it.
+/// One step: `V` before, after, and as predicted; and the influence of rounding.
 struct Fall {
     before: f64,
     after: f64,
@@ -67,7 +67,7 @@ fn fall<const P: usize>(case: Case) -> Vec<Fall> {
                 -(exponent * (gamma * length * s).ln_1p()).exp_m1()
             };
             let predicted = (-x).exp() * (before - innovation.epsilon.powi(2) * gone / s);
-            // theta, on both sides, is known to some units in the last place of what it was made from, and so far V and eps are blurred
+            // theta has an accuracy of some units in the last place on both sides, which limits the accuracy of V and eps
             let unit = 4.0 * f64::EPSILON * (theta.norm() + start + rls.theta().norm());
             let blur = |v: f64, information: f64| {
                 2.0 * unit * (information * v).sqrt() + unit * unit * information
@@ -158,7 +158,7 @@ fn a_gamma_of_twice_c_or_more_is_refused() {
     assert!(Weights::new(1.0, 1.999_999, 0.0).is_ok());
 }
 
-/// The exact step written out for any gamma: with 3 c, the Lyapunov function grows by what the equation says.
+/// The exact step for any gamma: with 3 c, the Lyapunov function grows as the equation predicts.
 #[test]
 fn such_a_gamma_would_let_the_lyapunov_function_grow() {
     let mut rng = rng(5);

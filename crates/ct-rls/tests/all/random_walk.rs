@@ -101,7 +101,7 @@ fn reference(
     (theta, p)
 }
 
-/// Of first order: half the step, half the difference; the extrapolation of both meets the equation to 1e-6. Exact while silent.
+/// First order: half the step, half the difference; the extrapolation of both satisfies the equation to 1e-6. Exact without excitation.
 #[test]
 fn agrees_with_its_equation() {
     let mut rng = rng(3);
@@ -137,7 +137,7 @@ fn agrees_with_its_equation() {
     }
 }
 
-/// What is silent grows by `q` a second, and by no more than the cap; the cap does not end the tracking of the rest.
+/// A direction without excitation grows by `q` per second, up to the cap; the cap does not end the tracking of the others.
 #[test]
 fn a_silent_direction_grows_to_the_cap() {
     let mut rng = rng(4);
@@ -203,8 +203,8 @@ proptest! {
         }
     }
 
-    /// After a step along one axis its variance is at most what the data of the step leave, `1/(gamma h phi^2)`, and no parameter's
-    /// is less than what its walk and they leave.
+    /// After a step along one axis, its variance is at most that from the data of the step, `1/(gamma h phi^2)`, and no parameter's
+    /// variance is below that from its walk and the data.
     #[test]
     fn one_parameter_stays_between_its_bounds(
         q in (-6.0..6.0).prop_map(|x: f64| 10_f64.powf(x)),

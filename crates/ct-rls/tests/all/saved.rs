@@ -1,4 +1,4 @@
-//! A saved estimator goes on as if nothing had been, and what is broken is not restored.
+//! A restored estimator continues with identical results, and damaged data are not restored.
 
 use crate::support::{normal, normals, rng, spd};
 use ct_rls::{
@@ -31,7 +31,7 @@ fn twins<I: FactoredIntegrator>(guards: Guards) -> (ContinuousRls<P, I>, Dynamic
     )
 }
 
-/// Both go on for some samples, a NaN among them; a low cap and silence are met.
+/// Both continue for some samples, a NaN among them; a low cap and a silent regressor occur.
 fn run<I: FactoredIntegrator>(
     fixed: &mut ContinuousRls<P, I>,
     dynamic: &mut DynamicRls<I>,
@@ -87,7 +87,7 @@ fn goes_on<I: FactoredIntegrator>(
         assert_eq!(dynamic.health(), dynamic_again.health());
         assert_eq!(fixed.guards(), fixed_again.guards());
 
-        // Each kind of size reads the other's.
+        // Estimators with fixed and with dynamic size read each other's saved state.
         let dynamic: DynamicRls<I> = from_value(to_value(&fixed).unwrap()).unwrap();
         let fixed: ContinuousRls<P, I> = from_value(to_value(&dynamic).unwrap()).unwrap();
         assert_eq!(fixed.theta(), fixed_again.theta());

@@ -15,7 +15,7 @@ fn estimator<const P: usize>() -> ContinuousRls<P> {
     ContinuousRls::new(SVector::zeros(), SMatrix::identity() * 1e3, weights).unwrap()
 }
 
-/// Regressors of each phase: how far the other entries are from the first.
+/// Regressors of each phase: ratio of the other entries to the first.
 fn regressor<const P: usize>(rng: &mut ChaCha8Rng, collinear: f64) -> SVector<f64, P> {
     let phi: SVector<f64, P> = normals(rng);
     let apart = collinear.min(1.0);
@@ -109,7 +109,7 @@ fn nearly_collinear_from_the_start() {
         // the smallest eigenvalue of P is below its smallest pivot
         let reached = health.trace / (P as f64 * health.smallest_pivot);
         assert!(reached > condition, "{P} {apart:e}: {reached:e}");
-        // the sum is known, the differences hardly
+        // the sum is known, the differences are nearly unknown
         assert!((rls.theta().sum() - theta.sum()).abs() < 1e-6);
         learn(&mut rls, 1.0, 5_000);
         let off = (rls.theta() - theta).norm();
@@ -123,7 +123,7 @@ fn nearly_collinear_from_the_start() {
     }
 }
 
-/// What a short test does not see: unit Gaussian regressors, no noise, nothing ill about the data.
+/// Failure that a short test does not show: unit Gaussian regressors, no noise, well-conditioned data.
 #[test]
 fn the_textbook_dies_on_healthy_data() {
     fn died<const P: usize>(seed: u64) -> u32 {

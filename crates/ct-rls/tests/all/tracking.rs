@@ -23,7 +23,7 @@ fn directional_forgetting_tracks_beside_a_silent_direction() {
         run.drifting.iter().all(|x| *x > 0.0 && *x < 0.03),
         "{run:?}"
     );
-    // what was known of the silent one is kept
+    // the information about the parameter without excitation is kept
     assert!(run.constant < 0.03, "{run:?}");
     assert!(run.largest < 100.0 && run.smallest_pivot > 0.1, "{run:?}");
     assert_eq!(run.capped, 0);

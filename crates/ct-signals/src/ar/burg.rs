@@ -59,8 +59,8 @@ impl ArModel {
         Ok(best.map_or_else(|| ArModel::white(0.0), |(_, model)| model))
     }
 
-    /// The autoregression behind a system that is known, of which samples may be missing (NaN): at the maximum of the exact likelihood of those that are there, its
-    /// order by the criterion of [`ArModel::fit`].
+    /// The autoregression after a system that is known, of which samples may be missing (NaN): at the maximum of the exact likelihood of
+    /// those that are there, its order by the criterion of [`ArModel::fit`].
     ///
     /// `process` makes the process of both, from an autoregression whose innovations have variance 1 and the segment's number.
     ///
@@ -93,11 +93,11 @@ fn largest_order(asked: usize, samples: usize) -> Result<usize, Error> {
     Ok(asked.min(samples / SAMPLES_PER_COEFFICIENT))
 }
 
-/// What Burg's recursion gives of each order.
+/// Results of Burg's recursion for each order.
 struct Burg {
     /// `k_1, k_2, ...`, fewer than asked for when the errors reach 0.
     reflections: Vec<f64>,
-    /// Of order 0, 1, ...: the whitened series' sum of squares, the first samples' with the predictors that they have.
+    /// For orders 0, 1, ...: the sum of squares of the whitened series. The first samples use predictors of lower order.
     squares: Vec<f64>,
 }
 

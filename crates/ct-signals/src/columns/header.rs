@@ -3,7 +3,7 @@
 use super::Found;
 use crate::{ColumnFault, Error, quoted, unit};
 
-/// What is looked for: a role and the words it goes by.
+/// A role, and the words that name it.
 pub(super) struct Role {
     pub(super) name: &'static str,
     letter: char,

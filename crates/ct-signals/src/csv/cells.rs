@@ -1,10 +1,10 @@
-//! Cells of a CSV file: numbers, and what stands there where a sample is missing.
+//! Cells of a CSV file: numbers, and marks of missing samples.
 
 use super::place::Place;
 use crate::{Error, TimestampError, quoted};
 
-/// What historians, loggers and spreadsheets write where there is no sample, in small letters. A cell that begins with one of them and goes
-/// on with a blank or a colon is meant too (`Bad: sensor failure`).
+/// Marks of missing samples in historians, loggers and spreadsheets, in small letters. A cell that begins with one of them and continues
+/// with a blank or a colon is a missing sample too (`Bad: sensor failure`).
 const MISSING: &[&str] = &[
     "-",
     "--",
@@ -48,10 +48,10 @@ const MISSING: &[&str] = &[
     "pt",
 ];
 
-/// Words that are meant only where another follows.
+/// Words that mark a missing sample only if a certain word follows.
 const BEGINNINGS: &[&str] = &["no", "scan", "i/o", "comm", "under", "over", "calc", "pt"];
 
-/// Whether a cell says that its sample is missing.
+/// Whether a cell marks a missing sample.
 pub(crate) fn says_missing(cell: &str) -> bool {
     if cell.is_empty() {
         return true;
@@ -60,7 +60,7 @@ pub(crate) fn says_missing(cell: &str) -> bool {
     let end = lower.find([' ', ':', ';', ',', '(']).unwrap_or(lower.len());
     let (first, rest) = lower.split_at(end);
     let alone = rest.is_empty();
-    // A sign in front of a number is no word.
+    // A sign in front of a number does not make a word.
     let number = rest.trim_start().starts_with(|c: char| c.is_ascii_digit());
     let is_sign = !first.contains(|c: char| c.is_alphanumeric());
     MISSING.contains(&first)
@@ -76,25 +76,25 @@ pub(super) fn is_word(cell: &str) -> bool {
         || !(cell_is_number || cell.starts_with(|c: char| c.is_ascii_digit() || "+-.,".contains(c)))
 }
 
-/// What a cell holds.
+/// Content of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Cell {
     Number(f64),
-    /// Its sample is missing.
+    /// The sample is missing.
     Missing,
 }
 
-/// Why a cell is refused; the caller knows its row and its column.
+/// Reason why a cell is rejected; the caller knows its row and its column.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum CellFault {
     Empty,
     /// A number that is not finite.
     NotFinite,
-    /// A word that says nothing of a missing sample.
+    /// A word that is no mark of a missing sample.
     Word,
     /// Commas that are no decimal mark.
     Thousands,
-    /// It says that its sample is missing, and none may be.
+    /// The cell marks a missing sample, and missing samples are not allowed.
     Strict,
     /// The time is a number in the rows before, and no number here.
     NoNumber,
@@ -108,7 +108,7 @@ pub(crate) enum CellFault {
 }
 
 impl CellFault {
-    /// As an error of the file; `strict`: a missing sample is refused.
+    /// Converts the fault to an error of the file; `strict`: a missing sample is an error.
     pub(super) fn at(self, place: Place, cell: &str, strict: bool) -> Error {
         let (file, row, column) = (place.file(), place.row(), place.column());
         let mend = match self {
@@ -162,10 +162,10 @@ impl CellFault {
     }
 }
 
-/// The mend of [`CellFault::Thousands`].
+/// Correction for [`CellFault::Thousands`].
 pub(crate) const THOUSANDS: &str =
     "write decimals with a point and without separators for thousands";
-/// The mend of [`CellFault::NoNumber`].
+/// Correction for [`CellFault::NoNumber`].
 pub(crate) const TIME_AS_NUMBER: &str =
     "the rows before have the time as a number: write it so throughout";
 
@@ -173,11 +173,11 @@ pub(crate) const TIME_AS_NUMBER: &str =
 #[derive(Debug, Clone)]
 pub(crate) struct Numbers {
     decimal_comma_allowed: bool,
-    /// The decimal mark seen so far.
+    /// The decimal mark found so far.
     mark: Option<char>,
     /// A missing sample is refused.
     strict: bool,
-    /// What stands for a missing sample beside the usual words: as text, and as a number where it is one.
+    /// Marks of a missing sample in addition to the usual words: as text, and as a number if it is one.
     own: Vec<(String, Option<f64>)>,
     scratch: String,
 }
@@ -212,7 +212,7 @@ impl Numbers {
                 self.check_mark(cell)?;
                 Ok(Cell::Number(value))
             }
-            // A number too large to be one is no word.
+            // A number beyond the floating-point range is no word.
             Ok(_) if self.strict || cell.contains(|c: char| c.is_ascii_digit()) => {
                 Err(CellFault::NotFinite)
             }
@@ -225,7 +225,7 @@ impl Numbers {
         }
     }
 
-    /// A cell of the time's column, which holds a number.
+    /// Reads a cell of the time column that contains a number.
     pub fn time(&mut self, cell: &str) -> Result<f64, CellFault> {
         match self.value(cell) {
             Ok(value) if value.is_finite() => {

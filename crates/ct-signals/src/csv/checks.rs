@@ -1,4 +1,4 @@
-//! What can only be seen in a whole record.
+//! Checks that need the whole record.
 
 use std::collections::HashMap;
 
@@ -7,15 +7,14 @@ use crate::columns::{Found, Layout, Purpose};
 use crate::record::median_step;
 use crate::{Error, quoted};
 
-/// A record is refused when more than this share of the output sits exactly at its limits ...
+/// A record is rejected if more than this share of the output is exactly at its limits ...
 const SATURATED_SHARE: f64 = 1.0 / 3.0;
 
 /// ... and that is more than this many times what the commonest other value has: a coarsely
 /// quantised output has many samples at every level, a saturated one only at its limits.
 const SATURATED_RATIO: usize = 4;
 
-/// Inputs, outputs and sampling intervals between its inverse and this can be raised to the powers
-/// that a fit takes, with many digits to spare.
+/// Inputs, outputs and sampling intervals between the inverse of this and this do not overflow in the powers that a fit computes.
 const LARGEST: f64 = 1e15;
 
 impl Table {
@@ -121,7 +120,7 @@ impl Table {
                 });
             }
             let largest = values.iter().fold(0.0, |high: f64, v| high.max(v.abs()));
-            // What is simulated may rest at zero.
+            // A signal for simulation may be zero for a long time.
             if purpose == Purpose::Fit && largest < 1.0 / LARGEST {
                 return Err(Error::TooSmall {
                     file: file.into(),
@@ -162,7 +161,7 @@ impl Table {
     }
 }
 
-/// What stands in cells whose sample is missing.
+/// The contents of the cells with missing samples.
 fn listed(words: &[(String, usize)]) -> String {
     let word = |(word, _): &(String, usize)| match word.as_str() {
         "" => "empty cells".to_string(),
@@ -176,7 +175,7 @@ fn check_saturation(file: &str, column: &Found, values: &[f64]) -> Result<(), Er
     let rows = present().count();
     let low = present().fold(f64::INFINITY, f64::min);
     let high = present().fold(f64::NEG_INFINITY, f64::max);
-    // The one lowest or highest sample of any record is no limit.
+    // The single lowest or highest sample of a record is no limit.
     let at = |value: f64| Some(present().filter(|v| *v == value).count()).filter(|n| *n > 1);
     let (at_low, at_high) = (at(low).unwrap_or(0), at(high).unwrap_or(0));
     let count = at_low + at_high;
@@ -211,12 +210,12 @@ fn check_saturation(file: &str, column: &Found, values: &[f64]) -> Result<(), Er
     })
 }
 
-/// A number without the last digits, which are an accident of binary arithmetic.
+/// A number rounded to remove binary rounding errors.
 pub(super) fn rounded(value: f64) -> f64 {
     format!("{value:.9e}").parse().unwrap_or(value)
 }
 
-/// The value of a signal that stays the same to a part in a billion, missing samples aside.
+/// The value of a signal that is constant to a part in a billion, without missing samples.
 pub(crate) fn constant(values: &[f64]) -> Option<f64> {
     let first = *values.iter().find(|value| !value.is_nan())?;
     values

@@ -3,8 +3,8 @@
 //!
 //! Understood: commas, semicolons or tabs (found from the header); a decimal comma where commas do not separate; a byte-order mark, CRLF,
 //! blank lines, lines that begin with `#`, and blanks around a cell; times as numbers in a unit, or as dates and times; words such as `Bad`
-//! and `null`, and empty cells, where a sample is missing; rows that are missing; units that are not those of the model. Only the columns in
-//! use are read. Nothing is ever written.
+//! and `null`, and empty cells, where a sample is missing; rows that are missing; units that are not those of the model. Only the columns
+//! in use are read. Nothing is ever written.
 
 mod cells;
 mod checks;
@@ -31,19 +31,19 @@ pub(crate) use self::{
 use crate::columns::{Columns, Heading, Purpose};
 use crate::{Error, Hold, LARGEST_RECORD, MIN_ROWS, Record, read_file};
 
-/// How a record is read.
+/// Options for reading a record.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReadOptions {
-    /// What the inputs do between samples.
+    /// Hold of the inputs between samples.
     pub hold: Hold,
     /// Rows before this are left out: a date, or a number in the unit of the time column.
     pub from: Option<String>,
-    /// Rows behind this are left out, as [`ReadOptions::from`].
+    /// Rows after this are left out, as [`ReadOptions::from`].
     pub to: Option<String>,
     /// Refuses missing samples and missing rows.
     pub strict: bool,
-    /// The record is put on an even grid of this interval \[s\]; `None`: it stays as it was sampled.
+    /// Interval of the even grid for resampling \[s\]; `None`: the record keeps its sampling.
     pub resample: Option<f64>,
 }
 
@@ -61,7 +61,7 @@ impl From<Hold> for ReadOptions {
 pub struct Reading {
     /// The record.
     pub record: Record,
-    /// What was read, what was missing and what was done.
+    /// Summary: rows read, samples missing, and corrections made.
     pub summary: ReadSummary,
 }
 
@@ -82,8 +82,8 @@ pub fn read_csv(path: &Path, columns: &Columns, options: &ReadOptions) -> Result
     read(path, columns, options, Purpose::Fit)
 }
 
-/// Reads a record on whose inputs a model is simulated: an output whose column is not there has no sample, and two rows are enough.
-/// Outputs that are there may stand still.
+/// Reads a record on whose inputs a model is simulated: an output whose column is not there has no sample, and two rows are enough. Outputs
+/// that are present may be constant.
 ///
 /// # Errors
 /// As [`read_csv`], but for what is wrong with outputs alone.
@@ -149,7 +149,7 @@ fn parse(
     table.into_reading(file, text, layout, (options, purpose))
 }
 
-/// The header of a file: what there is to choose from, before anything is read.
+/// The header of a file, with the available columns, before the record is read.
 ///
 /// # Errors
 /// Where the file is not text, is empty, or has no header.

@@ -1,4 +1,4 @@
-//! Where in a file something stands, worked out only where a message needs it.
+//! Position in a file, computed only if a message needs it.
 
 use super::text::line_number;
 use crate::quoted;

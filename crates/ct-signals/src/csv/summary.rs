@@ -1,4 +1,4 @@
-//! What was read, what was missing and what was done, in one line.
+//! One-line summary: rows read, samples missing, and corrections made.
 
 use std::fmt;
 
@@ -11,9 +11,9 @@ use crate::{Calendar, duration};
 pub struct MissingSamples {
     /// The column's name.
     pub column: String,
-    /// How many.
+    /// Number of samples.
     pub samples: usize,
-    /// What stands in their cells, with the number of each; empty for an empty cell.
+    /// Contents of the cells with missing samples, with the number of each; empty text for an empty cell.
     pub words: Vec<(String, usize)>,
 }
 
@@ -28,7 +28,7 @@ pub struct Converted {
     pub to: String,
 }
 
-/// What was read of a file; [`fmt::Display`] says it in one line.
+/// Summary of a file that was read; [`fmt::Display`] formats it in one line.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadSummary {
     /// The file.
@@ -41,7 +41,7 @@ pub struct ReadSummary {
     /// The header of the time.
     #[serde(skip)]
     pub time_header: String,
-    /// Rows before or behind what is wanted.
+    /// Rows outside the required range of time.
     pub outside: usize,
     /// Rows without a time, which are not used.
     pub without_time: usize,
@@ -51,19 +51,19 @@ pub struct ReadSummary {
     pub interval: f64,
     /// Time from the first to the last row in use \[s\].
     pub duration: f64,
-    /// When it began, where the file has dates.
+    /// Start date, if the file has dates.
     #[serde(skip)]
     pub calendar: Option<Calendar>,
     /// Samples that are missing, by column.
     pub missing: Vec<MissingSamples>,
     /// Columns that were converted.
     pub converted: Vec<Converted>,
-    /// The interval of the grid on which the record was put \[s\].
+    /// Interval of the grid after resampling \[s\].
     pub resampled: Option<f64>,
 }
 
 impl ReadSummary {
-    /// Whether the file was read as it stands: nothing was missing, left out or converted.
+    /// Whether the file was read unchanged: no sample was missing, left out or converted.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.outside == 0

@@ -20,16 +20,16 @@ pub(super) struct Table {
     pub(super) ends: Vec<usize>,
     /// \[s\], from zero of the column, or from the first row where these are dates.
     pub(super) time: Vec<f64>,
-    /// Of every channel, in the order of [`Layout::channels`], its values in the units that are wanted.
+    /// Values of each channel, in the order of [`Layout::channels`], in the required units.
     pub(super) values: Vec<Vec<f64>>,
-    /// Of every channel the words that stand in cells whose sample is missing, with their number.
+    /// For each channel, the words that mark missing samples, with their number.
     pub(super) missing: Vec<Vec<(String, usize)>>,
     pub(super) calendar: Option<Calendar>,
-    /// Rows before or behind what is wanted.
+    /// Rows outside the required range of time.
     pub(super) outside: usize,
     /// Rows without a time.
     pub(super) without_time: usize,
-    /// Where the first of them ends, and what stands in their cells.
+    /// Place where the first row without a time ends, and the contents of the time cells.
     pub(super) untimed: (usize, Vec<(String, usize)>),
 }
 
@@ -146,13 +146,13 @@ pub(super) fn read_table(
     }
 }
 
-/// Whether a row below the header holds units: words alone, and none that says that a sample is missing.
+/// Whether a row below the header contains units: words only, and no mark of a missing sample.
 fn is_row_of_units(row: &StringRecord) -> bool {
     let says = |cell: &str| !cell.is_empty() && cell != "-" && says_missing(cell);
     row.iter().all(is_word) && !row.iter().any(says)
 }
 
-/// Counts what stands in a cell whose sample is missing: the first words that occur by themselves, the others together.
+/// Counts the contents of cells with missing samples: the first different words separately, the others together.
 fn count_word(words: &mut Vec<(String, usize)>, cell: &str) {
     const MOST: usize = 6;
     const LONGEST: usize = 24;
@@ -186,7 +186,7 @@ impl Table {
             calendar.start = calendar.start.after(first);
             self.time.iter_mut().for_each(|time| *time -= first);
         }
-        // Names and units go into sentences, tables and files; none of them may steer a terminal.
+        // Names and units are used in sentences, tables and files; control characters are removed.
         let printable = |text: &str| escaped(text).into_owned();
         let mut values = self.values.into_iter();
         let mut channels = |columns: &[Found]| -> Vec<Channel> {

@@ -115,11 +115,11 @@ pub(crate) fn delimiter(text: &str) -> u8 {
         .find(|line| !line.trim().is_empty() && !line.starts_with('#'))
         .unwrap_or_default();
     let count = |delimiter: &u8| header.bytes().filter(|byte| byte == delimiter).count();
-    // `max_by_key` takes the last of equals: a comma, where none occurs.
+    // `max_by_key` returns the last of equal items: a comma, if no delimiter occurs.
     b";\t,".iter().copied().max_by_key(count).unwrap_or(b',')
 }
 
-/// What a delimiter is called.
+/// Name of a delimiter.
 pub(crate) fn delimiter_name(delimiter: u8) -> &'static str {
     match delimiter {
         b';' => "semicolon",

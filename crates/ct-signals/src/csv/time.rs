@@ -12,7 +12,7 @@ use super::{
 use crate::columns::Columns;
 use crate::{Calendar, Error, Timestamp, TimestampError, TimestampReader, Zone, quoted};
 
-/// How a column writes the time.
+/// Format of a time column.
 #[derive(Debug, Clone)]
 pub(crate) enum Times {
     /// Numbers, so many seconds for one.
@@ -25,7 +25,8 @@ pub(crate) enum Times {
 }
 
 impl Times {
-    /// From the first cell; `all`: the cells of the whole column, which may tell day and month apart. A number is so many `seconds`.
+    /// Finds the format from the first cell; `all`: the cells of the whole column, which may show the order of day and month. A number is a
+    /// multiple of `seconds`.
     pub fn of(
         cell: &str,
         all: impl FnOnce() -> Vec<String>,
@@ -39,7 +40,7 @@ impl Times {
         // Dates with an offset are shown, and limits of a part understood, with that offset.
         let zone = columns.time_zone.as_deref().or_else(|| offset_of(cell));
         let reader = match TimestampReader::new(format, zone, [cell]) {
-            // The rest of the column tells day and month apart.
+            // The rest of the column distinguishes day and month.
             Err(TimestampError::DayOrMonth { .. }) => {
                 let cells = all();
                 TimestampReader::new(format, zone, cells.iter().map(String::as_str))
@@ -47,7 +48,7 @@ impl Times {
             reader => reader,
         };
         let reader = reader.map_err(refused)?;
-        // It is read once more with its row.
+        // The first cell is read again together with its row.
         let first = reader.clone().read(cell).map_err(refused)?;
         Ok(Self::Dates {
             reader: Box::new(reader),
@@ -99,7 +100,7 @@ impl Times {
             });
         }
         let mend = match self {
-            // An hour comes twice where clocks are set back.
+            // An hour occurs twice when clocks are set back.
             Self::Dates { .. } if previous - time <= 3600.0 => {
                 "name the zone with time_zone = \"...\" under [columns] where clocks were set back, or sort the rows by time"
             }

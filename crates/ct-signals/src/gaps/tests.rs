@@ -56,7 +56,7 @@ fn short_gaps_are_held_through_and_long_ones_cut() {
     assert_eq!(first.inputs[0].values[19..23], [19.0, 19.0, 19.0, 22.0]);
     assert!(first.outputs[0].values[20].is_nan() && first.outputs[0].values[22] == 220.0);
     assert_eq!(second.time[0], 200.0);
-    // Held for as long as it takes, and not at all.
+    // Held without limit, and not at all.
     assert_eq!(gappy.without_gaps(f64::INFINITY).0[0].len(), 80);
     assert_eq!(gappy.without_gaps(0.0).0.len(), 3);
 }
@@ -73,13 +73,13 @@ fn a_missing_input_is_held_or_ends_a_part() {
         (2, 1, 1, 3)
     );
     assert_eq!(parts[0].inputs[0].values[6..10], [9.0, 9.0, 9.0, 12.0]);
-    // What row 29 does is read at row 30.
+    // The effect of row 29 is read at row 30.
     assert_eq!(
         (parts[0].time[0], parts[0].time.last()),
         (106.0, Some(&160.0))
     );
     assert_eq!((parts[1].time[0], parts[1].len()), (180.0, 20));
-    // An input that runs in lines is not known behind its last sample.
+    // An input that is linear between samples is not known after its last sample.
     record.inputs[0].hold = Hold::First;
     let (parts, _) = record.without_gaps(4.0);
     assert_eq!(parts[0].time.last(), Some(&158.0));
@@ -108,7 +108,7 @@ fn rows_that_are_missing_at_random_leave_the_interval() {
 
 #[test]
 fn a_logger_with_several_rates_loses_nothing() {
-    // As a tester of batteries writes: every 0.1 s while something happens, then every 1 s and every 10 s.
+    // As a battery tester writes: every 0.1 s during fast changes, then every 1 s and every 10 s.
     let steps = [
         (300, 0.1),
         (11, 10.0),
@@ -130,13 +130,13 @@ fn a_logger_with_several_rates_loses_nothing() {
         record
     };
     assert!(!with_time(time.clone()).has_gaps());
-    // Behind it a minute is missing.
+    // After it one minute is missing.
     let last = time[time.len() - 1];
     time.extend((0..20).map(|k| last + 60.0 + 0.1 * k as f64));
     let gappy = with_time(time);
     assert_eq!(gappy.before_missing_row(), Some(last));
     assert_eq!(gappy.without_gaps(1.0).0.len(), 2);
-    // Rows are lost one by one: steps of two intervals stand side by side now and then, and most do not.
+    // Rows are lost one by one: only some of the steps of two intervals are adjacent.
     let lost = record((0..1000).filter(|k| (k * k * 31 + k * 17) % 101 > 10));
     assert!(lost.missing_rows() > 110, "{}", lost.missing_rows());
 }

@@ -1,9 +1,9 @@
-//! Why a line of a stream is not used.
+//! Reasons why a line of a stream is not used.
 
 use crate::TimestampError;
 use crate::csv::TIME_AS_NUMBER;
 
-/// Why a line is not used; the next one may be.
+/// Reason why a line is not used; later lines may be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BadLine {
@@ -20,12 +20,12 @@ pub enum BadLine {
         delimiter: &'static str,
     },
     /// An empty cell.
-    #[error("column \"{column}\": the cell is empty; check what writes the rows")]
+    #[error("column \"{column}\": the cell is empty; check the program that writes the rows")]
     Empty {
         /// The column's header.
         column: String,
     },
-    /// A cell that says that its sample is missing.
+    /// The cell marks a missing sample.
     #[error("column \"{column}\": \"{text}\" stands for a missing sample")]
     Missing {
         /// The column's header.
@@ -33,8 +33,10 @@ pub enum BadLine {
         /// The cell.
         text: String,
     },
-    /// A number too large to be one.
-    #[error("column \"{column}\": \"{text}\" is not a finite number; check what writes the rows")]
+    /// A number beyond the floating-point range.
+    #[error(
+        "column \"{column}\": \"{text}\" is not a finite number; check the program that writes the rows"
+    )]
     NotFinite {
         /// The column's header.
         column: String,
@@ -57,17 +59,17 @@ pub enum BadLine {
         /// Why.
         error: Box<TimestampError>,
     },
-    /// A cell that holds no number.
+    /// The cell contains no number.
     #[error("column \"{column}\": \"{text}\" is not a number; {mend}")]
     Text {
         /// The column's header.
         column: String,
         /// The cell.
         text: String,
-        /// What to do.
+        /// The correction, in words.
         mend: &'static str,
     },
-    /// Both marks for decimals.
+    /// The column uses both decimal marks.
     #[error(
         "column \"{column}\": \"{text}\" has another decimal mark than the rows before; use one of them throughout"
     )]
@@ -77,7 +79,9 @@ pub enum BadLine {
         /// The cell.
         text: String,
     },
-    /// Bytes that are no text.
-    #[error("the line is not UTF-8 text; check the speed of the line and what writes the rows")]
+    /// Bytes that are not UTF-8 text.
+    #[error(
+        "the line is not UTF-8 text; check the speed of the line and the program that writes the rows"
+    )]
     NotText,
 }

@@ -27,7 +27,7 @@ impl Rows {
             }
         } else {
             let fields = || line.split(char::from(self.delimiter));
-            // A row that is not whole has wrong cells too.
+            // An incomplete row may have wrong cells too.
             self.check_count(fields().count())?;
             for (i, cell) in line.split(char::from(self.delimiter)).enumerate() {
                 let Some(role) = self.at.iter().position(|at| *at == i) else {
@@ -111,7 +111,7 @@ impl Rows {
                 });
             }
             Err(CellFault::Word | CellFault::Strict) => {
-                "check what writes the rows, or list the word under [columns] where it says that the sample is missing"
+                "check the program that writes the rows, or list the word under [columns] where it says that the sample is missing"
             }
         };
         Err(BadLine::Text {
@@ -121,12 +121,12 @@ impl Rows {
         })
     }
 
-    /// The time of a row \[s\]; the first one says how times are written.
+    /// The time of a row \[s\]; the first row determines the format.
     fn time(&mut self, cell: &str) -> Result<f64, CellFault> {
         if let Some(times) = &mut self.times {
             return times.read(cell, &mut self.numbers);
         }
-        // There is no more of the column to look at.
+        // The other cells of the column are not available.
         let all = || vec![cell.to_string()];
         let mut times = Times::of(cell, all, self.seconds, &self.columns)?;
         if let Times::Dates { reader, first } = &mut times {

@@ -25,7 +25,7 @@ fn a_header_says_the_order_and_the_units() {
         Ok(Line::Nothing)
     );
     assert_eq!(read(&mut rows, "# a comment"), Ok(Line::Nothing));
-    // The command of a row counts whatever the reading is.
+    // The command of a row is used whatever the reading is.
     assert_eq!(read(&mut rows, "12.5;4;1;"), Ok(Line::Row([60.0, 4.0])));
     let bad = rows.outputs()[0].clone().unwrap_err();
     assert!(
@@ -56,12 +56,12 @@ fn without_a_header_three_or_four_numbers_have_an_order() {
     let bad = three.outputs()[0].clone().unwrap_err();
     assert_eq!(
         bad.to_string(),
-        "column \"output\": the cell is empty; check what writes the rows"
+        "column \"output\": the cell is empty; check the program that writes the rows"
     );
     let message = read(&mut three, "1\t\t5").unwrap_err();
     assert_eq!(
         message,
-        "column \"input\": the cell is empty; check what writes the rows"
+        "column \"input\": the cell is empty; check the program that writes the rows"
     );
     let message = read(&mut three, "12:30\t5\t1").unwrap_err();
     assert!(message.contains("write it so throughout"), "{message}");
@@ -86,13 +86,13 @@ fn several_outputs_are_read_in_the_order_in_which_they_are_named() {
     assert_eq!(read(&mut rows, "1,100,4,12"), Ok(Line::Row([1.0, 4.0])));
     assert_eq!(rows.outputs(), [Ok(12.0), Ok(10.0)]);
     assert_eq!(rows.name("output", 1), "lower [mm]");
-    // Either may be lost for itself, in one row.
+    // Each reading may be missing alone.
     assert_eq!(read(&mut rows, "2,,4,12"), Ok(Line::Row([2.0, 4.0])));
     assert_eq!(rows.outputs()[0], Ok(12.0));
     let bad = rows.outputs()[1].clone().unwrap_err();
     assert_eq!(
         bad.to_string(),
-        "column \"lower [mm]\": the cell is empty; check what writes the rows"
+        "column \"lower [mm]\": the cell is empty; check the program that writes the rows"
     );
 
     let (mut rows, _) = begin("0,15,4.5,14.8,9.1").unwrap();
@@ -129,7 +129,7 @@ fn rows_of_a_model_without_inputs_have_a_time_and_outputs() {
         assert!(matches!(read(&mut rows, "1,2.5"), Ok(Line::Row([1.0, _]))));
         assert_eq!(rows.outputs(), [Ok(2.5)]);
         assert_eq!(rows.inputs().count(), 0);
-        // The row stays where its reading is missing.
+        // The row is used although its reading is missing.
         assert!(matches!(read(&mut rows, "2,"), Ok(Line::Row([2.0, _]))));
         assert!(rows.outputs()[0].is_err());
     }
@@ -147,7 +147,7 @@ fn times_may_be_dates_and_words_stand_for_missing_samples() {
     };
     let (mut rows, _) = Rows::begin("input", 1, "t;u;y", &columns).unwrap();
     assert_eq!(rows.times(), None);
-    // Over the hour that is left out in spring.
+    // Across the hour that is skipped in spring.
     for (line, time, reading) in [
         ("29.03.2026 01:59:58,5;4;12,5", 0.0, Some(12.5)),
         ("29.03.2026 03:00:00;4;Bad", 1.5, None),
@@ -183,7 +183,7 @@ fn times_may_be_dates_and_words_stand_for_missing_samples() {
         read(&mut restored, "1;29.03.2026 03:00:09;4"),
         Ok(Line::Row([10.5, 4.0]))
     );
-    // The hour that comes twice: where the rows stood tells which.
+    // The hour that occurs twice: the order of the rows decides.
     let october = 210.0 * 86_400.0;
     let mut second = again();
     second.count_from(&calendar, october + 3.0 * 3600.0);
@@ -284,11 +284,11 @@ fn several_inputs_are_read_and_each_is_needed() {
     let bad = read(&mut rows, "2,,50,40").unwrap_err();
     assert_eq!(
         bad,
-        "column \"room [degC]\": the cell is empty; check what writes the rows"
+        "column \"room [degC]\": the cell is empty; check the program that writes the rows"
     );
 }
 
-/// What the first line is taken for is what it is read as: else it would be begun with again and again.
+/// The detection of the first line and its reading agree: otherwise the reader would start again and again.
 #[test]
 fn a_carriage_return_within_a_line_is_part_of_a_cell_for_both() {
     let line = "1,1,3\r2,1,3";

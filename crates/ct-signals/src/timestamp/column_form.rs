@@ -6,7 +6,7 @@ use super::form::{DateForm, Fields, Form};
 use super::{DAY, TimestampError, Written, calendar};
 use crate::quoted;
 
-/// The form of the first cell and whether it has a date, with the order of day and month from the others where it is not plain.
+/// The form of the first cell and whether it has a date; the order of day and month comes from the other cells if it is ambiguous.
 pub(super) fn find_form<'a>(
     first: &'a str,
     others: impl Iterator<Item = &'a str>,
@@ -37,7 +37,7 @@ pub(super) fn find_form<'a>(
     }
 }
 
-/// The message that asks for a format, with the two that fit.
+/// The message that requests a format, with the two possible formats.
 pub(super) fn undecided(cell: &str, form: &Form) -> TimestampError {
     let separator = match form.date {
         DateForm::Undecided(separator) => char::from(separator),

@@ -1,12 +1,12 @@
-//! Why a date or a time is not understood.
+//! Errors of dates and times.
 
 use thiserror::Error;
 
-/// Why a date or a time is refused; the caller knows the file, the row and the column.
+/// Reason why a date or a time is rejected; the caller knows the file, the row and the column.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TimestampError {
-    /// There is no zone of this name.
+    /// No time zone has this name.
     #[error(
         "there is no time zone \"{zone}\"; give a name such as \"Europe/Berlin\" or \"UTC\", or an offset such as \"+01:00\""
     )]
@@ -14,7 +14,7 @@ pub enum TimestampError {
         /// The name.
         zone: String,
     },
-    /// No cell of the column holds anything.
+    /// Every cell of the column is empty.
     #[error("there is no date or time to read; name another column")]
     NoCells,
     /// The first cell has no form that is known.
@@ -25,16 +25,16 @@ pub enum TimestampError {
         /// The cell.
         text: String,
     },
-    /// Day and month cannot be told apart.
+    /// Day and month cannot be distinguished.
     #[error(
         "\"{text}\" has two meanings, and no date of the column says which number is the day; set time_format = \"{day_first}\" or \"{month_first}\""
     )]
     DayOrMonth {
         /// The cell.
         text: String,
-        /// The format in which the day is first.
+        /// The format with the day first.
         day_first: String,
-        /// The format in which the month is first.
+        /// The format with the month first.
         month_first: String,
     },
     /// Some dates have the day first, others the month.
@@ -47,7 +47,7 @@ pub enum TimestampError {
         /// `day` or `month`.
         first_here: &'static str,
     },
-    /// A cell is written otherwise than the first one.
+    /// A cell has another form than the first one.
     #[error(
         "\"{text}\" is not written as \"{first}\" further up; write all times alike, or split the file there"
     )]
@@ -66,10 +66,10 @@ pub enum TimestampError {
         text: String,
         /// The format.
         format: String,
-        /// What does not fit.
+        /// Reason for the mismatch.
         reason: String,
     },
-    /// There is no such date or time.
+    /// The date or time does not exist.
     #[error("\"{text}\" is not in the calendar or on the clock; correct the cell")]
     NoSuchTime {
         /// The cell.
@@ -85,7 +85,7 @@ pub enum TimestampError {
         /// The zone.
         zone: String,
     },
-    /// A bound that a person gave is not understood.
+    /// A bound given by the user is not understood.
     #[error("\"{text}\" is no date that has one meaning; write 2026-01-31 or \"2026-01-31 14:25\"")]
     UnknownBound {
         /// What was given.

@@ -1,4 +1,4 @@
-//! How the dates of a column are written, and what one cell says.
+//! Formats of dates in a column, and the reading of a cell.
 //!
 //! A [`Form`] holds what must be the same in all cells: the order and the separator of the date, and whether an offset follows. Whether
 //! a cell has a time, seconds and a fraction may differ from row to row: many programs leave out what is zero.
@@ -8,7 +8,7 @@ mod scanner;
 use self::scanner::Scanner;
 use super::calendar;
 
-/// How all cells of a column are written.
+/// Format of all cells of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Form {
     pub date: DateForm,
@@ -31,30 +31,30 @@ pub(super) enum DateForm {
     Undecided(u8),
     /// `31-Jan-2026`
     MonthName(u8),
-    /// No date: `14:25:00`
+    /// Time without a date: `14:25:00`
     TimeOnly,
 }
 
-/// What a cell says.
+/// Fields of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Fields {
-    /// Days since 1970-01-01; `None` where there is no date.
+    /// Days since 1970-01-01; `None` without a date.
     pub days: Option<i64>,
     /// Seconds of the day; without a date there may be more than a day of them.
     pub seconds: i64,
     pub nanoseconds: u32,
     /// Seconds that local time is ahead of UTC.
     pub offset: Option<i32>,
-    /// Whether there is a time of day.
+    /// Whether the cell has a time of day.
     pub timed: bool,
 }
 
-/// Why a cell cannot be read.
+/// Reason why a cell cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// It is written in another way.
+    /// The cell has another format.
     Form,
-    /// There is no such date or time.
+    /// The date or time does not exist.
     Range,
 }
 
@@ -72,7 +72,7 @@ impl Form {
             (1 | 2, b'-' | b'/' | b'.' | b' ') if at(first + 1).is_ascii_alphabetic() => {
                 DateForm::MonthName(separator)
             }
-            // No country writes the month first with points.
+            // Dates with points never have the month first.
             (1 | 2, b'.') => DateForm::DayFirst(separator),
             (1 | 2, b'-' | b'/') => DateForm::Undecided(separator),
             _ => return None,
@@ -225,7 +225,7 @@ impl Form {
             let more = scan.peek().is_ascii_digit();
             return Ok((hour, minute, more.then(|| scan.number(2, 2)).transpose()?));
         }
-        // Without a date the hours may be those since the start of the record.
+        // Without a date, the hours may count from the start of the record.
         let hour = scan.number(1, if dated { 2 } else { 4 })?;
         scan.expect(b':')?;
         let minute = scan.number(2, 2)?;
@@ -235,7 +235,7 @@ impl Form {
     }
 }
 
-/// Seconds ahead of UTC that a text such as `+01:00`, `-0330`, `+01` or `Z` says.
+/// Seconds ahead of UTC for a text such as `+01:00`, `-0330`, `+01` or `Z`.
 pub(super) fn offset(text: &str) -> Option<i32> {
     let mut scan = Scanner {
         bytes: text.as_bytes(),

@@ -179,7 +179,7 @@ fn where_nothing_says_which_number_is_the_day_two_formats_are_named() {
             assert_eq!(reader.read(&cell).unwrap(), utc(&format!("{date} {clock}")));
         }
     }
-    // Later cells may be the first that have two meanings, or the other order.
+    // Later cells may be the first ambiguous ones, or have the other order.
     let mut reader = TimestampReader::new(None, None, ["03/03/2026"]).unwrap();
     assert!(matches!(
         reader.read("04/03/2026"),
@@ -230,7 +230,7 @@ fn a_time_of_day_passes_midnight() {
     assert!(!reader.has_dates());
     let times: Vec<Timestamp> = cells.iter().map(|c| reader.read(c).unwrap()).collect();
     assert_eq!(times[1].seconds_since(times[0]), 1.0);
-    // A fall by less than half a day is the file's fault.
+    // A fall by less than half a day is an error of the file.
     assert_eq!(times[3].seconds_since(times[2]), -3600.0);
     assert_eq!(times[5].seconds_since(times[0]), 86_400.0 + 3600.5);
     assert_eq!(reader.format(times[0]), "23:59:59.5");
@@ -292,7 +292,7 @@ fn a_bound_has_one_meaning() {
         zone.bound("2026-02-30"),
         Err(TimestampError::NoSuchTime { .. })
     ));
-    // As the column is written, where that is known.
+    // With the known format of the column.
     let reader = TimestampReader::new(None, Some("Europe/Berlin"), ["01/31/2026 14:25"]).unwrap();
     assert_eq!(
         reader.bound("03/04/2026 1:00").unwrap(),

@@ -32,7 +32,7 @@ pub struct Zone {
 enum Rules {
     /// Seconds ahead of UTC, all the year.
     Fixed(i32),
-    /// With daylight saving time, now or at some time.
+    /// A zone with daylight saving time, now or in some years.
     Changing(TimeZone),
 }
 
@@ -59,7 +59,7 @@ pub(super) struct KnownOffset {
 }
 
 impl KnownOffset {
-    /// No time at all.
+    /// Zero duration.
     pub(super) const NONE: Self = Self {
         begin: 0,
         end: 0,
@@ -77,12 +77,12 @@ pub(super) struct Civil {
     pub timed: bool,
 }
 
-/// Why a civil time is no instant.
+/// Reason why a civil time is not a valid instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NoInstant {
     /// Clocks go forward over it.
     Skipped,
-    /// It is beyond the years that can be computed with.
+    /// The year is outside the range of the computation.
     Range,
 }
 
@@ -112,7 +112,7 @@ impl Zone {
             });
         }
         let found = TimeZoneDatabase::bundled().get(name).ok();
-        // Jiff's own name for a zone that is not known is no zone.
+        // Jiff's name for an unknown zone is rejected.
         let zone = found
             .filter(|zone| !zone.is_unknown())
             .ok_or_else(|| TimestampError::UnknownZone { zone: quoted(name) })?;
@@ -235,7 +235,7 @@ impl Zone {
         }
     }
 
-    /// Seconds since the epoch of a civil time. `known` holds the times for which the offset is known from the call before.
+    /// Seconds since the epoch of a civil time. `known` contains the times with known offset from the preceding call.
     #[inline]
     fn seconds(
         &self,
@@ -267,13 +267,13 @@ fn changing(
             *known = known_around(zone, at(offset), offset);
             Ok(at(offset))
         }
-        // Twice: the earlier, unless the time would not go forward.
+        // Of two possible instants the earlier, unless the time would not increase.
         AmbiguousOffset::Fold { before, after } => {
             let earlier = Timestamp::new(at(before), civil.nanoseconds);
             let forward = previous.is_none_or(|previous| previous < earlier);
             Ok(if forward { at(before) } else { at(after) })
         }
-        // Never. A day whose first hour is left out begins when the clocks have gone forward.
+        // Cannot occur. A day whose first hour is skipped begins when the clocks have gone forward.
         AmbiguousOffset::Gap { before, .. } if !civil.timed => Ok(at(before)),
         AmbiguousOffset::Gap { .. } => Err(NoInstant::Skipped),
     }
@@ -295,7 +295,7 @@ fn known_around(zone: &TimeZone, seconds: i64, offset: Offset) -> KnownOffset {
         }?;
         Some(transition.timestamp().as_second())
     };
-    // One that is at this very instant precedes what follows it.
+    // A change at this very instant comes before the times that follow it.
     let begin = change(seconds + 1, false).and_then(|change| {
         let before = offset_at(change - 1)?;
         Some(change + i64::from(own.max(before)))
@@ -311,7 +311,7 @@ fn known_around(zone: &TimeZone, seconds: i64, offset: Offset) -> KnownOffset {
     }
 }
 
-/// `:07.25`, or nothing where there is nothing.
+/// Text such as `:07.25`, or empty for zero.
 pub(super) fn seconds_text(seconds: u8, nanoseconds: u32) -> String {
     let mut text = String::new();
     if seconds != 0 || nanoseconds != 0 {

@@ -18,9 +18,9 @@ pub struct Dimension {
 }
 
 impl Dimension {
-    /// Of pure numbers.
+    /// Dimension of pure numbers.
     pub const NONE: Self = Self::of([0; 6]);
-    /// Of times.
+    /// Dimension of time.
     pub const TIME: Self = Self::of([0, 0, 1, 0, 0, 0]);
 
     /// From the powers of metre, kilogram, second, ampere, kelvin and mole.

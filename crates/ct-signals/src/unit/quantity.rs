@@ -1,11 +1,11 @@
-//! What a unit's text means: its dimension, its size and its zero, and how values are converted.
+//! Meaning of a unit's text: dimension, size and zero, and the conversion of values.
 
 use super::dimension::Dimension;
 use super::table::{self, Base};
 
-// Not a crate: those that read units at run time follow UCUM or GNU units, where C is the coulomb and degC, rpm, pct or lmin are unknown.
+// Not a crate: crates that read units at run time follow UCUM or GNU units, where C is the coulomb and degC, rpm, pct or lmin are unknown.
 
-/// A unit of measurement that is understood.
+/// A known unit of measurement.
 ///
 /// ```
 /// use ct_signals::Unit;
@@ -24,7 +24,7 @@ pub struct Unit {
     dimension: Dimension,
     /// Power of the angle.
     angle: i8,
-    /// Whether the angle counts turns, as rpm and Hz do; 1/min and 1/s are then the same.
+    /// Whether the angle is measured in turns, as for rpm and Hz; 1/min and 1/s are then equal.
     turns: bool,
     /// The size in SI units and turns, as a fraction.
     size: (f64, f64),
@@ -32,7 +32,7 @@ pub struct Unit {
     zero: (f64, f64),
 }
 
-/// How values are converted: `factor * value + offset`.
+/// Conversion of values: `factor * value + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conversion {
     /// New units in one old unit.
@@ -48,7 +48,7 @@ impl Conversion {
         self.factor * value + self.offset
     }
 
-    /// Whether values stay as they are.
+    /// Whether the conversion does not change values.
     #[must_use]
     pub fn is_identity(&self) -> bool {
         self.factor == 1.0 && self.offset == 0.0
@@ -58,8 +58,8 @@ impl Conversion {
 impl Unit {
     /// A unit from its text; `None` where it is not understood.
     ///
-    /// Understood are symbols with SI prefixes (`mV`, `kPa`, `µs`) and many names in full (`litres`), powers (`m3`, `m^3`, `m³`,
-    /// `s-1`), products with `*`, `.`, `·` or a blank, and quotients; `1` and `-` are pure numbers. Several factors below a stroke need brackets,
+    /// Understood are symbols with SI prefixes (`mV`, `kPa`, `µs`) and many names in full (`litres`), powers (`m3`, `m^3`, `m³`, `s-1`),
+    /// products with `*`, `.`, `·` or a blank, and quotients; `1` and `-` are pure numbers. Several factors below a stroke need brackets,
     /// `J/(kg K)`: `J/kg K` is not understood, as it has two meanings. `C` and `F` are temperatures, gallons those of the US.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
@@ -73,7 +73,7 @@ impl Unit {
             .replace("deg F", "degF")
             .replace("° C", "°C")
             .replace("° F", "°F");
-        // A scale with a zero of its own is one only where it stands alone.
+        // A unit with an offset zero (degC) has its offset only if it is not part of a compound unit.
         if let Some(base) = table::find(&text) {
             return Some(Self::of(base));
         }
@@ -107,9 +107,9 @@ impl Unit {
 
     /// How values in this unit become values in another; `None` where the two measure different things.
     ///
-    /// `degC`, `K` and `degF` alone are scales of temperature and have an offset; a difference of temperatures in a column of its own cannot be
-    /// told from them. In a compound such as `W/degC` they are differences. An angle is no ratio, and `rad/s` is not `1/s`; turns may be left
-    /// out, so that `rpm` is `1/min`.
+    /// `degC`, `K` and `degF` alone are scales of temperature and have an offset; a difference of temperatures in a column of its own
+    /// cannot be distinguished from them. In a compound such as `W/degC` they are differences. An angle is no ratio, and `rad/s` is not
+    /// `1/s`; turns may be left out, so that `rpm` is `1/min`.
     #[must_use]
     pub fn conversion_to(&self, other: &Self) -> Option<Conversion> {
         let angles = self.angle == other.angle
@@ -118,7 +118,7 @@ impl Unit {
         if self.dimension != other.dimension || !angles {
             return None;
         }
-        // Fractions are kept to the end, so that 1000 is 1000 and 32 is 32.
+        // Exact fractions are used to the end, so that 1000 is exactly 1000 and 32 exactly 32.
         let factor = (self.size.0 * other.size.1) / (self.size.1 * other.size.0);
         let zeros = self.zero.0 * other.zero.1 - other.zero.0 * self.zero.1;
         let offset = zeros * other.size.1 / (self.zero.1 * other.zero.1 * other.size.0);
@@ -164,10 +164,10 @@ impl Unit {
     }
 }
 
-/// What is left of a unit's text.
+/// The part of a unit's text that is not read yet.
 struct Parser<'a> {
     rest: &'a str,
-    /// Whether this is within brackets, where there are no further ones.
+    /// Whether the parser is inside brackets; nested brackets are not allowed.
     bracketed: bool,
 }
 

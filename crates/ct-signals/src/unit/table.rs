@@ -4,15 +4,15 @@ use std::f64::consts::PI;
 
 use super::dimension::Dimension;
 
-/// A unit that has a symbol of its own.
+/// A unit with a symbol.
 pub(super) struct Symbol {
-    /// As it is written. Words of four letters and more are understood in capitals too.
+    /// Spellings. Words of four letters and more are also understood in capitals.
     names: &'static [&'static str],
-    /// Whether a prefix such as `m` or `k` may stand before it.
+    /// Whether a prefix such as `m` or `k` is allowed.
     prefixed: bool,
     /// Powers of metre, kilogram, second, ampere, kelvin and mole.
     powers: [i8; 6],
-    /// Power of the angle, and whether it counts turns.
+    /// Power of the angle, and whether the angle is given in turns.
     angle: (i8, bool),
     /// The size in SI units and turns, as a fraction: that of whole numbers has no rounding in it.
     size: (f64, f64),
@@ -157,7 +157,7 @@ const PREFIXES: &[(&str, (f64, f64))] = &[
 
 /// The unit of a symbol, with or without a prefix.
 pub(super) fn find(name: &str) -> Option<Base> {
-    // Without a prefix first: min is a minute, not a milli-inch.
+    // Units without a prefix first: min is a minute, not a milli-inch.
     if let Some(symbol) = SYMBOLS.iter().find(|symbol| symbol.is(name)) {
         return Some(symbol.base((1.0, 1.0)));
     }

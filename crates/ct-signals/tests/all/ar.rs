@@ -1,5 +1,5 @@
 //! Autoregressive noise against dense linear algebra, and over many simulated records.
-// Matrices by their indices, as in the books.
+// Matrices by their indices, as in textbooks.
 #![allow(clippy::needless_range_loop)]
 
 mod missing;
@@ -142,7 +142,7 @@ fn after_a_reset_the_next_record_is_whitened_like_the_first() {
     let model = ArModel::from_coefficients(&[1.5, -0.7], 1.0).unwrap();
     let v = simulate(&[1.5, -0.7], 1.0, 9, 2);
     let mut whitener = model.whitener(1);
-    // Stop at every phase of the filter's ring, also before it is full.
+    // Missing rows at every phase of the filter's ring, also before it is full.
     for stop in 0..9 {
         whitener.reset();
         for value in &v[..stop] {
@@ -249,7 +249,7 @@ fn segments_are_independent_records() {
         "{:?}",
         model.coefficients()
     );
-    // Their order does not matter.
+    // The result does not depend on their order.
     let reversed: Vec<&[f64]> = views.iter().rev().copied().collect();
     let other = ArModel::fit(&reversed, 5).unwrap();
     assert_relative_eq!(
@@ -282,7 +282,7 @@ fn degenerate_signals_give_a_stable_model() {
         assert!(model.sigma().is_finite() && model.stationary_std().is_finite());
         assert!(model.coefficients().iter().all(|a| a.is_finite()));
         assert!(model.whiten(&v).iter().all(|w| w.is_finite()));
-        // Stable: its own coefficients are accepted, up to rounding at the margin.
+        // Stable: its coefficients are accepted, up to rounding at the margin.
         assert!(model.log_det(v.len()).is_finite());
     }
     let silent = ArModel::fit(&[&[0.0; 30], &[]], 3).unwrap();

@@ -62,7 +62,7 @@ fn says(error: &Error, words: &[&str]) {
     }
 }
 
-/// What is wrong with the columns, where that is the error.
+/// The fault of the columns, if the error is of this kind.
 fn fault(error: &Error) -> Option<&ColumnFault> {
     match error {
         Error::Column { fault, .. } => Some(fault),
@@ -70,7 +70,7 @@ fn fault(error: &Error) -> Option<&ColumnFault> {
     }
 }
 
-/// No column was found for this role.
+/// Whether no column was found for this role.
 fn missing(error: &Error, of: &str) -> bool {
     matches!(fault(error), Some(ColumnFault::Missing { role, .. }) if *role == of)
 }
@@ -241,7 +241,7 @@ fn jitter_is_no_gap() {
 
 #[test]
 fn columns_of_a_model_file() {
-    // Any format that serde knows will do; a file with one row is at hand.
+    // Any serde format would do; here a file with one row is used.
     let parse = |text: &str| -> Result<Columns, csv::Error> {
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         reader.deserialize().next().unwrap()

@@ -99,7 +99,7 @@ fn ljung_box_counts_fitted_coefficients() {
 #[test]
 fn input_test_is_even_where_nothing_is_left() {
     type Input = fn(&mut ChaCha8Rng) -> Vec<f64>;
-    // The moves of an input that steps every twelve samples.
+    // Changes of an input with a step every twelve samples.
     let moves = |rng: &mut ChaCha8Rng| {
         let sizes = noise::white(N, 1.0, rng);
         (0..N)
@@ -135,8 +135,7 @@ fn input_test_is_even_where_nothing_is_left() {
 
 #[test]
 fn input_test_is_even_in_a_closed_loop() {
-    // A proportional controller on an integrating process: the residual is pure noise, but the
-    // input answers to it.
+    // A proportional controller on an integrating process: the residual is pure noise, but the input depends on it.
     let p: Vec<f64> = (0..RUNS)
         .map(|seed| {
             let mut rng = rng(seed);
@@ -197,7 +196,7 @@ fn tests_that_make_no_sense_are_refused() {
     let error = prewhitened_input_test(&x, &x[1..], 5);
     assert!(matches!(error, Err(Error::SeriesMismatch { .. })));
     assert!(prewhitened_input_test(&x, &x, 0).is_err());
-    // A still input explains nothing: no correlation.
+    // A constant input explains nothing: no correlation.
     let (correlation, p) = prewhitened_input_test(&[1.0; 30], &x, 5).unwrap();
     assert_eq!((correlation, p), (vec![0.0; 6], 1.0));
 }
@@ -250,7 +249,7 @@ fn tests_are_even_where_samples_are_missing_and_see_what_is_there() {
             let share = share_below(&p, 0.05);
             println!("{what}, {context}: {share} below 0.05");
             assert_uniform(&p, &format!("{what}, {context}"));
-            // Three standard errors, and what the chi-square approximation misses.
+            // Three standard errors, and the error of the chi-square approximation.
             let width = 3.0 * (0.05 * 0.95 / runs as f64).sqrt() + 0.005;
             assert!((share - 0.05).abs() < width, "{what}, {context}: {share}");
         };
@@ -299,7 +298,7 @@ fn tests_are_even_where_samples_are_missing_and_see_what_is_there() {
         sized(all(&unexplained(0.0, 0.0)), "white beside steps");
         sized(all(&unexplained(0.0, 0.9)), "noise of 0.9 beside steps");
         let seen = all(&unexplained(0.16, 0.0));
-        // Three samples of ten are missing: of whole records 0.8 are asked for.
+        // Three samples of ten are missing: with complete records the limit is 0.8.
         assert!(
             share_below(&seen, 0.01) > 0.75,
             "{}",
@@ -321,7 +320,7 @@ fn lags_without_pairs_do_not_count() {
             *x = f64::NAN;
         }
     }
-    // Every third sample only: the test of the series of these.
+    // Every third sample only: equal to the test of the series of these samples.
     let (whole, thin) = (ljung_box(&sampled, 6, 0), ljung_box(&x, 18, 0));
     assert_relative_eq!(whole.unwrap(), thin.unwrap(), max_relative = 1e-9);
     assert!(matches!(

@@ -41,10 +41,10 @@ fn outputs_that_are_not_there_have_no_sample_and_keep_their_place() {
     // Converted as everywhere.
     assert_eq!(record.outputs[1].values[..2], [1.0, 2.0]);
     assert!(record.outputs[1].values[2].is_nan());
-    // An input may rest at zero.
+    // An input may be constant at zero.
     assert_eq!(record.inputs[0].values, [0.0; 3]);
     assert!(fit.unwrap_err().to_string().contains("y1 [cm]"));
-    // Nobody names the outputs, and none is there.
+    // No output is named, and none exists.
     let unnamed = Columns {
         outputs: Vec::new(),
         ..columns()

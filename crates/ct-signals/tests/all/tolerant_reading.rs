@@ -28,7 +28,7 @@ fn refused(text: &str, columns: &Columns, options: &ReadOptions, words: &[&str])
     }
 }
 
-/// A plant at a minute an interval: stamps, a valve and litres, as a historian in Germany exports them.
+/// A plant with an interval of one minute: stamps, a valve and litres, in the format of a German historian.
 fn historian(row: impl Fn(usize) -> Option<String>) -> String {
     let rows = (0..60).filter_map(|k| Some(row(k)? + "\n"));
     "Zeit;Ventil [%];Inhalt [l]\n".to_string() + &rows.collect::<String>()
@@ -257,7 +257,7 @@ fn any_number_of_inputs_and_outputs_is_read() {
         (names(&record.inputs), names(&record.outputs)),
         (vec!["u".into(), "d".into()], vec!["a".into(), "b".into()])
     );
-    // An output at another rate is one of which samples are missing.
+    // An output at another rate is an output with missing samples.
     assert_eq!(record.outputs[1].missing(), 30);
     let twice = Columns {
         outputs: vec!["a".into(), "a".into()],

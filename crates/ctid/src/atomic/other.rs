@@ -1,4 +1,4 @@
-//! What a file has beside its content, where that is its permissions alone.
+//! Metadata of a file: here its permissions alone.
 
 use std::fs::{File, Metadata};
 use std::io;
@@ -8,10 +8,10 @@ pub(super) fn links(_: &Metadata) -> u64 {
     1
 }
 
-/// Gives a file what another has beside its content.
+/// Copies the metadata of a file to another file.
 pub(super) fn copy(_: &File, old: &Metadata, new: &File) -> io::Result<()> {
     new.set_permissions(old.permissions())
 }
 
-/// With which permissions it is made.
+/// Sets the permissions of the new file.
 pub(super) fn set_mode(_: &mut tempfile::Builder<'_, '_>, _: u32) {}

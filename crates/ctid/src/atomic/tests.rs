@@ -15,7 +15,7 @@ fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
     write_if(path, content, || true).map(|_| ())
 }
 
-/// What a killed run has left goes with the next one; what lives, and what is somebody else's, stays.
+/// Temporary files of killed runs are removed by the next run; files of running programs and of other programs stay.
 #[test]
 fn what_a_killed_run_has_left_is_removed() {
     let folder = tempfile::tempdir().unwrap();
@@ -49,7 +49,7 @@ fn a_file_that_is_there_is_not_created() {
     assert!(!create(&file, b"second").unwrap());
     assert_eq!(fs::read(&file).unwrap(), b"first");
     assert_eq!(names(folder.path()), ["out.json"]);
-    // Also where it comes after everything was looked at.
+    // Also if it appears after all checks.
     let late = new(&file, b"third").unwrap_err();
     assert_eq!(late.kind(), io::ErrorKind::AlreadyExists);
     assert_eq!(fs::read(&file).unwrap(), b"first");

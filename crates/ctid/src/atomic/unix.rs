@@ -1,4 +1,4 @@
-//! What a file has beside its content: owner, group, permissions, extended attributes, other names.
+//! Metadata of a file: owner, group, permissions, extended attributes, hard links.
 
 use std::fs::{File, Metadata, Permissions};
 use std::io;
@@ -9,7 +9,7 @@ pub(super) fn links(metadata: &Metadata) -> u64 {
     metadata.nlink()
 }
 
-/// Gives a file what another has beside its content.
+/// Copies the metadata of a file to another file.
 ///
 /// # Errors
 /// Where the user may not, as with the owner of a file of somebody else.
@@ -18,7 +18,8 @@ pub(super) fn copy(old: &File, metadata: &Metadata, new: &File) -> io::Result<()
     if (made.uid(), made.gid()) != (metadata.uid(), metadata.gid()) {
         fchown(new, Some(metadata.uid()), Some(metadata.gid()))?;
     }
-    // After the owner, whose change takes some of them away, and before the attributes, among which finer ones may be.
+    // Set the permissions after the owner, because a change of owner clears some of them, and before the attributes, which may contain an
+    // access control list.
     new.set_permissions(metadata.permissions())?;
     copy_extended(old, new)
 }
@@ -28,12 +29,12 @@ fn copy_extended(old: &File, new: &File) -> io::Result<()> {
     use rustix::fs::{XattrFlags, fgetxattr, flistxattr, fsetxattr};
     use rustix::io::Errno;
 
-    /// What Linux allows for all names, and for one value \[bytes\].
+    /// Limit of Linux for all attribute names, and for one value \[bytes\].
     const LARGEST: usize = 1 << 16;
 
     let mut names = vec![0; LARGEST];
     let length = match flistxattr(old, names.as_mut_slice()) {
-        // The file system has none.
+        // The file system has no extended attributes.
         Err(Errno::NOTSUP) => return Ok(()),
         length => length?,
     };
@@ -51,7 +52,7 @@ fn copy_extended(_: &File, _: &File) -> io::Result<()> {
     Ok(())
 }
 
-/// With which permissions it is made, from which the umask takes its part.
+/// Sets the permissions of the new file, which the umask reduces.
 pub(super) fn set_mode(builder: &mut tempfile::Builder<'_, '_>, mode: u32) {
     builder.permissions(Permissions::from_mode(mode));
 }

@@ -27,17 +27,17 @@ pub(super) struct Compare {
     /// Model file
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
-    /// Held-out record: takes no part in any fit or choice, and is only scored; may be repeated
+    /// Held-out record: only scored, not used for fits or selection; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
-    /// In a loop whose [controller] is known: simulate it from its reference, as is done for a plant, or run on the measured command, as is
-    /// done for a model of one's own
+    /// In a loop with a known [controller]: simulate the loop from its reference (default for a plant), or run the model on the measured
+    /// command (default for your own model)
     #[arg(long = "loop", value_enum, value_name = "WAY")]
     way: Option<LoopWay>,
     /// Limit on the time of the search; Ctrl-C ends it earlier with the best result so far
     #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
     effort: EffortLevel,
-    /// Seed of the random starts of a model of one's own: another one must not give another result
+    /// Seed of the random starts for your own model: the result should not depend on it
     #[arg(long, default_value_t = FitOptions::default().seed, value_name = "N", hide = true)]
     seed: u64,
     #[command(flatten)]
@@ -56,10 +56,10 @@ enum LoopWay {
 pub(super) struct Diagnose {
     #[command(flatten)]
     compare: Compare,
-    /// Write the shape of what nothing explains as CSV, for `ctid add NAME --from F`
+    /// Write the shape of the unexplained error as CSV, for `ctid add NAME --from F`
     #[arg(long, value_name = "F.csv")]
     unknown: Option<PathBuf>,
-    /// Add at most so many effects
+    /// Largest number of effects to add
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..), allow_negative_numbers = true)]
     max_effects: Option<u8>,
 }
@@ -74,7 +74,7 @@ impl Compare {
         }
     }
 
-    /// What stands in the model file and has no effect, and what the records cannot tell, where there is such.
+    /// Notes on entries of the model file that have no effect, and on what the records cannot show.
     fn notes(waiting: &[String], input: &Input, look: Look) -> String {
         let Input { problem, summaries } = input;
         let note = |table: &String| {
@@ -136,7 +136,7 @@ impl Compare {
     }
 }
 
-/// What is said of effects whose numbers are those of the records at hand.
+/// Notes on effects whose numbers come from the records of this run.
 fn not_kept(model: &OwnModelFile, used: &RecordNumbers, look: Look) -> String {
     let notes = model.not_kept(used).into_iter();
     notes
@@ -168,7 +168,7 @@ fn unused(tables: &[String], look: Look) -> String {
 }
 
 impl Compare {
-    /// A loop that was asked to be simulated, where that cannot be done.
+    /// A requested simulation of the loop that is not possible.
     fn check_loop(&self, model: &OwnModelFile) -> Result<(), Error> {
         match self.way {
             Some(LoopWay::Simulated) => model.require_no_loop(),
@@ -176,7 +176,7 @@ impl Compare {
         }
     }
 
-    /// A model of the user's own.
+    /// A user's own model.
     fn run_own(
         &self,
         model: &OwnModelFile,
@@ -234,7 +234,7 @@ impl Diagnose {
             look,
         )
     }
-    /// A model of the user's own.
+    /// A user's own model.
     fn run_own(
         &self,
         model: &OwnModelFile,

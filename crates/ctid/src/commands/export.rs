@@ -27,7 +27,8 @@ pub(super) struct Export {
     /// Records (CSV) that the model is fitted to; without one --modelica writes the values of the text and of [known]
     #[arg(value_name = "DATA.csv")]
     data: Vec<PathBuf>,
-    /// Write the model with its fitted values as Modelica, standard errors in comments: one of your own, or a plant of one input and one output without effects
+    /// Write the model with its fitted values as Modelica, standard errors in comments: one of your own, or a plant of one input and one
+    /// output without effects
     #[arg(long, value_name = "F.mo")]
     modelica: Option<PathBuf>,
     /// Write record, time, inputs, and of each output what was measured, the model and the residual

@@ -30,7 +30,7 @@ pub(super) struct Identify {
     /// Record (CSV), one; several of one plant for srivc and rivc
     #[arg(required = true, value_name = "DATA.csv")]
     data: Vec<PathBuf>,
-    /// How the parameters are found; several, with commas between them, or all, are set side by side
+    /// Estimation method; several, separated by commas, or `all`, are compared side by side
     #[arg(long, value_enum, value_delimiter = ',', required = true)]
     method: Vec<Choice>,
     /// Orders n of A and m of B in A y = B u + d; N..N tries all from one n to another with m below n
@@ -41,24 +41,24 @@ pub(super) struct Identify {
         allow_hyphen_values = true
     )]
     order: Orders,
-    /// Records that are not fitted, on which the models are tried
+    /// Records that are not fitted, for a test of the models
     #[arg(long, value_name = "TEST.csv", num_args = 1..)]
     test: Vec<PathBuf>,
-    /// Model file, of which the columns, the hold of the input and, by methods that have to do with the loop, the controller are used; beside a
-    /// linear model of your own stands its own transfer function
+    /// Model file: source of the columns, the hold of the input and, for methods for a loop, the controller; for a linear model of your
+    /// own, the identified model is compared with its transfer function
     #[arg(long, value_name = "M.toml", conflicts_with_all = ["columns", "hold"])]
     model: Option<PathBuf>,
-    /// Of a linear model of your own with several inputs: the one that is identified
+    /// For a linear model of your own with several inputs: the input that is identified
     #[arg(long, value_name = "NAME", requires = "model")]
     input: Option<String>,
-    /// The same of several outputs
+    /// For a linear model of your own with several outputs: the output that is identified
     #[arg(long, value_name = "NAME", requires = "model")]
     output: Option<String>,
-    /// The columns' names, where their first letters do not tell; several inputs with + between them, for srivc and rivc. Without a fourth name there is
-    /// no reference
+    /// Names of the columns, if their first letters are not sufficient; several inputs with + between them, for srivc and rivc. Without a
+    /// fourth name there is no reference
     #[arg(long, value_name = "TIME,INPUT,OUTPUT[,REFERENCE]", value_parser = columns)]
     columns: Option<Columns>,
-    /// What the input does between samples
+    /// Hold of the input between samples
     #[arg(long, value_enum, default_value_t = InputHold::Zero)]
     hold: InputHold,
     /// Memory of stabilized-oe, ct-rls and recursive-fcloe [s]; without it a fifth of the record, at least 10 time constants
@@ -68,13 +68,14 @@ pub(super) struct Identify {
     /// best of several, from which fcloe, recursive-fcloe, srivc and rivc start
     #[arg(long, value_name = "L", allow_negative_numbers = true)]
     bandwidth: Option<f64>,
-    /// Where zero of the signals is, for ls, iv, fcloe and recursive-fcloe
+    /// How the operating point (zero of the signals) is chosen, for ls, iv, fcloe and recursive-fcloe
     #[arg(long, value_enum, default_value_t = LevelChoice::Auto)]
     levels: LevelChoice,
-    /// Delay of the inputs [s], for srivc and rivc: a number, auto to estimate it up to a tenth of the record, or 0..S to estimate it up to S
+    /// Delay of the inputs [s], for srivc and rivc: a number, auto to estimate it up to a tenth of the record, or 0..S to estimate it up to
+    /// S
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     delay: Option<DelayChoice>,
-    /// The plant integrates, A(0) = 0; for srivc and rivc
+    /// The plant has an integrator, A(0) = 0; for srivc and rivc
     #[arg(long)]
     integrator: bool,
     /// Bandwidth of a filter on the reading in front of the controller [1/s]; y is the filtered reading
@@ -86,7 +87,7 @@ pub(super) struct Identify {
     results: Results,
 }
 
-/// Three or four names, in the order of the help.
+/// Three or four names, in the order of the help text.
 fn columns(text: &str) -> Result<Columns, String> {
     let names: Vec<&str> = text.split(',').map(str::trim).collect();
     let (time, input, output, reference) = match names[..] {
@@ -113,13 +114,13 @@ fn columns(text: &str) -> Result<Columns, String> {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum InputHold {
-    /// It stands until the next sample: a D/A converter
+    /// Constant until the next sample: a D/A converter
     Zero,
-    /// It runs on a line to the next sample: a measured input
+    /// A straight line to the next sample: a measured input
     First,
 }
 
-/// Which columns are read and how, and the model of the user's own that they are of.
+/// Columns, hold, and the user's own model to which the columns belong.
 type Layout<'l> = (&'l Columns, Hold, Option<&'l OneByOne<'l>>);
 
 impl Identify {
@@ -138,7 +139,7 @@ impl Identify {
         Ok(file)
     }
 
-    /// Which columns, the hold, and the controller with its limits.
+    /// Columns, hold, and the controller with its limits.
     fn layout(
         &self,
         model: Option<ModelFile>,
@@ -201,7 +202,7 @@ impl Identify {
         methods
     }
 
-    /// Refuses an option that concerns none of the methods.
+    /// Rejects an option that none of the methods uses.
     fn check_options(&self, methods: &[Method]) -> Result<(), Error> {
         let names: Vec<&str> = methods.iter().map(|method| method.id()).collect();
         let names = names.join(",");
@@ -231,12 +232,12 @@ impl Identify {
             );
         }
         if self.memory.is_some() && methods.iter().all(|method| weighs_all_alike(*method)) {
-            return refuse("--memory", "which weighs the whole record alike");
+            return refuse("--memory", "which gives all samples the same weight");
         }
         Ok(())
     }
 
-    /// What was asked of a method: the options that concern it.
+    /// Options that concern a method.
     fn request(
         &self,
         method: Method,
@@ -262,7 +263,7 @@ impl Identify {
         }
         if let Some(zeta) = self.sensor_filter.filter(|_| of_loop) {
             let Some(controller) = request.controller else {
-                return wrong("--sensor-filter is of a loop: give --model with a [controller], and a method that uses it".to_owned());
+                return wrong("--sensor-filter is of a loop: give --model with a [controller], and choose a method that uses the controller".to_owned());
             };
             request.controller = Some(controller.with_sensor_filter(zeta)?);
         }
@@ -391,7 +392,7 @@ impl Identify {
     }
 }
 
-/// Whether a method has no memory that could fade.
+/// Whether a method has a memory that does not fade.
 fn weighs_all_alike(method: Method) -> bool {
     method.is_refined() || method.is_of_loop() && method != Method::RecursiveFcloe
 }

@@ -1,4 +1,4 @@
-//! The command line: what may be typed, and what is then called.
+//! The command line: its options and the functions that it calls.
 
 mod compare;
 mod export;
@@ -23,7 +23,7 @@ use crate::progress::Bar;
 use crate::symptoms::Sought;
 use crate::{Error, catalogue, check, design, edit, monitor, serve, tour};
 
-/// Says which physical effect a model of measured data is missing.
+/// Finds the physical effect that a model of measured data is missing.
 #[derive(Debug, Parser)]
 #[command(
     version,
@@ -36,35 +36,36 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Fit the model and show it over the measurements, and where it fails
+    /// Fit the model, plot it against the measurements, and show where it fails
     Compare(Compare),
-    /// Find the missing effect: score the catalogue, confirm by refit, say what the data can tell
+    /// Find the missing effect: score the catalogue, confirm by refit, report what the data can show
     Diagnose(Diagnose),
-    /// Add an effect to a model file; comments and layout stay
+    /// Add an effect to a model file; comments and layout are preserved
     Add(Add),
-    /// Remove an effect from a model file; comments and layout stay
+    /// Remove an effect from a model file; comments and layout are preserved
     Remove(Remove),
-    /// List the catalogue of effects, or say all about one
+    /// List the catalogue of effects, or describe one
     Effects(Effects),
-    /// Read a model in Modelica and say what it holds: states, inputs, outputs, parameters, units that do not fit
+    /// Read a model in Modelica and summarise it: states, inputs, outputs, parameters, inconsistent units
     Check(Check),
     /// Simulate a model on new inputs, with a 95 % band where it is fitted to records first
     Simulate(Simulate),
     /// Write the fitted model as Modelica, or the curves and residuals of its fit as CSV
     Export(Export),
-    /// Propose the next experiment, which tells two effects apart
+    /// Propose the next experiment, which distinguishes two effects
     Design(design::Arguments),
-    /// Watch a running plant: rows on standard input; alarms out when the model stops fitting, with the effect it looks like
+    /// Monitor a running plant: rows on standard input; alarms on standard output when the model stops fitting, with the effect that is
+    /// consistent with the change
     Monitor(monitor::Arguments),
     /// Identify a linear model in continuous time from a record
     Identify(Box<Identify>),
-    /// Serve the page: the same with the mouse, on this machine alone
+    /// Serve the page: the same functions in a browser, on this computer only
     Serve(serve::Arguments),
-    /// Compute the tables of a paper again, with many noises, and say which printed figures agree
+    /// Compute the tables of a paper again, with many noises, and report which printed figures agree
     Tables(Tables),
 }
 
-/// Where results go besides the terminal.
+/// Files for results, in addition to the terminal.
 #[derive(Debug, Args)]
 struct Results {
     /// Write the result as JSON
@@ -77,13 +78,13 @@ struct Results {
 
 #[derive(Debug, Args)]
 struct Add {
-    /// The effect, as `ctid effects` lists it, of a plant with --from a name of your own
+    /// The effect, as listed by `ctid effects`; for a plant with --from, a name of your choice
     effect: String,
     /// Model file
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
-    /// Of a plant the shape of a term of your own, as `ctid diagnose --unknown` writes it; of a model of your own the result that `ctid diagnose --json`
-    /// wrote, of which the effect's sizes and the numbers of its record are kept
+    /// Of a plant the shape of a term of your own, as `ctid diagnose --unknown` writes it; of a model of your own the result that `ctid
+    /// diagnose --json` wrote, of which the effect's sizes and the numbers of its record are kept
     #[arg(long, value_name = "F", conflicts_with = "place")]
     from: Option<PathBuf>,
     /// The vessel it acts in, or the pump, where the plant has several
@@ -102,12 +103,12 @@ struct Remove {
 
 #[derive(Debug, Args)]
 struct Effects {
-    /// One effect to say all about
+    /// An effect to describe in full
     effect: Option<String>,
     /// List only what may be added to the model of this file
     #[arg(long, value_name = "M.toml", conflicts_with = "effect")]
     model: Option<PathBuf>,
-    /// List those that go with a symptom or a word of the process, best first: clog, drift, leak, stick, late, noisy
+    /// List the effects for a symptom or a word of the process, best first: clog, drift, leak, stick, late, noisy
     #[arg(long, value_name = "WORDS", conflicts_with = "effect")]
     like: Option<String>,
 }
@@ -181,7 +182,7 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
 }
 
 impl Results {
-    /// Where the results go, checked.
+    /// The checked files of the results.
     fn plan(&self, inputs: &[&Path], unknown: Option<&Path>) -> Result<Vec<Output>, Error> {
         let unknown = unknown.map(|path| (Kind::Unknown, path));
         let wanted: Vec<_> = self.wanted().chain(unknown).collect();
@@ -195,7 +196,7 @@ impl Results {
     }
 }
 
-/// Writes the files, then says what was found and what was written.
+/// Writes the files, then prints the findings and the names of the files.
 pub(crate) fn finish(
     found: &impl Found,
     text: &str,
@@ -203,7 +204,8 @@ pub(crate) fn finish(
     out: &mut dyn Write,
     look: Look,
 ) -> Result<(), Error> {
-    // The files first: whoever pipes the text into `head` still gets them. Where one cannot be written the text is not lost.
+    // The files are written first: they are complete even if the reader of the text closes the pipe. If a file cannot be written, the text
+    // is printed nevertheless.
     let written: Vec<_> = outputs.iter().map(|output| output.write(found)).collect();
     let mut text = text.to_string();
     if !outputs.is_empty() {
@@ -221,9 +223,11 @@ pub(crate) fn finish(
         };
         text += &look.faint(match (written, output.kind()) {
             (true, _) => format!("wrote {path}"),
-            (false, Kind::Record) => format!("{path} is not written: nothing is worth applying"),
+            (false, Kind::Record) => {
+                format!("{path} is not written: no experiment is worth applying")
+            }
             (false, _) => {
-                format!("{path} is not written: nothing is left unexplained that has a shape")
+                format!("{path} is not written: the residual shows no function of a variable")
             }
         });
         text.push('\n');
@@ -232,7 +236,7 @@ pub(crate) fn finish(
     failed
 }
 
-/// Writes text; a reader that has seen enough and gone is no error.
+/// Writes text; a reader that has closed the pipe is no error.
 pub(crate) fn say(out: &mut dyn Write, text: &str) -> Result<(), Error> {
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),

@@ -24,7 +24,7 @@ pub(super) struct Simulate {
     /// Model file
     #[arg(value_name = "M.toml")]
     model: PathBuf,
-    /// Inputs (CSV): the columns of the inputs, and where there are first readings of the outputs, those
+    /// Inputs (CSV): the columns of the inputs and, if available, first readings of the outputs
     #[arg(value_name = "INPUTS.csv")]
     inputs: PathBuf,
     /// Write time, outputs and the limits of their 95 % bands
@@ -33,7 +33,7 @@ pub(super) struct Simulate {
     /// Write the result as JSON
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
-    /// Fit the model to these records first; without it a model of your own takes the values of its text, without a band
+    /// Fit the model to these records first; without this option your own model uses the values of its text, and there is no band
     #[arg(long, value_name = "DATA.csv", num_args = 1..)]
     fit: Vec<PathBuf>,
     /// Leave out rows of the records of --fit before this; --from and --to are of the inputs
@@ -44,7 +44,7 @@ pub(super) struct Simulate {
         requires = "fit"
     )]
     fit_from: Option<String>,
-    /// Leave out rows of the records of --fit behind this
+    /// Leave out rows of the records of --fit after this
     #[arg(
         long,
         value_name = "TIME",
@@ -52,10 +52,10 @@ pub(super) struct Simulate {
         requires = "fit"
     )]
     fit_to: Option<String>,
-    /// Write the limits of a reading too: the band of the output and the noise
+    /// Write the limits of a reading too: the band of the output plus the noise
     #[arg(long, requires = "fit")]
     readings: bool,
-    /// Fit initial states to so many first readings of each output, where INPUTS.csv has them
+    /// Fit initial states to this number of first readings of each output, if INPUTS.csv has them
     #[arg(long, value_name = "N", default_value_t = FIRST_READINGS, value_parser = first, allow_negative_numbers = true)]
     initial: usize,
     /// Limit on the time of the fit of a plant
@@ -108,7 +108,7 @@ impl Simulate {
                 "a model file of a plant holds first guesses, no values: give the records that it is fitted to, --fit DATA.csv",
             ));
         }
-        // Without a fit the inputs are those that are applied, whatever moves them.
+        // Without a fit the given inputs are applied, also if a controller produced them.
         let fitted = (!self.fit.is_empty()).then(|| model.loop_said(look));
         let bar = Bar::new();
         bar.phase("fitting the model");

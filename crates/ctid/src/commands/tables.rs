@@ -21,10 +21,10 @@ pub(super) struct Tables {
     /// The paper
     #[arg(value_enum, default_value_t = Paper::Udink)]
     paper: Paper,
-    /// Noises: each table is run once with each; without it as many as a paper's bands are for, 200 or 100
+    /// Number of noises: each table is run once with each; by default the number for which a paper's bands are valid, 200 or 100
     #[arg(long, value_name = "N", value_parser = runs, allow_negative_numbers = true)]
     runs: Option<usize>,
-    /// What the noises are drawn from
+    /// Seed of the noise
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Write the record of baysse's emulated rig as CSV, for `diagnose` or `identify`
@@ -34,7 +34,7 @@ pub(super) struct Tables {
     results: Results,
 }
 
-/// How many runs; which of the limits holds is known with the paper.
+/// Number of runs; the limits depend on the paper.
 fn runs(text: &str) -> Result<usize, String> {
     text.parse().map_err(|_| {
         let (udink, baysse) = (udink::FEWEST, baysse::FEWEST);
@@ -52,15 +52,14 @@ enum Paper {
     All,
 }
 
-/// The runs that the bands of each paper are for.
+/// Number of runs for which the bands of each paper are valid.
 const RUNS_UDINK: usize = 200;
 const RUNS_BAYSSE: usize = 100;
 
 impl Tables {
     pub(super) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         if self.record.is_some() && !matches!(self.paper, Paper::Baysse) {
-            let what =
-                "--record is of the rig that `ctid tables baysse` emulates; no other paper has one";
+            let what = "--record belongs to the rig that `ctid tables baysse` emulates; no other paper has one";
             return Err(Error::Usage(what.to_owned()));
         }
         if self.results.report.is_some() && matches!(self.paper, Paper::All) {

@@ -1,4 +1,4 @@
-//! `ctid design`: the next experiment, which tells two effects apart.
+//! `ctid design`: the next experiment, which distinguishes two effects.
 
 pub mod text;
 
@@ -23,10 +23,10 @@ use crate::own_model::{self, AnyModelFile, OwnModelFile, OwnProposal};
 use crate::progress::Bar;
 use crate::{Error, names};
 
-/// What may be typed.
+/// Command line options.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Records (CSV) that leave it undecided; several are fitted together
+    /// Records (CSV) that do not decide between the two; several are fitted together
     #[arg(required = true, value_name = "DATA.csv")]
     data: Vec<PathBuf>,
     /// Model file; neither of the two effects is in it
@@ -39,19 +39,19 @@ pub struct Arguments {
     /// any: all that moved in the records
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
     input: Vec<AppliedRange>,
-    /// Smallest and largest command, or reference in a loop; without it what the records visited
+    /// Smallest and largest command, or reference in a loop; by default the range of the records
     #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true)]
     range: Option<Vec<f64>>,
-    /// Largest change of the command, or reference, in a second
+    /// Largest change of the command, or reference, per second
     #[arg(long, value_name = "MAX", allow_negative_numbers = true)]
     slew: Option<f64>,
-    /// Length [s]; without it that of the longest record
+    /// Length [s]; by default that of the longest record
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     duration: Option<f64>,
-    /// What sequences are drawn from
+    /// Seed of the random sequences
     #[arg(long, value_name = "S", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
-    /// Limit on the time of the search; the result says what it left out
+    /// Limit on the time of the search; the result lists the steps that were left out
     #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
     effort: EffortLevel,
     /// Where the experiment goes as CSV, if one is worth applying; without it next.csv, or next-2.csv where that is there
@@ -64,13 +64,13 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
-/// What random numbers are drawn from.
+/// Seed of random numbers.
 pub(crate) fn seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_| format!("a whole number from 0 to {} is needed", u64::MAX))
 }
 
-/// An input of a model of one's own, and its range where one is given.
+/// An input of a user's own model, and its range where one is given.
 #[derive(Debug, Clone)]
 struct AppliedRange {
     name: String,
@@ -99,7 +99,7 @@ impl std::str::FromStr for AppliedRange {
     }
 }
 
-/// A design, and in what unit of time its CSV is written.
+/// A design, and the unit of time of its CSV file.
 #[derive(Debug, Serialize)]
 pub struct Proposal {
     /// The design.
@@ -114,7 +114,7 @@ pub struct Proposal {
 }
 
 impl Proposal {
-    /// A design, its time written as these columns have it.
+    /// A design whose time is written in the format of these columns.
     #[must_use]
     pub fn new(design: Design, columns: &Columns) -> Self {
         let (time, seconds) = columns.time_header();
@@ -136,7 +136,7 @@ fn digits(value: f64) -> String {
 
 impl Found for Proposal {
     fn record(&self) -> Option<String> {
-        // What tells nothing apart is not worth applying.
+        // An experiment that does not distinguish the two is not worth applying.
         if self.design.twins() {
             return None;
         }
@@ -153,7 +153,7 @@ impl Found for Proposal {
     }
 }
 
-/// The effect of one of the two names, and the tank that it is to act in.
+/// The effect with one of the two names, and the tank in which it acts.
 pub(crate) fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Candidacy, Error> {
     let (id, place) = match name.split_once(':') {
         Some((id, place)) => (id, Some(place)),
@@ -231,7 +231,7 @@ impl Arguments {
         output::plan(&wanted, inputs)
     }
 
-    /// The limits for a model of one's own.
+    /// The limits for a user's own model.
     fn own_limits(&self, model: &OwnModelFile) -> Result<OwnLimits, Error> {
         let mut limits = OwnLimits {
             duration: self.duration,
@@ -268,7 +268,7 @@ impl Arguments {
         Ok(limits)
     }
 
-    /// Of a model of one's own.
+    /// For a user's own model.
     fn run_own(
         &self,
         model: &OwnModelFile,
@@ -296,7 +296,7 @@ impl Arguments {
         finish(&proposal, &text, &outputs, out, look)
     }
 
-    /// Designs, and writes what was asked for.
+    /// Designs an experiment, and writes the requested files.
     pub(crate) fn run(&self, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         let files = Files {
             data: self.data.clone(),
@@ -338,7 +338,7 @@ impl Arguments {
         );
         bar.clear();
         let design = design.map_err(|error| files.blame(error))?;
-        // Of a file that was asked for it is said that it is not there.
+        // If a file was requested, report that it is not written.
         if design.twins() && self.out.is_none() {
             outputs.retain(|output| output.kind() != Kind::Record);
         }

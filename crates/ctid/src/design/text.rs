@@ -1,4 +1,4 @@
-//! What a person reads of a design; all of it is derived from the struct that `--json` writes.
+//! Text output of a design; it is derived from the struct that `--json` writes.
 
 use missing_effect::design::{Alternative, Candidate, Design, Power};
 
@@ -6,10 +6,10 @@ use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 
-/// How many experiments the table shows.
+/// Number of experiments in the table.
 pub(crate) const SHOWN: usize = 10;
-/// What the columns of the table mean.
-pub(crate) const NOTE: &str = "(power: by so much the criterion of the wrong one rises on average; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; of those with power in plenty the first stays nearest to what the records visited)";
+/// Meaning of the table's columns.
+pub(crate) const NOTE: &str = "(power: the expected rise of the criterion of the wrong model; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; among experiments with ample power the first stays closest to the range of the records)";
 
 fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
@@ -28,11 +28,11 @@ pub fn design(design: &Design, look: Look) -> String {
     alternatives(design, look) + &experiments(design, look) + &findings(design, look)
 }
 
-/// The two effects on the records that there are.
+/// The two effects on the existing records.
 fn alternatives(design: &Design, look: Look) -> String {
     let [a, b] = &design.between;
     let title = format!(
-        "{} or {}, on the records that there are, weighted by their noise",
+        "{} or {}, on the existing records, weighted by their noise",
         named(a),
         named(b)
     );
@@ -55,7 +55,7 @@ fn alternatives(design: &Design, look: Look) -> String {
     lines(&look.heading(&title), &sides, &rows)
 }
 
-/// The experiments, the best first, and the same once more.
+/// The experiments, the best first, and the repetition of the previous one.
 fn experiments(design: &Design, look: Look) -> String {
     let (unit, limits) = (&design.experiment.unit, &design.limits);
     let what = if design.in_loop {
@@ -137,7 +137,7 @@ fn row(number: &str, candidate: &Candidate, design: &Design) -> Vec<String> {
     ]
 }
 
-/// What is below a hundredth is nothing.
+/// Values below a hundredth are shown as zero.
 pub(crate) fn power(power: &Power, refitted: bool) -> String {
     let mark = if refitted { "" } else { "~" };
     if power.power < 0.01 {

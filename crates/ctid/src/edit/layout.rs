@@ -1,10 +1,10 @@
-//! The text of a model file, changed in its own layout: its list of effects and where an effect acts.
+//! Changes of a model file's text that keep its layout: its list of effects, and the place of an effect.
 
 use toml_edit::{Array, DocumentMut, Item, Table, Value, value};
 
 use crate::Error;
 
-/// The text as a document that keeps its layout; `file` names it in messages.
+/// The text as a document with its layout; `file` is its name in messages.
 pub(crate) fn document(file: &str, text: &str) -> Result<DocumentMut, Error> {
     text.parse()
         .map_err(|error: toml_edit::TomlError| Error::File {
@@ -13,7 +13,7 @@ pub(crate) fn document(file: &str, text: &str) -> Result<DocumentMut, Error> {
         })
 }
 
-/// Appends to the list, in the list's own layout; makes the list where there is none.
+/// Appends to the list in the list's layout; creates the list if there is none.
 pub(super) fn push(document: &mut DocumentMut, id: &str) {
     let Some(effects) = document.get_mut("effects").and_then(Item::as_array_mut) else {
         document.insert("effects", value(Array::from_iter([id])));
@@ -25,7 +25,7 @@ pub(super) fn push(document: &mut DocumentMut, id: &str) {
         effects.push(id);
         return;
     }
-    // One effect a line: a comment behind the last one stays behind it.
+    // One effect per line: a comment after the last effect stays after it.
     let indent = effects
         .iter()
         .last()
@@ -40,8 +40,7 @@ pub(super) fn push(document: &mut DocumentMut, id: &str) {
     effects.set_trailing_comma(comma);
 }
 
-/// Takes an effect out of the list. What stands before an entry may be the comment of the entry
-/// above it, so it is handed on to what follows.
+/// Removes an effect from the list. Text before an entry may be the comment of the entry above it, so the text is moved to the next entry.
 pub(super) fn take_out(effects: &mut Array, id: &str) -> bool {
     let Some(index) = effects.iter().position(|on| on.as_str() == Some(id)) else {
         return false;
@@ -69,7 +68,7 @@ pub(super) fn take_out(effects: &mut Array, id: &str) -> bool {
     true
 }
 
-/// Writes `where = "..."` into the `[effect.X]` table, made where there is none.
+/// Writes `where = "..."` into the `[effect.X]` table, which is created if necessary.
 pub(super) fn set_place(document: &mut DocumentMut, id: &str, word: &str) -> Option<()> {
     let mut tables = Table::new();
     tables.set_implicit(true);

@@ -1,5 +1,5 @@
-//! `ctid add` and `ctid remove`: they edit the `effects = [...]` line of a model file and leave
-//! everything else as it stands, comments and layout included.
+//! `ctid add` and `ctid remove`: they edit the `effects = [...]` line of a model file and do not change anything else, including comments
+//! and layout.
 
 mod layout;
 pub(crate) mod own;
@@ -19,26 +19,27 @@ use crate::model_file::{self, ModelFile};
 use crate::term_file;
 use crate::{Error, atomic, names};
 
-/// Adds an effect to a model file; `place` is a vessel or a pump, where there is a choice. Returns
-/// what was done, in one line.
+/// Adds an effect to a model file; `place` is a vessel or a pump, if there is a choice. Returns a description of the change, in one line.
 ///
 /// # Errors
 /// Where the effect is unknown, on already, or does not act on this plant or there; the file is
 /// then as it was.
 pub fn add(path: &Path, effect: &str, place: Option<&str>) -> Result<String, Error> {
     let name = path.display().to_string();
-    change(path, |text| match (own::is_own(text), place) {
+    change(path, |text| {
+        match (own::is_own(text), place) {
         (false, _) => with_effect(&name, text, effect, place),
         (true, None) => own::with_effect(path, text, effect, None, &own::beside(path)),
         (true, Some(_)) => Err(Error::Usage(
-            "--where is of the plants: at a model of your own the effect names its port, as lag(u)"
+            "--where is for the built-in plants only: for your own model the effect names its port, as lag(u)"
                 .to_string(),
         )),
+    }
     })
 }
 
-/// Adds to a plant a term of the user's own, its shape read from a CSV file; to a model of the user's own an effect, with what a result in
-/// JSON found of it. Returns what was done, in one line.
+/// Adds a user's own term to a plant, with its shape read from a CSV file; to a user's own model an effect, with its values from a result
+/// in JSON. Returns a description of the change, in one line.
 ///
 /// # Errors
 /// Where the name is taken or the shape cannot act on this plant, or the result is not one of this model and effect; the file is then as it
@@ -56,7 +57,7 @@ pub fn add_from(path: &Path, name: &str, from: &Path) -> Result<String, Error> {
     change(path, |text| with_term(&file, text, name, &from, &read))
 }
 
-/// Removes an effect or a term from a model file. Returns what was done, in one line.
+/// Removes an effect or a term from a model file. Returns a description of the change, in one line.
 ///
 /// # Errors
 /// Where the effect is unknown or not on; the file is then as it was.
@@ -71,18 +72,18 @@ pub fn remove(path: &Path, effect: &str) -> Result<String, Error> {
     })
 }
 
-/// A changed text and what was done, in one line.
+/// A changed text and a description of the change, in one line.
 pub struct Edited {
     /// The model file's new text.
     pub text: String,
-    /// What was done.
+    /// Description of the change.
     pub done: String,
 }
 
-/// One change after the other: of two at once, as from two tabs of `ctid serve`, one would be lost.
+/// Serialises changes: of two simultaneous changes, as from two tabs of `ctid serve`, one would be lost.
 static CHANGING: Mutex<()> = Mutex::new(());
 
-/// Whoever writes into the file meanwhile, such as an editor, is read so often again.
+/// Number of attempts if another program, such as an editor, writes to the file at the same time.
 const READINGS: usize = 5;
 
 /// Changes a file's text; its kind of line ends stays. What others have written there meanwhile is kept: the change is then made to
@@ -99,7 +100,7 @@ pub(crate) fn change(
     for _ in 0..READINGS {
         let text = model_file::read_text(path)?;
         let edited = edit(&text)?;
-        // The editor writes LF; a file from an editor that writes CRLF keeps it.
+        // The editor writes LF; a file with CRLF keeps CRLF.
         let written = if text.contains("\r\n") {
             edited.text.replace("\r\n", "\n").replace('\n', "\r\n")
         } else {
@@ -111,11 +112,11 @@ pub(crate) fn change(
     }
     Err(changed(
         &path.display().to_string(),
-        "something else writes into it all the time",
+        "another program keeps writing to it",
     ))
 }
 
-/// Puts a whole text in the place of `from`, or where no file is.
+/// Replaces the text `from` by a new one, or creates the file.
 ///
 /// # Errors
 /// [`Error::Changed`] where another text stands there.
@@ -136,11 +137,11 @@ fn still(path: &Path, text: &str) -> bool {
     model_file::read_text(path).is_ok_and(|now| now == text)
 }
 
-/// A change that would have been made to something else than was seen.
+/// Error: the file has changed since it was shown.
 pub(crate) fn changed(file: &str, what: &str) -> Error {
     Error::Changed {
         file: file.to_string(),
-        what: format!("{what}; nothing was written; look at what stands there now and try again"),
+        what: format!("{what}; nothing was written; check the present content and try again"),
     }
 }
 
@@ -165,7 +166,7 @@ pub fn with_effect(
     let effect = names::effect(effect)?;
     if model.effects.iter().any(|on| on.effect.id == effect.id) {
         return Err(refuse(format!(
-            "{} is on already; `ctid remove {0}` takes it out",
+            "{} is in the model already; `ctid remove {0}` takes it out",
             effect.id
         )));
     }
@@ -193,7 +194,7 @@ pub fn with_effect(
         })?;
     }
     let text = document.to_string();
-    // What is about to be written has to be a model file that can be read again.
+    // The new text has to be a valid model file.
     let model = model_file::parse(file, &text)?;
     let placed = model.effects.last().copied().unwrap_or(placed);
     let done = format!(
@@ -205,7 +206,7 @@ pub fn with_effect(
     Ok(Edited { text, done })
 }
 
-/// The text with a column for a signal under `[columns]`; an empty name takes it away.
+/// The text with a column for a signal under `[columns]`; an empty name removes the column.
 ///
 /// # Errors
 /// Where the text is no TOML, or `columns` is no table.
@@ -231,7 +232,7 @@ pub(crate) fn with_column(
     {
         _ if column.is_empty() => drop(table.remove(signal)),
         Some(said) => {
-            // A comment behind it stays.
+            // A comment after the value stays.
             let decor = said.decor().clone();
             *said = column.into();
             *said.decor_mut() = decor;
@@ -249,7 +250,7 @@ fn has_table(document: &DocumentMut, name: &str) -> bool {
         .is_some_and(|terms| terms.contains_key(name))
 }
 
-/// The text of a model file without an effect or a term; its `[effect.X]` table stays for another day.
+/// The text of a model file without an effect or a term; its `[effect.X]` table is kept for later use.
 ///
 /// # Errors
 /// As [`remove`].
@@ -269,7 +270,7 @@ pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Er
         return Err(Error::File {
             file: file.to_string(),
             what: format!(
-                "{} is not on, so it cannot be removed; effects = {}",
+                "{} is not in the model, so it cannot be removed; effects = {}",
                 id,
                 list(&model)
             ),
@@ -278,14 +279,14 @@ pub fn without_effect(file: &str, text: &str, effect: &str) -> Result<Edited, Er
     let text = document.to_string();
     let model = model_file::parse(file, &text)?;
     let kept = match document.get(kind).and_then(|table| table.get(id)) {
-        Some(_) => format!("; [{kind}.{id}] stays for the day it is added again"),
+        Some(_) => format!("; [{kind}.{id}] is kept in the file for when it is added again"),
         None => String::new(),
     };
     let done = format!("{file}: removed {}; effects = {}{kept}", id, list(&model));
     Ok(Edited { text, done })
 }
 
-/// ` at the upper vessel`, ` at the sensor of the lower tank`, where the plant has several; `assumed` when nobody said which.
+/// ` at the upper vessel`, ` at the sensor of the lower tank`, if the plant has several; `assumed` if the user did not name a place.
 fn place_of(model: &ModelFile, placed: Placed, assumed: bool) -> String {
     let Some(name) = placed.place_name(model.plant, &model.known) else {
         return String::new();

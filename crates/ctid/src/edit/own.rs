@@ -1,4 +1,4 @@
-//! `ctid add` and `ctid remove` of effects at the ports of a model of its user's own.
+//! `ctid add` and `ctid remove` of effects at the ports of a user's own model.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,10 +17,10 @@ use crate::own_model::effects::{RECORD, every_candidate, find, plain};
 use crate::own_model::{OwnModelFile, read_model};
 use crate::report::rounded;
 
-/// Where the text that a model file names is read.
+/// Reads the text that a model file names.
 pub(crate) type ReadText<'r> = &'r dyn Fn(&Path) -> Result<ModelSpec, Error>;
 
-/// Of what `ctid diagnose --json` and `ctid compare --json` write of a model of its user's own, what is kept in a model file.
+/// The parts of the JSON results of `ctid diagnose` and `ctid compare`, for a user's own model, that a model file can keep.
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct Findings {
     model: String,
@@ -36,7 +36,7 @@ struct FoundStep {
     parameters: Vec<FoundParameter>,
 }
 
-/// An effect alone beside the believed model.
+/// Result of one effect added alone to the believed model.
 #[derive(Debug, Clone, Deserialize)]
 struct FoundSingle {
     sizes: Vec<FoundParameter>,
@@ -52,15 +52,15 @@ impl Findings {
     /// Reads a result.
     ///
     /// # Errors
-    /// Where the file is none of a diagnosis or a comparison of a model of its user's own.
+    /// Where the file is none of a diagnosis or a comparison of a user's own model.
     pub fn read(path: &Path) -> Result<Self, Error> {
         Self::of_text(&read_text(path)?).map_err(|what| Error::file(path, what))
     }
 
-    /// The same of its text.
+    /// Reads the findings from a JSON text.
     ///
     /// # Errors
-    /// What is wrong and the mend.
+    /// What is wrong and the correction.
     pub fn of_text(text: &str) -> Result<Self, String> {
         serde_json::from_str(text).map_err(|error| {
             format!(
@@ -69,13 +69,13 @@ impl Findings {
         })
     }
 
-    /// Whether it says anything of an effect.
+    /// Whether the result contains an effect.
     pub fn has(&self, id: &str) -> bool {
         self.record_numbers.contains_key(id)
     }
 
-    /// The value of a parameter in the last model that has it, of the shape of what no candidate explains, or, of an effect that is in no
-    /// model, as it was fitted alone.
+    /// The value of a parameter in the last model with this parameter, of the unexplained function, or, for an effect that is in no model,
+    /// from its single fit.
     fn value(&self, name: &str) -> Option<f64> {
         let steps = self.steps.iter().rev().chain(&self.unknown);
         let steps = steps.flat_map(|step| &step.parameters);
@@ -88,16 +88,16 @@ impl Findings {
 }
 
 impl Findings {
-    /// What is kept of an effect: where fits of its parameters begin, and the numbers of its records.
+    /// Values to keep for an effect: start values of its parameters, and the numbers of its records.
     ///
     /// # Errors
-    /// Where the result says nothing of it.
+    /// Where the result contains no information about it.
     pub fn kept(&self, candidate: &Candidate) -> Result<Kept, String> {
         let id = &candidate.id;
         let Some(numbers) = self.record_numbers.get(id) else {
             let known: Vec<&str> = self.record_numbers.keys().map(String::as_str).collect();
             return Err(format!(
-                "the result says nothing of {id}: it has {}; without --from the effect is fitted anew",
+                "the result does not contain {id}: it has {}; without --from the effect is fitted anew",
                 known.join(", ")
             ));
         };
@@ -137,13 +137,13 @@ impl From<&Diagnosis> for Findings {
     }
 }
 
-/// Whether a text is the model file of a model of its user's own.
+/// Whether a text is the model file of a user's own model.
 pub(super) fn is_own(text: &str) -> bool {
     let table = text.parse::<toml::Table>();
     table.is_ok_and(|table| table.contains_key("model"))
 }
 
-/// Where the text stands that a model file of this path names.
+/// Finds the text that the model file at this path names.
 pub(super) fn beside(path: &Path) -> impl Fn(&Path) -> Result<ModelSpec, Error> {
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     move |named| read_model(&folder.join(named))
@@ -172,7 +172,7 @@ pub(crate) fn with_effect(
     let is_on = model.effects.on.contains(id);
     if is_on && from.is_none() {
         return Err(refuse(format!(
-            "{id} is on already; `ctid remove '{id}'` takes it out, and --from RESULT.json keeps what a result found of it"
+            "{id} is in the model already; `ctid remove '{id}'` takes it out, and --from RESULT.json keeps what a result found of it"
         )));
     }
     let mut document = document(&file, text)?;
@@ -199,7 +199,7 @@ pub(crate) fn with_effect(
     Ok(Edited { text, done })
 }
 
-/// Writes what a result found of an effect into its table. Returns what, in words.
+/// Writes a result's values of an effect into its table. Returns a description of them.
 fn keep(
     document: &mut DocumentMut,
     candidate: &Candidate,
@@ -245,7 +245,7 @@ fn keep(
     })
 }
 
-/// Sets a key; a comment behind it stays.
+/// Sets a key; a comment after it stays.
 fn set(table: &mut dyn toml_edit::TableLike, key: &str, mut item: Item) {
     let before = table.get(key).and_then(Item::as_value);
     if let (Some(before), Some(new)) = (before, item.as_value_mut()) {
@@ -254,7 +254,7 @@ fn set(table: &mut dyn toml_edit::TableLike, key: &str, mut item: Item) {
     table.insert(key, item);
 }
 
-/// The text of a model file without an effect; its `[effect."..."]` table stays for another day.
+/// The text of a model file without an effect; its `[effect."..."]` table is kept for later use.
 ///
 /// # Errors
 /// Where it is not on.
@@ -267,7 +267,7 @@ pub(crate) fn without_effect(
     let file = path.display().to_string();
     let mut document = document(&file, text)?;
     let wanted = plain(effect);
-    // As it is written there, with blanks or without.
+    // The entry as written in the file, with or without blanks.
     let listed = document.get_mut("effects").and_then(Item::as_array_mut);
     let removed = listed.is_some_and(|effects| {
         let written = effects.iter().filter_map(|on| on.as_str());
@@ -279,7 +279,7 @@ pub(crate) fn without_effect(
         return Err(Error::File {
             file,
             what: format!(
-                "{wanted} is not on, so it cannot be removed; effects = {:?}",
+                "{wanted} is not in the model, so it cannot be removed; effects = {:?}",
                 model.effects.on
             ),
         });
@@ -288,7 +288,7 @@ pub(crate) fn without_effect(
     let model = OwnModelFile::parse_with(path, &text, read)?;
     let waits = model.effects.waiting.contains(&wanted);
     let kept = if waits {
-        format!("; [effect.\"{wanted}\"] stays for the day it is added again")
+        format!("; [effect.\"{wanted}\"] is kept in the file for when it is added again")
     } else {
         String::new()
     };

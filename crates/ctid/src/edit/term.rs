@@ -1,4 +1,4 @@
-//! Terms of an own model, written into its file.
+//! Terms of the user's own, written into the model file.
 
 use plants::{Fitted, Term};
 use toml_edit::{Array, Item, Table, value};
@@ -10,7 +10,7 @@ use crate::report::rounded;
 use crate::term_file::TermFile;
 use crate::{Error, model_file, term_file};
 
-/// The text with a term whose table is there already.
+/// The text with a term whose table already exists.
 pub(super) fn with_waiting_term(
     file: &str,
     text: &str,
@@ -20,7 +20,7 @@ pub(super) fn with_waiting_term(
     if model.terms.iter().any(|on| on.term.name == name) {
         return Err(Error::File {
             file: file.to_string(),
-            what: format!("{name} is on already; `ctid remove {name}` takes it out"),
+            what: format!("{name} is in the model already; `ctid remove {name}` takes it out"),
         });
     }
     let mut document = document(file, text)?;
@@ -49,7 +49,7 @@ pub fn with_term(
             file: file.to_string(),
             what: if model.terms.iter().any(|on| on.term.name == name) {
                 format!(
-                    "{name} is on already; give another name, or `ctid remove {name}` and delete [term.{name}]"
+                    "{name} is in the model already; give another name, or `ctid remove {name}` and delete [term.{name}]"
                 )
             } else {
                 format!(
@@ -107,12 +107,12 @@ pub fn with_term(
     Ok(Edited { text, done })
 }
 
-/// To the digits that a person reads.
+/// Rounds values to the digits that are shown.
 fn shortened(values: &[f64]) -> Vec<f64> {
     values.iter().map(|&value| rounded(value, 6)).collect()
 }
 
-/// The same of knots, where they still rise then.
+/// Rounds knots, if they still rise after rounding.
 fn knots(at: &[f64]) -> Vec<f64> {
     let short = shortened(at);
     if short.windows(2).all(|pair| pair[0] < pair[1]) {

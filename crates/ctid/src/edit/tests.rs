@@ -80,7 +80,7 @@ fn the_place_is_written_where_there_is_a_choice() {
         "{}",
         done.done
     );
-    // The table has waited: nobody need say again where.
+    // The table was kept: the place need not be given again.
     let again = with_effect("tank.toml", &done.text, "overflow", None).unwrap();
     assert_eq!(
         model_file::parse("", &again.text).unwrap().effects[0].vessel,
@@ -99,7 +99,7 @@ fn what_cannot_be_done_is_refused() {
     };
     assert_eq!(
         add("overflow", None),
-        "tank.toml: overflow is on already; `ctid remove overflow` takes it out"
+        "tank.toml: overflow is in the model already; `ctid remove overflow` takes it out"
     );
     assert!(add("overflo", None).contains("did you mean overflow?"));
     assert!(add("sqrt_outflow", None).contains("does not act on plant"));
@@ -108,7 +108,7 @@ fn what_cannot_be_done_is_refused() {
     let remove = without_effect("tank.toml", text, "pump_lag");
     assert_eq!(
         remove.err().unwrap().to_string(),
-        "tank.toml: pump_lag is not on, so it cannot be removed; effects = [\"overflow\"]"
+        "tank.toml: pump_lag is not in the model, so it cannot be removed; effects = [\"overflow\"]"
     );
 }
 
@@ -127,7 +127,7 @@ fn a_refused_change_leaves_the_file_as_it_was() {
         std::fs::read(&path).unwrap(),
         b"plant = \"single-tank\"\r\neffects = [\"overflow\"]\r\n"
     );
-    // Nothing is left beside it.
+    // No temporary file is left in the folder.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
@@ -141,7 +141,7 @@ fn in_a_file(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
 
 const BARE: &str = "plant = \"single-tank\"\neffects = []\n";
 
-/// An editor that writes between reading and writing loses nothing, and neither does who adds the effect.
+/// An editor that writes between reading and writing loses nothing, and neither does the user who adds the effect.
 #[test]
 fn what_is_written_meanwhile_is_kept() {
     let (_folder, path) = in_a_file(BARE);

@@ -1,4 +1,4 @@
-//! `ctid identify` for a person: the results of the crate `linear-identification` as text.
+//! `ctid identify`: the results of the crate `linear-identification` as text.
 
 pub mod side_by_side_text;
 pub mod text;

@@ -5,7 +5,7 @@ use linear_identification::side_by_side::{Outcome, Row, SideBySide};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 
-/// The whole of it.
+/// The complete text.
 #[must_use]
 pub fn text(found: &SideBySide, look: Look) -> String {
     let mut text = format!(
@@ -21,15 +21,15 @@ pub fn text(found: &SideBySide, look: Look) -> String {
     text
 }
 
-/// By what the methods are compared.
+/// Measure by which the methods are compared.
 pub(crate) fn measure(found: &SideBySide) -> String {
     let test = match &found.test[..] {
         [] => String::new(),
         names => format!(", and on {}, which was not fitted", names.join(", ")),
     };
     let in_loop = if found.in_loop {
-        " The input answers to the noise through the controller, and a model that takes this for the plant fits better: here the fit does \
-         not say which method is right."
+        " The controller feeds the noise back to the input. A model that attributes this feedback to \
+         the plant fits better, so the fit does not show which method is right."
     } else {
         ""
     };
@@ -41,7 +41,7 @@ pub(crate) fn measure(found: &SideBySide) -> String {
     )
 }
 
-/// The methods that found something.
+/// The methods with a result.
 pub(crate) fn with_results(found: &SideBySide) -> impl Iterator<Item = (&Row, &Outcome)> {
     let rows = found.methods.iter();
     rows.filter_map(|row| row.found.as_ref().map(|outcome| (row, outcome)))
@@ -117,7 +117,7 @@ pub(crate) fn tests(outcome: &Outcome) -> String {
         p => format!("p = {}", numbers::decimals(p, 3)),
     };
     format!(
-        "error white: {}; free of the input: {}",
+        "simulation error white: {}; uncorrelated with the input: {}",
         p(outcome.whiteness_p),
         p(outcome.input_p)
     )
@@ -177,10 +177,10 @@ fn orders(found: &SideBySide, look: Look) -> String {
     text
 }
 
-/// What the table of orders says.
+/// Meaning of the table of orders.
 pub(crate) const ORDERS: &str = "BIC of the simulation error beside an autoregressive noise model: shown above is the least of a method whose parameters differ \
      significantly from zero. \
-     YIC: the lower, the better known are the parameters of a model that fits; it needs standard errors.";
+     YIC: low for a model that fits and has small standard errors; it needs standard errors.";
 
 /// The largest standard error of a parameter over its size.
 pub(crate) fn largest_error(outcome: &Outcome) -> Option<f64> {

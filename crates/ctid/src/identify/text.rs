@@ -143,7 +143,7 @@ fn parameters(found: &Identification, look: Look) -> String {
             numbers::duration(settings.first_order),
         ),
         (None, Some(_)) => {
-            "(the last column is of the second half; standard errors take the residual for white)"
+            "(the last column is of the second half; standard errors assume a white residual)"
                 .to_owned()
         }
         (None, None) => return text,
@@ -153,7 +153,7 @@ fn parameters(found: &Identification, look: Look) -> String {
     text
 }
 
-/// The second half: the start is not the record's.
+/// The second half, where the start has no influence.
 fn settled(values: &[f64]) -> &[f64] {
     values.get(values.len() / 2..).unwrap_or_default()
 }
@@ -229,7 +229,7 @@ fn drift(found: &Identification, look: Look) -> String {
     text
 }
 
-/// What `a_1` is.
+/// Name of `a_1`.
 pub(crate) fn time_constant_name(found: &Identification) -> &'static str {
     match found.order.n {
         1 => "time constant a1",
@@ -237,23 +237,23 @@ pub(crate) fn time_constant_name(found: &Identification) -> &'static str {
     }
 }
 
-/// What the drift says, nothing where none is known.
+/// Sentence about the drift; empty if it is not known.
 pub(crate) fn drift_verdict(found: &Identification) -> String {
     let Some(drift) = &found.drift else {
         return String::new();
     };
     if drift.moves() {
-        return "The estimates move with the level by more than chance: the process is not linear over this range, or not of this order."
+        return "The estimates change with the level by more than chance: the process is not linear over this range, or not of this order."
             .to_owned();
     }
     if drift.tells() {
-        return "The estimates do not move with the level beyond their standard errors; a shorter --memory sees faster changes, less surely."
+        return "The estimates do not change with the level beyond their standard errors; a shorter --memory follows faster changes with larger standard errors."
             .to_owned();
     }
     let percent = |part: f64| numbers::significant(100.0 * part, 2);
     format!(
-        "This record is too short to tell whether the estimates move with the level: the memory is {} % of it, and the level that it \
-         remembers covers {} % of the output's range; record longer, or try a shorter --memory.",
+        "This record is too short to tell whether the estimates change with the level: the memory is {} % of it, and the level within the memory \
+         covers {} % of the output's range; record longer, or try a shorter --memory.",
         percent(drift.memory_part),
         percent(drift.level_part)
     )
@@ -296,7 +296,7 @@ fn in_loop(found: &Identification, look: Look) -> String {
     let Some(in_loop) = &found.in_loop else {
         return String::new();
     };
-    let mut text = format!("{}\n", look.heading("The loop, and the way there"));
+    let mut text = format!("{}\n", look.heading("The loop, and how it was estimated"));
     for (name, sentence) in facts(found, in_loop) {
         text += &look.paragraph("  - ", &format!("{name}: {sentence}"));
     }

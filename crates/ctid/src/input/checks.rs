@@ -1,4 +1,4 @@
-//! Whether records fit each other, the model's units and sizes, and its parameters.
+//! Checks that records are consistent with each other, with the model's units and sizes, and with its parameters.
 
 use ct_signals::Record;
 use plants::controller::Controller;
@@ -7,20 +7,19 @@ use plants::{Outlet, Place, Plant, Scales};
 use crate::model_file::{ControllerLaw, ControllerSettings, ModelFile};
 use crate::{Error, numbers};
 
-/// Readings above the tank's height by this part, and commands above their range, are noise.
+/// Readings above the tank's height, and commands above their range, by up to this share are noise.
 const BEYOND_THE_RANGE: f64 = 1.01;
 
-/// Where an effect of the sensor is in the model a full tank may read this many times its height; a reading beyond is in
-/// another unit.
+/// With an effect of the sensor in the model, a full tank may read up to this many times its height; a larger reading has another unit.
 const BEYOND_THE_TANK: f64 = 1.5;
 
-/// Readings this far below zero, as a part of what the record spans, are no noise about an empty tank.
+/// Readings below zero by more than this share of the record's range are not noise about an empty tank.
 const BELOW_THE_OUTLET: f64 = 0.1;
 
-/// Sampling intervals that differ by less than this part are one: times are read from text.
+/// Sampling intervals that differ by less than this share are equal: times are read from text.
 const SAME_INTERVAL: f64 = 0.01;
 
-/// The controller as it ran in the records.
+/// The controller at the interval of the records.
 pub(super) fn controller(
     model_name: &str,
     settings: &ControllerSettings,
@@ -63,12 +62,12 @@ pub(super) fn controller(
         file: model_name.to_string(),
         what: error.to_string(),
     })?;
-    // Of several levels it is the last one that is held.
+    // With several levels, the controller controls the last one.
     let outputs = records.first().map_or(1, |record| record.outputs.len());
     Ok(controller.at_output(outputs.saturating_sub(1)))
 }
 
-/// Records that are fitted by one model are in one unit, and so are the commands of two pumps and the levels of several tanks.
+/// All records of a fit have the same units, and so have the commands of two pumps and the levels of several tanks.
 pub(super) fn check_units(pumps: usize, records: &[Record], test: &[Record]) -> Result<(), Error> {
     let Some((first, others)) = records.split_first() else {
         return Err(Error::Usage(
@@ -138,7 +137,7 @@ pub(super) fn check_units(pumps: usize, records: &[Record], test: &[Record]) -> 
     Ok(())
 }
 
-/// Some fitted record has an input that moves; those beside it, and held-out ones, may be at rest.
+/// At least one fitted record has an input that changes; the other records may be at rest.
 pub(super) fn check_movement(records: &[Record]) -> Result<(), Error> {
     let mut still = records.iter().map(Record::require_moving_input);
     match records.first() {
@@ -147,7 +146,7 @@ pub(super) fn check_movement(records: &[Record]) -> Result<(), Error> {
     }
 }
 
-/// A level above the tank is in another unit than the tank, or its sensor is not right.
+/// At least one fitted record has an input that changes; the other records may be at rest.
 pub(super) fn check_height<'a>(
     model_name: &str,
     model: &ModelFile,
@@ -217,7 +216,7 @@ pub(super) fn check_input<'a>(
     Ok(())
 }
 
-/// A unit behind a number.
+/// A unit after a number.
 fn after_space(unit: &str) -> String {
     match unit {
         "" => String::new(),
@@ -225,8 +224,8 @@ fn after_space(unit: &str) -> String {
     }
 }
 
-/// Where the outflow is a square root of the level a reading far below zero has another zero than the outlet: no such
-/// level can be simulated. Noise about an empty tank may reach below it, and so may a sensor whose offset is in the model.
+/// If the outflow depends on the square root of the level, a reading far below zero has another zero than the outlet and cannot be
+/// simulated. Noise around an empty tank may be slightly negative, and so may the reading of a sensor whose offset is in the model.
 pub(super) fn check_levels<'a>(
     model: &ModelFile,
     mut records: impl Iterator<Item = &'a Record>,
@@ -263,7 +262,7 @@ pub(super) fn check_levels<'a>(
     })
 }
 
-/// A term is written in the units of the record that it was found on.
+/// A term has the units of the record in which it was found.
 pub(super) fn check_terms(
     model_name: &str,
     model: &ModelFile,
@@ -291,7 +290,7 @@ pub(super) fn check_terms(
     Ok(())
 }
 
-/// Enough rows for the parameters; every record brings initial levels of its own.
+/// Checks that there are enough rows for the parameters; every record has its own initial levels.
 pub(super) fn check_rows(model: &ModelFile, records: &[Record]) -> Result<(), Error> {
     let Some(first) = records.first() else {
         return Ok(());

@@ -1,11 +1,10 @@
-//! Whether the records can tell anything of the process, seen without a fit.
+//! Checks of the information in the records, without a fit.
 //!
-//! Three findings, each made so that a record that a fit can use raises none of them:
+//! There are three warnings. A record that a fit can use causes none of them:
 //!
 //! - a record whose command never moves, beside one whose command does;
 //! - a command that makes a single step in all fitted records together;
-//! - an output that does not answer: its range is that of its own noise, and neither a lag of the prewhitened command nor the command
-//!   behind a first-order lag of any length is correlated with it.
+//! - an output that does not respond: its range is that of noise, and the output is not correlated with the command after any lag.
 
 use std::fmt;
 
@@ -14,40 +13,40 @@ use missing_effect::Problem;
 
 use crate::numbers;
 
-/// A command has moved where it is this part of its whole range away from where it stood.
+/// A command has changed if its distance from the previous constant value is this share of its whole range.
 const MOVE: f64 = 0.1;
 
-/// The range of white noise of up to 100 000 samples is below this many medians of its first differences.
+/// White noise of up to 100 000 samples has a range below this multiple of the median of its first differences.
 const NOISE_RANGE: f64 = 10.0;
 
-/// An output answers where chance alone gives such a correlation with the command less often than this.
+/// An output responds to the command if the p-value of their correlation is below this.
 const CHANCE: f64 = 0.01;
 
-/// Standard errors of a correlation beyond which it is none of chance.
+/// A correlation beyond this number of standard errors is significant.
 const STANDARD_ERRORS: f64 = 4.0;
 
-/// What a record cannot tell.
+/// Properties that a record cannot show.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ExcitationWarning {
-    /// The command of a record never moves.
+    /// The command of a record is constant.
     Still {
         /// The record.
         record: String,
     },
-    /// All fitted records together hold one step of the command.
+    /// All fitted records together contain one step of the command.
     SingleStep {
-        /// The record that holds it.
+        /// The record with the step.
         record: String,
         /// Commands before and after it.
         levels: (f64, f64),
         /// Unit of the command.
         unit: String,
     },
-    /// An output of a record shows no trace of its command.
+    /// An output of a record does not respond to the command.
     NoAnswer {
         /// The record.
         record: String,
-        /// The output, where there are several.
+        /// The output, if there are several.
         output: Option<String>,
         /// Range of the output.
         range: f64,
@@ -63,7 +62,7 @@ impl fmt::Display for ExcitationWarning {
         match self {
             Self::Still { record } => write!(
                 f,
-                "{record}: the command never moves, so this record says nothing of how the process answers; the other fitted records have to"
+                "{record}: the command never moves, so this record does not show how the process responds; the other fitted records have to"
             ),
             Self::SingleStep {
                 record,
@@ -84,7 +83,7 @@ impl fmt::Display for ExcitationWarning {
                 unit,
             } => write!(
                 f,
-                "{record}: the output{} shows no trace of the command: its range of {} is that of noise (median change from row to row {}); \
+                "{record}: the output{} does not respond to the command: its range of {} is that of noise (median change from row to row {}); \
                  check the columns, or record an experiment with larger steps",
                 output
                     .as_ref()
@@ -101,13 +100,13 @@ fn with_unit(value: f64, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
 }
 
-/// What the fitted records of a problem cannot tell.
+/// Warnings for the fitted records of a problem.
 #[must_use]
 pub fn of_problem(problem: &Problem) -> Vec<ExcitationWarning> {
     of_records(problem.records.iter())
 }
 
-/// The same of fitted records that are not in a problem yet.
+/// Warnings for fitted records that are not in a problem yet.
 pub(crate) fn of_records<'a>(
     records: impl Iterator<Item = &'a Record> + Clone,
 ) -> Vec<ExcitationWarning> {
@@ -140,7 +139,7 @@ pub(crate) fn of_records<'a>(
     warnings
 }
 
-/// The one step of the command, where all records hold no more; a second command that moves is more.
+/// The single step of the command, if all records together contain no other change.
 fn single_step<'a>(records: impl Iterator<Item = &'a Record> + Clone) -> Option<ExcitationWarning> {
     let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
     let (low, high) = records.clone().map(Record::input_range).reduce(wider)?;
@@ -170,7 +169,7 @@ fn single_step<'a>(records: impl Iterator<Item = &'a Record> + Clone) -> Option<
     found
 }
 
-/// The moves of a signal by more than `least`: from where it stood, to where it went.
+/// The changes of a signal by more than `least`: value before and after.
 fn moves(signal: &Channel, least: f64) -> Vec<(f64, f64)> {
     let mut moves = Vec::new();
     let mut values = signal.present();
@@ -186,7 +185,7 @@ fn moves(signal: &Channel, least: f64) -> Vec<(f64, f64)> {
     moves
 }
 
-/// Range of an output and median of its first differences, where it does not answer to the command.
+/// Range of an output and median of its first differences, if the output does not respond to the command.
 fn no_answer(record: &Record, output: &Channel) -> Option<(f64, f64)> {
     let (low, high) = output.range();
     let (input, output) = (&record.inputs[0].interpolated(), &output.values);
@@ -205,13 +204,13 @@ fn no_answer(record: &Record, output: &Channel) -> Option<(f64, f64)> {
     silent.then_some((range, difference))
 }
 
-/// No lag of the prewhitened input is correlated with the output. Where that cannot be tested it is not said.
+/// Whether no lag of the prewhitened input is correlated with the output. False if the test is not possible.
 fn uncorrelated(input: &[f64], output: &[f64]) -> bool {
     let lags = (input.len() / 10).clamp(2, 60);
     prewhitened_input_test(input, output, lags).is_ok_and(|(_, p)| p > CHANCE)
 }
 
-/// The input, as it is and behind first-order lags of one sample to a third of the record, is not correlated with the output.
+/// The input, and the input after first-order lags of one sample to a third of the record, are not correlated with the output.
 fn uncorrelated_behind_lags(input: &[f64], output: &[f64]) -> bool {
     let samples = output.iter().filter(|y| !y.is_nan()).count();
     let bound = STANDARD_ERRORS / (samples as f64).sqrt();
@@ -234,7 +233,7 @@ fn uncorrelated_behind_lags(input: &[f64], output: &[f64]) -> bool {
     }
 }
 
-/// Of the pairs of which both samples are there.
+/// Correlation over the pairs with both samples present.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let pairs = || a.iter().zip(b).filter(|(a, b)| !a.is_nan() && !b.is_nan());
     let count = pairs().count() as f64;
@@ -257,7 +256,7 @@ mod tests {
 
     use super::*;
 
-    /// A lag of `gain` and `tau` samples, in white noise of one, with this command.
+    /// Response of a lag with `gain` and `tau` samples to this command, plus white noise of standard deviation one.
     fn record(name: &str, gain: f64, tau: f64, seed: u64, command: &[f64]) -> Record {
         let n = command.len();
         let white = noise::white(n, 1.0, &mut ChaCha8Rng::seed_from_u64(seed));
@@ -282,7 +281,7 @@ mod tests {
         }
     }
 
-    /// Steps between random levels, each held for so long.
+    /// Steps between random levels, each held for this time.
     fn steps(n: usize, held: usize, seed: u64) -> Vec<f64> {
         let levels = noise::white(n.div_ceil(held), 1.0, &mut ChaCha8Rng::seed_from_u64(seed));
         (0..n).map(|k| levels[k / held]).collect()
@@ -306,7 +305,7 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         }
-        // Each of the tests finds something by chance in one record of a hundred.
+        // Each test has a false alarm in one record of a hundred.
         assert!(raised >= 18, "{raised} of 20");
     }
 
@@ -332,7 +331,8 @@ mod tests {
 
     #[test]
     fn an_output_that_answers_in_noise_does() {
-        // Slow and fast beside the sampling and the steps, as large as the noise or half of it; and without noise to speak of.
+        // Slow and fast compared with the sampling and the steps, with noise as large as the response or half of it; and with almost no
+        // noise.
         for (gain, tau, held) in [
             (1.0, 10.0, 20),
             (0.7, 200.0, 1000),
@@ -359,7 +359,7 @@ mod tests {
         };
         let once = record("a.csv", 30.0, 20.0, 1, &single);
         assert_eq!(warnings(std::slice::from_ref(&once)), [expected]);
-        // A measured command has noise of its own.
+        // A measured command contains noise.
         let measured: Vec<f64> = single
             .iter()
             .zip(noise::white(400, 0.005, &mut ChaCha8Rng::seed_from_u64(7)))
@@ -370,7 +370,7 @@ mod tests {
             warnings(&[noisy]).as_slice(),
             [ExcitationWarning::SingleStep { .. }]
         ));
-        // A second record with a step, a step back, and a ramp are more.
+        // A second record with a step, a step back, and a ramp has more changes.
         let again = record("b.csv", 30.0, 20.0, 2, &single);
         assert_eq!(warnings(&[once, again]), []);
         let back: Vec<f64> = (0..400)

@@ -1,4 +1,4 @@
-//! What `compare` and `diagnose` read: all of it, and checked, before anything is computed.
+//! Input of `compare` and `diagnose`: read and checked completely before the computation.
 
 mod checks;
 pub mod excitation;
@@ -18,7 +18,7 @@ use crate::look::Look;
 use crate::model_file::{self, ModelFile};
 use crate::output::same_file;
 
-/// What is wrong with a record, where its name says that it is none.
+/// Error of a record whose file name suggests that it is a model.
 fn perhaps_a_model(path: &Path, error: ct_signals::Error) -> Error {
     let named_as_model = path
         .extension()
@@ -41,23 +41,23 @@ pub struct Files {
     pub test: Vec<PathBuf>,
     /// The model file.
     pub model: PathBuf,
-    /// How the records are read, the hold aside, which the model says.
+    /// Options for reading the records, except the hold, which the model gives.
     pub options: ReadOptions,
 }
 
-/// Which part of a record is read, and how.
+/// Options for reading a record: its part and its format.
 #[derive(Debug, Clone, Default, Args)]
 pub struct ReadArguments {
     /// Leave out rows before this: a date such as "2026-01-31 14:25", or a number in the unit of the time column
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     from: Option<String>,
-    /// Leave out rows behind this
+    /// Leave out rows after this
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     to: Option<String>,
     /// Refuse missing samples and missing rows
     #[arg(long)]
     strict: bool,
-    /// Put the records on an even grid of this interval [s]
+    /// Resample the records on an even grid of this interval [s]
     #[arg(long, value_name = "S", value_parser = interval, allow_negative_numbers = true)]
     resample: Option<f64>,
 }
@@ -70,7 +70,8 @@ fn interval(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What was missing, converted or left out in records, and their dates, a line each; empty where they were read as they stand.
+/// Notes on samples that were missing, converted or left out in records, and on dates, one line each; empty if the records were read
+/// unchanged.
 pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
     let worth = |summary: &&ReadSummary| !summary.is_plain() || summary.calendar.is_some();
     let noted = summaries.iter().filter(worth);
@@ -80,7 +81,7 @@ pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
 }
 
 impl ReadArguments {
-    /// As the reader takes them; what the inputs do between samples is for others to say.
+    /// Options for the reader; the hold of the inputs is set elsewhere.
     #[must_use]
     pub fn options(&self) -> ReadOptions {
         ReadOptions {
@@ -93,17 +94,17 @@ impl ReadArguments {
     }
 }
 
-/// A problem, and how its records were read.
+/// A problem, and the summaries of its records.
 #[derive(Debug, Clone)]
 pub struct Input {
     /// Model and records.
     pub problem: Problem,
-    /// Of each record, fitted ones first.
+    /// Summary of each record, fitted ones first.
     pub summaries: Vec<ReadSummary>,
 }
 
 impl Files {
-    /// All of them.
+    /// All records.
     #[must_use]
     pub fn all(&self) -> Vec<&Path> {
         let records = self.data.iter().chain(&self.test);
@@ -113,12 +114,12 @@ impl Files {
     /// Reads and checks everything.
     ///
     /// # Errors
-    /// One line that names the file, the place and the mend.
+    /// One line that names the file, the place and the correction.
     pub fn read(&self) -> Result<Input, Error> {
         self.read_with(self.read_model()?)
     }
 
-    /// The model file, where no record is given twice.
+    /// Reads the model file, and checks that no record is given twice.
     ///
     /// # Errors
     /// As [`Files::read`].
@@ -127,7 +128,7 @@ impl Files {
         model_file::read(&self.model)
     }
 
-    /// The rest, where the model file was read: a pipe can be read only once.
+    /// Reads the rest after the model file: a pipe can be read only once.
     ///
     /// # Errors
     /// As [`Files::read`].
@@ -158,7 +159,7 @@ impl Files {
         })
     }
 
-    /// An error of the computation, with the file that is to blame where that is known.
+    /// An error of the computation, with the file in question if known.
     pub(crate) fn blame(&self, error: missing_effect::Error) -> Error {
         use missing_effect::Error::{ControlledOutput, Design, Structure, UnstableLoop};
         if matches!(
@@ -167,7 +168,7 @@ impl Files {
         ) {
             return Error::file(&self.model, error.to_string());
         }
-        // Its message names the option.
+        // The message of this error names the option.
         if matches!(error, Design(_)) {
             return error.into();
         }
@@ -183,7 +184,7 @@ impl Files {
         }
     }
 
-    /// How a record is called: by its file, or by its path where another has the same file name; in printable text.
+    /// Name of a record in messages: its file name, or its path if another record has the same file name; in printable text.
     pub(crate) fn name_of(&self, path: &Path) -> String {
         let records = self.data.iter().chain(&self.test);
         let same = records.filter(|other| other.file_name() == path.file_name());
@@ -194,7 +195,7 @@ impl Files {
         escaped(&name).into_owned()
     }
 
-    /// No record twice: a fitted one cannot be held out, and twice the same is not twice the data.
+    /// Checks that no record is given twice: a fitted record cannot be held out, and a repeated record adds no information.
     ///
     /// # Errors
     /// Where one is.
@@ -223,7 +224,7 @@ impl Files {
     }
 }
 
-/// Counts the times of all records with dates from the first of these dates.
+/// Measures the times of all records with dates from the first of these dates.
 pub fn on_one_clock(records: &mut [Record]) {
     let starts = records.iter().filter_map(|record| record.calendar.as_ref());
     let Some(first) = starts.map(|calendar| calendar.start).min() else {
@@ -238,8 +239,8 @@ pub fn on_one_clock(records: &mut [Record]) {
     }
 }
 
-/// Fitted records with dates are given in the order of their dates, and do not overlap: a clock that runs backwards between files tells
-/// nothing of drifts. `summaries`: how the records were read, where this is known.
+/// Fitted records with dates are given in the order of their dates, and do not overlap: with a clock that runs backwards between files,
+/// drifts cannot be found. `summaries`: summaries of the records, if known.
 pub(crate) fn check_clocks(records: &[Record], summaries: &[ReadSummary]) -> Result<(), Error> {
     for (k, pair) in records.windows(2).enumerate() {
         let [before, after] = pair else { continue };
@@ -269,7 +270,7 @@ pub(crate) fn check_clocks(records: &[Record], summaries: &[ReadSummary]) -> Res
     Ok(())
 }
 
-/// A problem from what has been read; `model_name` names the model file in messages.
+/// A problem from records and a model that were read; `model_name` is the name of the model file in messages.
 ///
 /// # Errors
 /// Where the records do not fit each other or the model.

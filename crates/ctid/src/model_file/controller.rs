@@ -10,7 +10,7 @@ use super::{
 };
 use crate::Error;
 
-/// How a controller answers to `e = r - y`.
+/// Control law, with `e = r - y`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ControllerLaw {
     /// `u = u_op + gain (e + (1/integral_time) int e dt)`.
@@ -36,10 +36,10 @@ pub enum ControllerLaw {
     },
 }
 
-/// The settings of a controller; those of a PI have been accepted by [`Controller::pi`].
+/// The settings of a controller; those of a PI were accepted by [`Controller::pi`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControllerSettings {
-    /// What it does with the error.
+    /// The control law.
     pub law: ControllerLaw,
     /// Smallest command \[input unit\]; minus infinity where none is given.
     pub u_min: f64,
@@ -111,7 +111,7 @@ impl Source<'_> {
         self.controller_law(raw, "controller")
     }
 
-    /// What a controller does with the error; `table`: the name of its table.
+    /// Reads the control law; `table`: the name of its table.
     pub(crate) fn controller_law(
         &self,
         raw: &Spanned<RawController>,
@@ -195,7 +195,7 @@ impl Source<'_> {
             u_min: limit("u_min", &raw.u_min, f64::NEG_INFINITY)?,
             u_max: limit("u_max", &raw.u_max, f64::INFINITY)?,
         };
-        // The interval is the records'; what cannot work does not hang on it.
+        // The interval is that of the records; errors do not depend on it.
         settings
             .controller(1.0)
             .map_err(|error| self.at(at, error.to_string()))?;

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{Error, names, term_file};
 
-/// What an `[effect.X]` table says.
+/// Content of an `[effect.X]` table.
 #[derive(Default)]
 pub(super) struct Setting {
     pub(super) vessel: Option<usize>,
@@ -25,8 +25,7 @@ pub(super) struct Setting {
 }
 
 impl Source<'_> {
-    /// The `[effect.X]` tables; a table of an effect that is not on is checked too, and kept for
-    /// the day on which it is added.
+    /// The `[effect.X]` tables; a table of an effect that is not in the model is checked too, and kept for later use.
     pub(super) fn effect_tables(
         &self,
         (plant, known): (Plant, &Known),
@@ -71,7 +70,7 @@ impl Source<'_> {
         Ok(settings)
     }
 
-    /// The `[term.X]` tables, and whether each is kept as it stands; one that is not on is checked too.
+    /// The `[term.X]` tables, and whether each term is in the model; a term that is not in the model is checked too.
     pub(super) fn terms(
         &self,
         (plant, known): (Plant, &Known),
@@ -106,7 +105,7 @@ impl Source<'_> {
         Ok(terms)
     }
 
-    /// The table's names are parameters of the effect at its place, and what is fixed has a value.
+    /// The table's names are parameters of the effect at its place, and fixed parameters have a value.
     pub(super) fn check_parameters(
         &self,
         (plant, known): (Plant, &Known),
@@ -223,14 +222,14 @@ pub(crate) fn vessel(
         })
 }
 
-/// Names and places do not depend on the data: any ranges will do to ask for them.
+/// Names and places do not depend on the data: any ranges can be used for a query.
 pub(super) fn any_scales(second_pump: bool) -> Scales {
     let mut scales = Scales::from_ranges((0.0, 1.0), (0.0, 1.0), 1.0, 100.0);
     scales.input_2 = second_pump.then_some((0.0, 1.0));
     scales
 }
 
-/// A structure to ask for names and places, a second pump running or not.
+/// A structure for queries of names and places, with a second pump or without.
 pub(crate) fn any_structure(plant: Plant, known: &Known, second_pump: bool) -> Structure {
     Structure::new(plant, known.clone(), any_scales(second_pump))
 }

@@ -1,4 +1,4 @@
-//! First guesses, and what is known of parameters beside the records.
+//! First guesses and priors of parameters.
 
 use std::collections::BTreeMap;
 
@@ -29,7 +29,7 @@ impl Source<'_> {
         Ok(())
     }
 
-    /// The side measurements; a fit begins at them where nothing else is guessed.
+    /// The side measurements; a fit begins at them unless there is another guess.
     pub(super) fn priors(
         &self,
         model: &mut ModelFile,
@@ -82,8 +82,8 @@ impl Source<'_> {
                 ),
             ));
         };
-        // Gains, outflow coefficients and time constants of the plant are above zero whatever
-        // the data; the bounds of an effect follow from the data.
+        // Gains, outflow coefficients and time constants of the plant are positive for any data; the bounds of an effect follow from the
+        // data.
         if structure.parameters()[index].lower > 0.0 && !key.contains('.') {
             self.positive(key, number)
         } else {
@@ -92,7 +92,7 @@ impl Source<'_> {
     }
 }
 
-/// The effect of a name such as `overflow.rim` where it is not on.
+/// The effect of a name such as `overflow.rim` that is not in the model.
 fn waits<'n>(structure: &Structure, name: &'n str) -> Option<&'n str> {
     let (effect, _) = name.split_once('.')?;
     let own = format!("{effect}.");

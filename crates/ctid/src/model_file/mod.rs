@@ -1,4 +1,4 @@
-//! The model file: which plant, which effects, which columns, what is known.
+//! The model file: plant, effects, columns, known constants.
 //!
 //! ```
 //! let model = ctid::model_file::parse("tank.toml", r#"
@@ -48,7 +48,7 @@ pub(crate) use source::Source;
 /// The largest model file, and the largest file of a term \[bytes\].
 pub(crate) const LARGEST: usize = 1024 * 1024;
 
-/// What a model file says, checked.
+/// Checked content of a model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFile {
     /// The plant.
@@ -57,25 +57,25 @@ pub struct ModelFile {
     pub effects: Vec<Placed>,
     /// The terms of the user's own that have been added, in the file's order.
     pub terms: Vec<OwnTerm>,
-    /// Which column of the records is what.
+    /// Columns of the records.
     pub columns: Columns,
     /// Constants that are not fitted.
     pub known: Known,
     /// First guesses by name, as [`Structure::parameter_names`] writes it: `alpha`, `overflow.rim`.
     pub start: BTreeMap<String, f64>,
-    /// Names of the parameters that stay at their value in `start`.
+    /// Names of the parameters that keep their value in `start`.
     pub fixed: Vec<String>,
-    /// What is known of parameters beside the records, by the same names.
+    /// Prior knowledge of parameters, by the same names.
     pub priors: BTreeMap<String, PriorValue>,
-    /// The controller of the loop, where it is known.
+    /// The controller of the loop, if known.
     pub controller: Option<ControllerSettings>,
-    /// What the input does between samples.
+    /// Hold of the input between samples.
     pub hold: Hold,
-    /// Tables of effects and terms that are not on, and so have no effect: `effect.overflow`.
+    /// Tables of effects and terms that are not in the model: `effect.overflow`.
     pub waiting: Vec<String>,
 }
 
-/// A term of the user's own, and the units that it is written in; empty where the file does not say.
+/// A user's own term, and its units; empty if the file does not give them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnTerm {
     /// The term.
@@ -87,13 +87,13 @@ pub struct OwnTerm {
 }
 
 impl ModelFile {
-    /// The domain of the model, as far as its own text says the output's unit.
+    /// The domain of the model, derived from the output's unit.
     #[must_use]
     pub fn domain(&self) -> Domain {
         Domain::of(self.plant, self.columns.output_unit())
     }
 
-    /// The plant with its effects, over the ranges that the data visit.
+    /// The plant with its effects, for the ranges of the data.
     ///
     /// # Errors
     /// None for a model that [`parse`] has returned.
@@ -114,7 +114,7 @@ impl ModelFile {
 /// Reads a model file.
 ///
 /// # Errors
-/// One line that names the file, the line, what is wrong and the mend.
+/// One line that names the file, the line, what is wrong and the correction.
 pub fn read(path: &Path) -> Result<ModelFile, Error> {
     of_text(path, &read_text(path)?)
 }
@@ -146,7 +146,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
     })?;
     let text = String::from_utf8(bytes)
         .map_err(|_| cannot("the model file is not UTF-8 text; save it as UTF-8".to_string()))?;
-    // Some editors put a byte-order mark in front.
+    // Some editors write a byte-order mark at the beginning.
     Ok(text
         .strip_prefix('\u{feff}')
         .map(str::to_string)
@@ -199,7 +199,7 @@ pub fn parse(file: &str, text: &str) -> Result<ModelFile, Error> {
     for name in &raw.effects {
         if let Some((term, fixed)) = terms.get(name.as_ref().as_str()) {
             if model.terms.iter().any(|on| on.term.name == term.term.name) {
-                let what = format!("{} stands here twice; keep it once", name.as_ref());
+                let what = format!("{} is given twice; keep one of the two", name.as_ref());
                 return Err(source.at(name.span().start, what));
             }
             if *fixed {

@@ -6,7 +6,7 @@ use ct_signals::{Columns, Hold};
 use serde::Deserialize;
 use toml::Spanned;
 
-/// The file as it stands; its numbers and names are checked afterwards, where their lines are known.
+/// Raw content of the file; numbers and names are checked later, when their lines are known.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Raw {
@@ -65,7 +65,7 @@ pub(crate) struct RawKnown {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawController {
-    /// Of a model of its user's own: the output that it reads, ...
+    /// For a user's own model: the output that the controller reads, ...
     pub(crate) output: Option<Spanned<String>>,
     /// ... and the column of the reference.
     pub(crate) reference: Option<Spanned<String>>,
@@ -130,7 +130,7 @@ impl Number {
     }
 }
 
-/// An `[effect.X]` table as it stands.
+/// Raw content of an `[effect.X]` table.
 pub(super) type EffectTable = BTreeMap<Spanned<String>, Spanned<Entry>>;
 
 /// An entry of an `[effect.X]` table.

@@ -1,4 +1,4 @@
-//! The file being read: what is wrong in it is said with its line.
+//! The file being read: errors contain their line.
 
 mod known;
 
@@ -10,7 +10,7 @@ use self::known::disturbed;
 use super::raw::Number;
 use crate::{Error, names};
 
-/// The file being read: it knows its lines.
+/// The file being read, with its line numbers.
 pub(crate) struct Source<'a> {
     pub(crate) file: &'a str,
     pub(crate) text: &'a str,
@@ -31,9 +31,9 @@ impl Source<'_> {
         1 + self.text.bytes().take(byte).filter(|&b| b == b'\n').count()
     }
 
-    /// What the parser refuses, in one line, with the key that was probably meant.
+    /// The parser's error in one line, with the key that was probably meant.
     pub(crate) fn syntax(&self, error: &toml::de::Error) -> Error {
-        // Words of the file stand between backquotes.
+        // Words of the file are between backquotes.
         let parts = error.message().trim().split('`').enumerate();
         let parts = parts.map(|(i, part)| {
             if i % 2 == 1 {
@@ -54,7 +54,7 @@ impl Source<'_> {
                 names::suggestion(written, known.iter().copied())
             );
         } else if let Some((_, rest)) = what.split_once("unknown variant `") {
-            // The only key that takes one of some words without being looked at afterwards.
+            // The only key with a fixed list of words that is not checked later.
             let word = rest.split('`').next().unwrap_or_default();
             what = format!(
                 "hold = \"{}\" is not known; write hold = \"zero\" (the command is held between rows) or hold = \"first\" (a straight line between rows)",
@@ -71,7 +71,7 @@ impl Source<'_> {
         } else if let Some(mend) = number_with_more(self.line(error)) {
             what = format!("numbers without a unit and with a decimal point: {mend}");
         } else if toml::from_str::<toml::Table>(self.text).is_err() {
-            // what is wrong is the writing, not what it says
+            // the notation is wrong, not the content
             what += "; write `key = value`, words in quotes, numbers without quotes and without a unit, each key once";
         }
         let Some(span) = error.span() else {
@@ -83,7 +83,7 @@ impl Source<'_> {
         self.at(span.start, what)
     }
 
-    /// The line that the parser refuses.
+    /// The line of a parser error.
     fn line(&self, error: &toml::de::Error) -> &str {
         let start = error.span().map_or(0, |span| span.start);
         let (before, behind) = self.text.split_at_checked(start).unwrap_or_default();
@@ -135,7 +135,7 @@ impl Source<'_> {
         }
         Err(self.at(
             number.span().start,
-            format!("{key} = {} has to be above zero; correct it, or delete the line where it is not known", shown(value)),
+            format!("{key} = {} has to be above zero; correct it, or delete the line if the value is not known", shown(value)),
         ))
     }
 
@@ -178,7 +178,7 @@ impl Source<'_> {
     }
 }
 
-/// A line as it was meant, where its value begins as a number and has a unit behind it or a decimal comma.
+/// The probably intended line, if its value begins as a number and has a unit or a decimal comma.
 fn number_with_more(line: &str) -> Option<String> {
     let (key, value) = line.split_once('=')?;
     let word = value.split_whitespace().next()?;
@@ -189,7 +189,7 @@ fn number_with_more(line: &str) -> Option<String> {
         return None;
     }
     let key = quoted(key.trim());
-    // 1,000.0 may be a thousand, or a slip.
+    // 1,000.0 may be a thousand, or a typing error.
     if word.matches([',', '.']).count() > 1 {
         return Some(format!("{key} = 154.0, say"));
     }

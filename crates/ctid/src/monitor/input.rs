@@ -1,4 +1,4 @@
-//! Lines of the input: the header, rows, and what is wrong with them.
+//! Lines of the input: the header, rows, and their errors.
 
 mod first_row;
 
@@ -8,14 +8,14 @@ use ct_signals::{BadLine, LONGEST_LINE, Line, Rows, TimestampError, quoted};
 use super::{Halt, INPUT, Session, lines::Cut};
 use crate::{Error, one_line};
 
-/// So many lines at the beginning may be parts of rows.
+/// Number of lines at the beginning that may be incomplete.
 const PARTS: usize = 2;
-/// What becomes of a row without a reading, of a plant and of a model of its user's own.
+/// Handling of a row without a reading, for a plant and for a user's own model.
 const LOST: [&str; 2] = [
     "the reading is lost, the command of the row is used",
     "the reading is lost, the inputs of the row are used",
 ];
-/// The mend where names are missing: `tail -f` alone begins in the middle of the file.
+/// Correction for missing names: `tail -f` alone begins in the middle of the file.
 const HEADER_FIRST: &str = "begin with the header: tail -n +1 -f FILE";
 
 impl<'a> Session<'a> {
@@ -41,7 +41,7 @@ impl<'a> Session<'a> {
             && matches!(&read, Err(bad) if may_follow_a_part(bad))
             && self.rows.as_ref().is_some_and(|rows| !rows.has_header())
         {
-            // Who listens to a running line hears the end of a row first.
+            // A reader that connects to a running stream receives the end of a row first.
             self.bad(|| "the row before was not whole".to_string());
             self.rows = None;
             self.timed = false;
@@ -84,7 +84,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// The row that was read last, and why it lacks the first reading that it lacks, where the line says so.
+    /// The last row, and the reason for its first missing reading, if the line gives one.
     fn readings(&self, time: f64) -> (Row, Option<BadLine>) {
         let mut row = Row::with_inputs(time, &[], &[]);
         let mut bad = None;
@@ -107,7 +107,7 @@ impl<'a> Session<'a> {
         (row, bad)
     }
 
-    /// A line in the order of the first one.
+    /// A line with the column order of the first one.
     fn read(&mut self, line: &[u8]) -> Result<Line, BadLine> {
         match &mut self.rows {
             Some(rows) => rows.read(line),
@@ -115,24 +115,24 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Whether a line that is no row is a header of another form: what follows is read in its order.
+    /// Whether a line that is no row is a header of another form: later rows are read in its order.
     fn header_again(&mut self, line: &[u8]) -> Result<bool, Error> {
         let (Some(known), Ok(text)) = (&self.rows, std::str::from_utf8(line)) else {
             return Ok(false);
         };
         let mut rows = match Rows::begin(INPUT, self.line, text, &self.columns) {
             Ok((rows, false)) => rows,
-            // The rows behind it are in units that are not those of the model.
+            // The rows after it are in units that are not those of the model.
             Err(error) if error.of_units() => return Err(error.into()),
             _ => return Ok(false),
         };
         rows.go_on(known);
-        // Who does not say a unit does not change it.
+        // A file without a unit does not change the unit.
         let pairs = known.units().zip(rows.units());
         for (before, now) in pairs {
             if !now.is_empty() && !before.is_empty() && now != before {
                 return Err(Error::Usage(format!(
-                    "{INPUT}, row {}: the header comes again with [{}] where it was [{}], and the model was learned in that; convert the rows, or begin anew",
+                    "{INPUT}, row {}: the header comes again with [{}] where it was [{}], and the model was learned in that; convert the rows, or start again",
                     self.line,
                     quoted(now),
                     quoted(before)
@@ -157,7 +157,7 @@ impl<'a> Session<'a> {
         rows.map_or(String::new(), |rows| quoted(rows.name("time", 0)))
     }
 
-    /// A row; `bad`: why it lacks a reading, where the line says so.
+    /// Processes a row; `bad`: the reason for a missing reading, if the line gives one.
     fn row(&mut self, row: &Row, bad: Option<BadLine>) -> Result<(), Halt> {
         if self.restored
             && self.taken == 0
@@ -244,12 +244,12 @@ impl<'a> Session<'a> {
     }
 
     fn refused(&mut self, refused: &Refused) {
-        // Time and inputs alone refuse a row.
+        // Only errors of time and inputs reject a row.
         let text = self.named(refused, refused.at());
         self.bad(|| text);
     }
 
-    /// What is wrong with a row's value, with its column and the mend; `at`: of which input or output.
+    /// Error in a row's value, with its column and the correction; `at`: number of the input or output.
     fn named(&self, refused: &Refused, at: usize) -> String {
         let column = self.rows.as_ref().map_or(String::new(), |rows| {
             quoted(rows.name(refused.column(), at))
@@ -257,7 +257,7 @@ impl<'a> Session<'a> {
         let mend = match refused {
             Refused::NotFinite { .. } => "check what writes it",
             Refused::BeyondRange { .. } => {
-                "check what writes it, or correct the range in the model file"
+                "check the program that writes it, or correct the range in the model file"
             }
             Refused::AboveTank { .. } => {
                 "check the sensor, or give the height in the reading's unit in the model file"
@@ -284,7 +284,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Whether a row may be refused because the one before, by which the stream was understood, was only the end of one.
+/// Whether a row may be rejected because the preceding row, which determined the format, was only the end of a row.
 fn may_follow_a_part(bad: &BadLine) -> bool {
     matches!(
         bad,
@@ -292,7 +292,7 @@ fn may_follow_a_part(bad: &BadLine) -> bool {
     )
 }
 
-/// Whether no later row will be understood either, until the model file says more.
+/// Whether all later rows will cause this error too, until the model file has more information.
 fn never_understood(error: &TimestampError) -> bool {
     matches!(
         error,

@@ -1,23 +1,23 @@
-//! Bytes into lines, of bounded length: what has no end is thrown away up to the next line. A line ends as in a file: at a line
-//! feed, a carriage return, or the two together.
+//! Splits bytes into lines of bounded length; a line that is too long is dropped up to its end. A line ends as in a file: at a line feed, a
+//! carriage return, or both.
 
 use ct_signals::LONGEST_LINE;
 
-/// A line, or what is left of one that is too long.
+/// A line, or the rest of a line that is too long.
 #[derive(Debug, PartialEq)]
 pub(super) enum Cut<'a> {
-    /// Without its end.
+    /// A line without its end.
     Line(&'a [u8]),
-    /// Longer than [`LONGEST_LINE`]; said once, when its end has come.
+    /// Longer than [`LONGEST_LINE`]; reported once, at the end of the line.
     TooLong,
 }
 
-/// The part of a line that has come so far.
+/// The part of a line that was received so far.
 #[derive(Default)]
 pub(super) struct Lines {
     part: Vec<u8>,
     too_long: bool,
-    /// The byte before was a carriage return: a line feed behind it ends nothing more.
+    /// The preceding byte was a carriage return: a line feed after it does not end another line.
     returned: bool,
 }
 

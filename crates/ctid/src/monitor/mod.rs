@@ -1,4 +1,4 @@
-//! `ctid monitor`: rows on standard input as they come; alarms on standard output, all else on standard error.
+//! `ctid monitor`: rows on standard input as they arrive; alarms on standard output, other messages on standard error.
 
 mod input;
 mod lines;
@@ -27,33 +27,33 @@ use screen::{DRAWN_EVERY, Screen};
 use source::Event;
 use trouble::Trouble;
 
-/// What the rows are called in messages.
+/// Name of the source of the rows in messages.
 const INPUT: &str = "standard input";
-/// What may be typed.
+/// Command line options.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Model file
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
-    /// Keep the state in this file: it is read at the start where it is there, and saved every minute and at the end
+    /// Keep the state in this file: it is read at the start if it exists, and saved every minute and at the end
     #[arg(long, value_name = "FILE")]
     state: Option<PathBuf>,
-    /// Write the estimates with their band as JSON lines too, between the alarms
+    /// Also write the estimates with their bands as JSON lines between the alarms
     #[arg(long)]
     estimates: bool,
-    /// Time between estimates [s]; without it ten times the slowest time constant
+    /// Time between estimates [s]; by default ten times the slowest time constant
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     interval: Option<f64>,
     /// Mean number of rows of the input between false alarms, of all kinds together
     #[arg(long, value_name = "N", default_value_t = Settings::default().rows_between_false_alarms, allow_negative_numbers = true)]
     false_alarm_every: f64,
-    /// Fewest rows to learn from, 100 to 1024
+    /// Least number of rows for learning, 100 to 1024
     #[arg(long, value_name = "N", default_value_t = Settings::default().learning_rows)]
     learn: usize,
 }
 
 impl Arguments {
-    /// Watches until the rows end, or the program is asked to stop.
+    /// Monitors until the rows end, or until the program is stopped.
     ///
     /// # Errors
     /// Where the model, the state or the first line cannot be used, nothing comes, or something cannot be written.
@@ -100,16 +100,16 @@ impl Arguments {
                 Event::Stop => break Ok("stopped"),
             }
         };
-        // What was seen is kept, whatever has ended it.
+        // The state is saved, whatever ended the run.
         let saved = session.saver.finish(&session.monitor);
         session.end(ended?, saved.is_ok())?;
         saved
     }
 }
 
-/// Why no further line is wanted.
+/// Reason for ending the input.
 enum Halt {
-    /// Nobody reads the alarms any more.
+    /// The reader of the alarms has closed the pipe.
     Closed,
     Error(Error),
 }
@@ -120,11 +120,11 @@ impl From<Error> for Halt {
     }
 }
 
-/// What is watched.
+/// The monitored model.
 #[derive(Clone)]
 enum Believed<'a> {
     Plant(Box<Model>),
-    /// With the candidates of its file, and the seconds in one unit of its time.
+    /// A user's own model with the candidates of its file, and the seconds in one unit of its time.
     Own(&'a OwnModelFile, &'a [CandidateModel], f64),
 }
 
@@ -153,18 +153,18 @@ struct Session<'a> {
     columns: Columns,
     settings: Settings,
     monitor: Monitor<'a>,
-    /// Of each input and output of a model of its user's own how it is put into the model's unit.
+    /// Conversion of each input and output of a user's own model to the model's unit.
     conversions: Vec<Option<Conversion>>,
-    /// The monitor goes on from a saved state.
+    /// Whether the monitor continues from a saved state.
     restored: bool,
     rows: Option<Rows>,
-    /// Lines before the first row that were none.
+    /// Number of lines before the first row.
     parts: usize,
     line: u64,
     trouble: Trouble,
-    /// The rows' way to write times has been looked at.
+    /// Whether the time format of the rows was checked.
     timed: bool,
-    /// Rows that a restored monitor has seen before, at the beginning.
+    /// Rows at the beginning that the restored monitor has already processed.
     seen_before: u64,
     taken: u64,
     screen: Screen,
@@ -203,7 +203,7 @@ impl<'a> Session<'a> {
                 Believed::Plant(Box::new(believed(file))),
             ),
             AnyModelFile::Own(file) => {
-                // Where the model file does not say in which unit the time is, the header does.
+                // If the model file gives no unit of the time, the header's unit is used.
                 let declared = file.columns.time.is_some();
                 let declared = declared.then(|| file.columns.time_header().1);
                 let saved = state.as_ref().and_then(::monitor::State::time_unit);
@@ -242,7 +242,7 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// The words for one of the plants, or for a model of its user's own.
+    /// The words for one of the plants, or for a user's own model.
     fn words<'w>(&self, of_plant: &'w str, of_own: &'w str) -> &'w str {
         match self.model {
             Believed::Plant(_) => of_plant,
@@ -254,7 +254,7 @@ impl<'a> Session<'a> {
     fn pause(&mut self) {
         self.screen.draw(&self.monitor);
         if self.saver.is_due() {
-            // A disk that is full for a while is no reason to stop watching.
+            // A disk that is temporarily full does not stop the monitor.
             if let Some(text) = self.saver.save(&self.monitor) {
                 self.screen.say(&text);
             }
@@ -293,7 +293,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// What the model file says that the monitor needs.
+/// The settings of the model file that the monitor needs.
 fn believed(file: &ModelFile) -> Model {
     Model {
         plant: file.plant,
@@ -307,7 +307,7 @@ fn believed(file: &ModelFile) -> Model {
     }
 }
 
-/// An error of the monitor, with the file that is to blame.
+/// An error of the monitor, with the file in question.
 fn blame(error: ::monitor::Error, arguments: &Arguments) -> Error {
     use ::monitor::Error::{ByClock, Damaged, NoParameters, OtherModel, Structure, Time, Version};
     match (&error, &arguments.state) {

@@ -1,4 +1,4 @@
-//! What is said between the alarms: notices in words, estimates, and JSON lines.
+//! Output between the alarms: notices in words, estimates, and JSON lines.
 
 use std::io;
 
@@ -9,7 +9,7 @@ use super::{Halt, INPUT, Session};
 use crate::numbers::significant;
 use crate::{Error, one_line};
 
-/// A threshold above this is not that of the false alarms alone: 8.6 where they come every 1e15 rows.
+/// A threshold above this is larger than false alarms require: 8.6 corresponds to one in 1e15 rows.
 const DEAF: f64 = 10.0;
 
 impl Session<'_> {
@@ -25,13 +25,13 @@ impl Session<'_> {
                 let (line, span) = (self.line, axis.span(*from, *to));
                 let what = if *bridged {
                     self.words(
-                        "the command is taken to have been held",
-                        "the inputs are taken to have been held",
+                        "the command is assumed to have been held",
+                        "the inputs are assumed to have been held",
                     )
                 } else {
                     self.words(
-                        "what the levels are is waited for",
-                        "what the states are is waited for",
+                        "the monitor waits for new levels",
+                        "the monitor waits for new states",
                     )
                 };
                 let name = self
@@ -54,7 +54,7 @@ impl Session<'_> {
             Notice::ClockSetBack { from, to } => {
                 self.next_estimate = *to;
                 format!(
-                    "the time goes back {} and stays there: the rows are followed from here on; what the {} are is waited for",
+                    "the time goes back {} and stays there: the rows are followed from here on; the monitor waits for new {}",
                     axis.span(*from, *to),
                     self.words("levels", "states")
                 )
@@ -82,7 +82,7 @@ impl Session<'_> {
             }
             Notice::LearnsAnew { why } => format!("learns anew: {why}"),
             Notice::IntervalChanged { time, from, to } => format!(
-                "the time steps by {} s instead of {} s since about {}: the noise is another then, and is learned anew",
+                "the time steps by {} s instead of {} s since about {}: the noise depends on the time step, and is learned again",
                 significant(*to, 4),
                 significant(*from, 4),
                 axis.at(*time)
@@ -96,7 +96,7 @@ impl Session<'_> {
             } => {
                 let deaf = if *threshold > DEAF {
                     format!(
-                        "; what the model leaves is so slow that only a large change will be seen (threshold {threshold:.1}): it may lack an effect"
+                        "; the residual is so slow that only a large change will be detected (threshold {threshold:.1}): it may lack an effect"
                     )
                 } else {
                     String::new()
@@ -123,7 +123,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// What is still needed, where nothing has been learned; empty where it has.
+    /// What is missing to finish learning; empty if learning is finished.
     pub(super) fn still_learning(&self) -> String {
         let Some(gathered) = self.monitor.gathered() else {
             return String::new();
@@ -141,7 +141,7 @@ impl Session<'_> {
         )
     }
 
-    /// Says where the parameters are, when it is time.
+    /// Prints the estimates of the parameters at the requested interval.
     pub(super) fn estimate(&mut self, time: f64) -> Result<(), Halt> {
         let Some(time_constant) = self.monitor.time_constant() else {
             return Ok(());
@@ -170,7 +170,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// A JSON line; where the rows have dates, with those of its `time` and of its `since`.
+    /// A JSON line; if the rows have dates, with the dates of its `time` and `since`.
     pub(super) fn print(
         &mut self,
         value: &impl serde::Serialize,

@@ -1,4 +1,4 @@
-//! Saves the state now and then; what cannot be written is said once, and tried again.
+//! Saves the state at intervals; a failed save is reported once and repeated.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -8,14 +8,14 @@ use ::monitor::Monitor;
 use super::state_file;
 use crate::{Error, one_line};
 
-/// How often the state is saved.
+/// Interval between saves of the state.
 const SAVED_EVERY: Duration = Duration::from_secs(60);
 
 pub(super) struct Saver {
-    /// None where no state is kept.
+    /// None if no state is saved.
     path: Option<PathBuf>,
     tried: Instant,
-    /// Rows of the state that is in the file.
+    /// Number of rows of the saved state.
     rows: u64,
     failed: bool,
 }
@@ -34,7 +34,7 @@ impl Saver {
         self.tried.elapsed() >= SAVED_EVERY
     }
 
-    /// Saves it; in words where that begins to fail, or to succeed again.
+    /// Saves the state; returns a message when saving begins to fail, or succeeds again.
     pub(super) fn save(&mut self, monitor: &Monitor) -> Option<String> {
         let failed = std::mem::replace(&mut self.failed, false);
         match self.finish(monitor) {
@@ -44,7 +44,7 @@ impl Saver {
                 self.failed = true;
                 (!failed).then(|| {
                     one_line(&format!(
-                        "{error}; it goes on watching, and tries again every {} s",
+                        "{error}; the monitor continues, and tries again every {} s",
                         SAVED_EVERY.as_secs()
                     ))
                 })
@@ -52,7 +52,7 @@ impl Saver {
         }
     }
 
-    /// The last time: a failure is an error.
+    /// The last save: a failure is an error.
     pub(super) fn finish(&mut self, monitor: &Monitor) -> Result<(), Error> {
         self.tried = Instant::now();
         let Some(path) = &self.path else {
@@ -85,7 +85,7 @@ mod tests {
             saver.save(&monitor)
         };
         assert_eq!(next(&mut saver, 1.0), None);
-        // Its own state is renewed.
+        // The monitor overwrites its own state.
         assert_eq!(next(&mut saver, 2.0), None);
         std::fs::write(&path, "{\"written_by\": \"another program\"}").unwrap();
         let said = next(&mut saver, 3.0).unwrap();
@@ -93,7 +93,7 @@ mod tests {
         assert!(std::fs::read_to_string(&path).unwrap().contains("another"));
         std::fs::remove_file(&path).unwrap();
         assert_eq!(next(&mut saver, 4.0).unwrap(), "the state is saved again");
-        // One that came before the first was written.
+        // A file that appeared before the first save.
         std::fs::write(&path, "mine").unwrap();
         let mut first = Saver::new(Some(path.clone()), 0);
         assert!(next(&mut first, 5.0).unwrap().contains("no state of"));
@@ -124,7 +124,7 @@ mod tests {
         assert_eq!(next(&mut saver), None);
         std::fs::remove_dir_all(&inside).unwrap();
         assert!(next(&mut saver).unwrap().contains("cannot be written"));
-        // No row has come since it failed: it is owed all the same.
+        // No row has come since the failed save: the state still has to be saved.
         assert!(saver.finish(&monitor).is_err());
         std::fs::create_dir(&inside).unwrap();
         saver.finish(&monitor).unwrap();

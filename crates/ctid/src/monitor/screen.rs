@@ -1,4 +1,4 @@
-//! What a person sees on standard error: lines, and on a terminal a plot of each output's innovations below them.
+//! Display on standard error: lines, and on a terminal a plot of each output's innovations below them.
 
 use std::collections::VecDeque;
 use std::io::{self, Write};
@@ -12,20 +12,20 @@ use crate::look::Look;
 use crate::numbers::{significant, value_and_error};
 use crate::plot::{Curve, RESIDUAL, plot};
 
-/// Innovations that are drawn.
+/// Number of plotted innovations.
 const DRAWN: usize = 400;
-/// The plot is drawn again after so long, where rows have come.
+/// Interval between redraws of the plot, if there are new rows.
 pub(super) const DRAWN_EVERY: Duration = Duration::from_millis(250);
 /// Lines of a plot.
 const ROWS: usize = 6;
-/// The plot shows at least so many standard deviations.
+/// Least range of the plot in standard deviations.
 const LEAST: f64 = 4.0;
 
 pub(super) struct Screen {
     look: Look,
-    /// Standard error, where it is a terminal.
+    /// Standard error, if it is a terminal.
     term: Option<Term>,
-    /// Lines of the plot on the terminal now.
+    /// Number of the plot's lines on the terminal.
     drawn: usize,
     /// The signals that are plotted, one for each output.
     signals: Vec<Signal>,
@@ -70,7 +70,7 @@ impl Screen {
         self.signals = outputs.into_iter().map(signal).collect();
     }
 
-    /// A line; whoever has closed standard error does not miss it.
+    /// Writes a line; a closed standard error is no error.
     pub(super) fn say(&mut self, text: &str) {
         self.clear();
         let _ = writeln!(io::stderr(), "{text}");
@@ -110,7 +110,7 @@ impl Screen {
         ));
     }
 
-    /// The innovations of a row, where there are any.
+    /// Adds the innovations of a row, if there are any.
     pub(super) fn innovations(&mut self, time: f64, innovations: &[Option<Innovation>]) {
         if self.term.is_none() {
             return;
@@ -130,7 +130,7 @@ impl Screen {
         }
     }
 
-    /// Takes the plot away.
+    /// Removes the plot.
     pub(super) fn clear(&mut self) {
         if let Some(term) = &self.term {
             let _ = term.clear_last_lines(self.drawn);
@@ -138,7 +138,7 @@ impl Screen {
         }
     }
 
-    /// Draws the plot again where something has come; nothing where standard error is no terminal.
+    /// Redraws the plot after new data; no plot if standard error is no terminal.
     pub(super) fn draw(&mut self, monitor: &Monitor) {
         let learning = matches!(monitor.progress(), Progress::Learning(_));
         if self.term.is_none() || !(self.fresh || learning) {
@@ -188,7 +188,7 @@ impl Screen {
     }
 }
 
-/// The line above the plot. A terminal would break a longer one in two, and one of them would stay when the plot is taken away.
+/// Heading of the plot.
 fn heading(
     of: Option<&str>,
     residual: f64,

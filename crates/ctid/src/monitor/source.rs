@@ -1,4 +1,4 @@
-//! Standard input and the wish to stop, on one channel.
+//! Standard input and stop requests, on one channel.
 
 use std::io::{self, Read};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -8,14 +8,14 @@ use crate::Error;
 
 /// Bytes read at once.
 const CHUNK: usize = 64 * 1024;
-/// Chunks that may wait.
+/// Capacity of the queue of chunks.
 const WAITING: usize = 4;
 
-/// What has come.
+/// Input event.
 pub(super) enum Event {
     /// Some bytes.
     Bytes(Vec<u8>),
-    /// No more bytes will.
+    /// End of the input.
     End,
     /// Reading has failed.
     Failed(io::Error),
@@ -23,12 +23,12 @@ pub(super) enum Event {
     Stop,
 }
 
-/// Reads standard input in a thread of its own, so that a wish to stop is heard while no row comes.
+/// Reads standard input in a separate thread, so that a stop request is handled while no row comes.
 pub(super) fn open() -> Result<Receiver<Event>, Error> {
     let (sender, receiver) = sync_channel(WAITING);
     let stop = sender.clone();
     ctrlc::set_handler(move || {
-        // Who no longer listens has stopped.
+        // The receiver has already stopped.
         let _ = stop.send(Event::Stop);
     })
     .map_err(|error| {

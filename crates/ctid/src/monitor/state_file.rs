@@ -1,4 +1,4 @@
-//! The saved state: written whole or not at all, and nothing else is overwritten. A checksum of its numbers tells a damaged one.
+//! The saved state: written completely or not at all, and no other file is overwritten. A checksum of its numbers detects damage.
 
 use std::fs;
 use std::io::{self, BufReader};
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, atomic, output};
 
-/// A larger file is none of ours \[bytes\].
+/// A larger file is not a state of this program \[bytes\].
 const LARGEST: u64 = 64 * 1024 * 1024;
 
 #[derive(Serialize)]
@@ -27,7 +27,7 @@ struct Read {
     state: State,
 }
 
-/// What a state of every version has.
+/// Fields that a state of every version has.
 #[derive(Deserialize)]
 struct Head {
     written_by: String,
@@ -35,7 +35,7 @@ struct Head {
 
 const WRITTEN_BY: &str = "ctid monitor";
 
-/// The state, where there is one; `None` where the file is not there yet. The folder is seen to take a file.
+/// Reads the state; `None` if the file does not exist. Checks that the folder is writable.
 pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
     if output::same_file(path, model) {
         return Err(Error::file(
@@ -46,7 +46,7 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
     let not_ours = |what: String| {
         Error::file(
             path,
-            format!("{what}; give --state another name, or delete the file to begin anew"),
+            format!("{what}; give --state another name, or delete the file to start again"),
         )
     };
     let metadata = match fs::metadata(path) {
@@ -81,7 +81,7 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
         .map_err(|error| not_ours(format!("it cannot be read: {error}")))?;
     let read: Read = serde_json::from_str(&text).map_err(|error| {
         let head = serde_json::from_str::<Head>(&text);
-        // It may quote what the file holds.
+        // The message may quote content of the file.
         let why = quoted(&error.to_string());
         not_ours(if head.is_ok_and(|head| head.written_by == WRITTEN_BY) {
             format!("another version of `ctid monitor` wrote it, or it is damaged ({why})")
@@ -102,12 +102,12 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
     Ok(Some(read.state))
 }
 
-/// CRC-32 of the state as it is written: numbers are read and written again to the last digit.
+/// CRC-32 of the state as written: numbers are read and written again exactly.
 fn checksum(state: &State) -> serde_json::Result<u32> {
     Ok(crc32fast::hash(&serde_json::to_vec(state)?))
 }
 
-/// Whether a state of ours stands there, in whatever version.
+/// Whether the file is a state of this program, in any version.
 fn is_ours(path: &Path) -> bool {
     let Ok(file) = fs::File::open(path) else {
         return false;
@@ -116,7 +116,8 @@ fn is_ours(path: &Path) -> bool {
     head.is_ok_and(|head| head.written_by == WRITTEN_BY)
 }
 
-/// Saves a state, where none is yet or one of ours: what somebody else has put there since the program began stays.
+/// Saves a state to a new file or over an earlier state of this program. A file that another program wrote since the start is not
+/// overwritten.
 pub(super) fn write(path: &Path, state: &State) -> Result<(), Error> {
     let text = checksum(state)
         .and_then(|checksum| {

@@ -1,14 +1,14 @@
-//! What is wrong with rows, said without flooding: the first ones in full, then now and then with a count.
+//! Messages about bad rows with a limited rate: the first ones in full, then occasional ones with a count.
 
 /// Messages in a row that are printed in full.
 const IN_FULL: u64 = 5;
-/// After so many good rows trouble is new again.
+/// After this number of good rows, a bad row is reported in full again.
 const FORGOTTEN: u64 = 1000;
 
 /// Counts bad rows.
 #[derive(Default)]
 pub(super) struct Trouble {
-    /// All of them.
+    /// Number of bad rows.
     pub bad: u64,
     recent: u64,
     good: u64,
@@ -23,13 +23,13 @@ impl Trouble {
         }
     }
 
-    /// A bad row: the message to print, where one is.
+    /// Counts a bad row; returns the message to print, if any.
     pub(super) fn bad(&mut self, message: impl FnOnce() -> String) -> Option<String> {
         self.good = 0;
         self.bad += 1;
         self.recent += 1;
         let recent = self.recent;
-        // The 10th, 100th, 1000th ... of them says how many there were.
+        // The 10th, 100th, 1000th ... message contains the count.
         let power = recent >= 10 && 10_u64.checked_pow(recent.ilog10()) == Some(recent);
         if recent <= IN_FULL {
             let last = if recent == IN_FULL {

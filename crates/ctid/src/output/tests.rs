@@ -50,7 +50,7 @@ fn only_what_ctid_wrote_is_overwritten() {
     }
 }
 
-/// Something to write.
+/// A result to write.
 #[derive(Serialize)]
 struct Number {
     schema: u32,
@@ -78,7 +78,7 @@ fn what_comes_while_the_command_runs_is_not_overwritten() {
         assert_eq!(fs::read_to_string(&json).unwrap(), mine);
         fs::remove_file(&json).unwrap();
     }
-    // Its own are written again and again.
+    // A file of this program may be overwritten repeatedly.
     for _ in 0..3 {
         assert!(planned().write(&NUMBER).unwrap());
     }

@@ -74,7 +74,7 @@ impl RawCandidate {
         }
     }
 
-    /// Where the model file has what these keys name.
+    /// Position of these keys in the model file.
     fn place(&self, keys: &[String]) -> Option<usize> {
         let key = keys.get(1)?;
         match keys.first()?.as_str() {
@@ -98,10 +98,10 @@ impl RawCandidate {
     }
 }
 
-/// The candidates in plain data, each of which fits the model.
+/// The candidates as plain data; each is valid for the model.
 ///
 /// # Errors
-/// One line that names the file, the line, the place in the expression, what is wrong and the mend.
+/// One line that names the file, the line, the place in the expression, what is wrong and the correction.
 pub(super) fn read(
     spec: &ModelSpec,
     raw: &RawCandidates,

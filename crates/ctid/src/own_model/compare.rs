@@ -1,4 +1,4 @@
-//! A model of its user's own fitted to records, and how far it is off.
+//! Fit of a user's own model to records, and its errors.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,29 +14,29 @@ use super::fitted::{FitLimit, FittedModel, blame};
 use super::problem::RecordNumbers;
 use crate::Error;
 
-/// Estimates whose correlation is above this are not known one without the other.
+/// Two estimates with a correlation above this are determined only in combination.
 const TOGETHER: f64 = 0.999;
 /// The initial states of held-out records are fitted within this share of the time, whatever the fit took.
 const OF_HELD_OUT: f64 = 0.25;
 
-/// Measured and model, of one output of one record.
+/// Measured values and model output, for one output of one record.
 #[derive(Debug, Clone)]
 pub struct Curves {
     /// The record's name.
     pub record: String,
     /// The output's name.
     pub output: String,
-    /// Its unit.
+    /// Unit of the values.
     pub unit: String,
     /// Length of the record \[s\].
     pub length: f64,
-    /// What was measured, NaN where nothing was \[unit of the output\].
+    /// Measured values, NaN if missing \[unit of the output\].
     pub measured: Vec<f64>,
-    /// What the model gives \[unit of the output\].
+    /// Output of the model \[unit of the output\].
     pub model: Vec<f64>,
 }
 
-/// What `ctid compare` finds.
+/// Result of `ctid compare`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Comparison {
     /// Version of this layout.
@@ -45,24 +45,24 @@ pub struct Comparison {
     pub model: String,
     /// The effects of the model file that are in the model.
     pub effects: Vec<String>,
-    /// What of the records they are written in.
+    /// Numbers of the records that the effects contain.
     pub record_numbers: RecordNumbers,
     /// The fitted model.
     pub steps: [Step; 1],
-    /// What a linear prediction from the past of each output's residual leaves.
+    /// Innovation variance of each output's residual: the part that its past does not predict.
     pub noise: Vec<NoiseFloor>,
     /// Fitted entries that these records do not determine, alone or together with another one.
     pub not_determined: Vec<Vec<String>>,
-    /// The limit on the time, and what it cut short.
+    /// The time limit, and the steps that were cut short.
     pub effort: Effort,
-    /// How long it took \[s\].
+    /// Computing time \[s\].
     pub seconds: f64,
-    /// Measured and model, of each output of each record.
+    /// Measured values and model output, for each output of each record.
     #[serde(skip)]
     pub curves: Vec<Curves>,
 }
 
-/// Fits the model and says how far it is off. Of the options the seed, the limit on the time and the interruption flag are used.
+/// Fits the model and computes its errors. The seed, the time limit and the interruption flag of the options are used.
 ///
 /// # Errors
 /// Where nothing can be fitted, with the file that is to blame.
@@ -87,7 +87,7 @@ pub fn compare(
 }
 
 impl FittedModel {
-    /// How far the fitted model is off, on its records and on those that are held out.
+    /// Errors of the fitted model on its records and on the held-out records.
     ///
     /// # Errors
     /// Where a simulation is not finite, or the initial states of a held-out record cannot be fitted.
@@ -150,7 +150,7 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
             coefficients: Vec::new(),
         });
     let noise_floors = noise_floors.collect();
-    // The fit is one by simulation error: its residual has the noise's colour.
+    // The fit minimises the simulation error: its residual has the noise's spectrum.
     let errors = setup
         .robust(fit, options.noise_order)
         .map_or_else(|_| fit.std_errors(), |robust| robust.std_errors);
@@ -209,7 +209,7 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
     })
 }
 
-/// Entries that the records do not determine: alone, or pairs of which they tell one combination only.
+/// Parameters that the records do not determine: single ones, or pairs of which only a combination is determined.
 fn not_determined(setup: &ModelSetup, fit: &Fit) -> Vec<Vec<String>> {
     let names = setup.names();
     let mut found = Vec::new();
@@ -223,7 +223,7 @@ fn not_determined(setup: &ModelSetup, fit: &Fit) -> Vec<Vec<String>> {
                 }
             }
         }
-        // Not all can be told: those without a trace in the outputs are named.
+        // If the parameters are not all determined: names those that do not affect the outputs.
         None => {
             let free = setup.free();
             let length = |column: usize| fit.triangle.column_norm(column);
@@ -249,7 +249,7 @@ mod tests {
     use crate::look::Look;
     use crate::own_model::{AnyModelFile, said};
 
-    /// A limit that has passed leaves a fit, and it is said in a line that it was cut short.
+    /// A time limit that has passed still gives a fit, and one line reports that it was cut short.
     #[test]
     fn the_limit_on_the_time_is_kept_and_said() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/models");

@@ -1,4 +1,4 @@
-//! `[controller.u]`: what moved an input of a model of its user's own in a loop.
+//! `[controller.u]`: the controller that drove an input of a user's own model in a loop.
 //!
 //! `ctid identify` works with it by the methods that have to do with a loop. Simulations of the model run on the measured inputs: what that
 //! means for a fit is said.
@@ -20,15 +20,15 @@ pub(super) type RawControllers = BTreeMap<Spanned<String>, Spanned<RawController
 /// A controller of the model file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct OwnController {
-    /// The input that it drives, by its position.
+    /// The input that the controller drives, by its position.
     pub input: usize,
-    /// The output that it reads, by its position.
+    /// The output that the controller reads, by its position.
     pub output: usize,
     /// The column of the reference.
     pub reference: Option<String>,
-    /// Its law; times are in the unit of the model's time.
+    /// Control law; times are in the unit of the model's time.
     settings: ControllerSettings,
-    /// Its table: `controller.u`.
+    /// Name of the controller's table: `controller.u`.
     table: String,
     /// The line of the table.
     line: usize,
@@ -37,7 +37,7 @@ pub(crate) struct OwnController {
 /// Reads and checks the controllers.
 ///
 /// # Errors
-/// One line that names the file, the line, what is wrong and the mend.
+/// One line that names the file, the line, what is wrong and the correction.
 pub(super) fn read(
     spec: &ModelSpec,
     raw: &RawControllers,
@@ -97,9 +97,9 @@ pub(super) fn read(
 }
 
 impl OwnController {
-    /// Its law with times in seconds; `time_unit`: seconds in one unit of the model's time.
+    /// Control law with times in seconds; `time_unit`: seconds in one unit of the model's time.
     pub fn in_seconds(&self, time_unit: f64) -> ControllerSettings {
-        // Of a polynomial in d/dt, highest power first.
+        // For a polynomial in d/dt, highest power first.
         let scaled = |coefficients: &[f64]| -> Vec<f64> {
             let powers = coefficients.iter().rev().enumerate();
             let mut scaled: Vec<f64> = powers
@@ -144,7 +144,7 @@ impl OwnModelFile {
         (tables.join(", "), inputs.join(", "))
     }
 
-    /// What a simulation on measured inputs means where the file declares a controller; `None` where it declares none.
+    /// Warning about a simulation on measured inputs if the file declares a controller; `None` if it declares none.
     pub fn loop_note(&self) -> Option<String> {
         if self.controllers.is_empty() {
             return None;
@@ -155,14 +155,14 @@ impl OwnModelFile {
         ))
     }
 
-    /// The same as a command says it; empty where there is none.
+    /// Loop warning in the layout of a command; empty if there is none.
     pub fn loop_said(&self, look: Look) -> String {
         self.loop_note().map_or(String::new(), |note| {
             look.paragraph("", &format!("note: {note}"))
         })
     }
 
-    /// For what is asked to simulate the loop.
+    /// For options that need a simulation of the loop.
     ///
     /// # Errors
     /// Where the file declares a controller: its loop cannot be simulated.
@@ -210,7 +210,7 @@ mod tests {
             integral_time: 90.0,
         };
         assert_eq!(pi, expected);
-        // The same one as polynomials in d/dt: u = (2 p + 4/3)/p e, time in minutes.
+        // The same controller as polynomials in d/dt: u = (2 p + 4/3)/p e, time in minutes.
         let rs = law(
             "[controller.u]\ntype = \"RS\"\noutput = \"y\"\nvariable = \"p\"\nr = [3.0, 2.0]\ns = [1.5, 0.0]",
         );

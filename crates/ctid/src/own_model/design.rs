@@ -1,4 +1,4 @@
-//! `ctid design` of a model of its user's own: the next experiment, at one of its inputs or at several.
+//! `ctid design` of a user's own model: the next experiment, at one of its inputs or at several.
 
 use ct_signals::{Heading, duration};
 use effect_search::design::{
@@ -19,7 +19,7 @@ use crate::output::Found;
 use crate::simulate::{cell, csv_text, header};
 use crate::{Error, numbers};
 
-/// An effect that the records ask for lowers the criterion by this much.
+/// A significant effect lowers the criterion by this much.
 const NEEDED: f64 = 6.0;
 
 /// Searches the experiments.
@@ -43,7 +43,7 @@ pub fn design(
     let problem = problem(file, records);
     let found = search(&problem, [ids[0], ids[1]], limits, options, progress);
     found.map_err(|error| match error {
-        // What is wrong with the options is no fault of a file.
+        // An error in the options, not in a file.
         effect_search::Error::Design(refused) if refused != Refused::OutOfTime => {
             Error::Usage(refused.to_string())
         }
@@ -51,18 +51,18 @@ pub fn design(
     })
 }
 
-/// A design, and how its experiment is written.
+/// A design, and the format of its experiment.
 #[derive(Debug, Serialize)]
 pub(crate) struct OwnProposal {
     #[serde(flatten)]
     pub design: Design,
-    /// The experiment as CSV; none where none is worth making.
+    /// The experiment as CSV; none if no experiment is worthwhile.
     #[serde(skip)]
     record: Option<String>,
 }
 
 impl OwnProposal {
-    /// A design whose experiment is written in columns of the model file's names.
+    /// A design whose experiment has the columns of the model file.
     pub fn new(design: Design, file: &OwnModelFile, time_unit: f64) -> Self {
         let record = (!design.twins()).then(|| csv(&design, file, time_unit));
         Self { design, record }
@@ -108,10 +108,10 @@ pub(crate) fn said(file: &OwnModelFile, design: &Design, look: Look) -> String {
     text
 }
 
-/// The two effects on the records that there are.
+/// The two effects on the existing records.
 fn alternatives(design: &Design, look: Look) -> String {
     let title = format!(
-        "{} or {}, on the records that there are, weighted by their noise",
+        "{} or {}, on the existing records, weighted by their noise",
         design.between[0].effect, design.between[1].effect
     );
     let mut rows = vec![
@@ -149,7 +149,7 @@ fn range(low: f64, high: f64, unit: &str) -> String {
     format!("{low} .. {high} {unit}").trim_end().to_string()
 }
 
-/// Length and inputs with what they may do: `33 min, u 0 .. 36 % (visited)`.
+/// Length and inputs with their permitted changes: `33 min, u 0 .. 36 % (visited)`.
 pub(crate) fn limits(design: &Design) -> String {
     let of = |limits: &InputRange| {
         let from = if limits.visited { " (visited)" } else { "" };
@@ -174,15 +174,15 @@ pub(crate) fn limits(design: &Design) -> String {
 
 /// An experiment in words.
 pub(crate) struct ShownExperiment {
-    /// What the inputs do.
+    /// Course of the inputs.
     pub what: String,
-    /// Where each output goes.
+    /// Range of each output.
     pub reaches: Vec<String>,
     pub power: String,
     pub decides: String,
 }
 
-/// The best experiments, and the same once more.
+/// The best experiments, and the repetition of the previous one.
 pub(crate) fn experiments(file: &OwnModelFile, design: &Design) -> Vec<ShownExperiment> {
     let shown = design.experiments.iter().take(SHOWN);
     let all = shown.chain(&design.again);
@@ -213,7 +213,7 @@ fn in_words(file: &OwnModelFile, design: &Design, experiment: &Experiment) -> Sh
     }
 }
 
-/// The experiments, the best first, and the same once more, as a table.
+/// The experiments, the best first, and the repetition of the previous one, as a table.
 fn listed(file: &OwnModelFile, design: &Design, look: Look) -> String {
     let mut title = limits(design);
     title.replace_range(..1, "E");
@@ -247,7 +247,7 @@ fn listed(file: &OwnModelFile, design: &Design, look: Look) -> String {
     text + "\n\n"
 }
 
-/// What the inputs do that move.
+/// Course of the inputs that change.
 fn applied(design: &Design, experiment: &Experiment) -> String {
     let inputs = experiment.inputs.iter();
     let inputs: Vec<String> = inputs.map(|own| sequence_words(design, own)).collect();
@@ -270,7 +270,7 @@ fn sequence_words(design: &Design, applied: &InputSequenceKind) -> String {
     )
 }
 
-/// What to apply, and what it can be expected to tell.
+/// Sentences: the experiment to apply, and the expected result.
 pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) -> Vec<String> {
     let words = EffectWords::of(&file.base, &file.candidates);
     let [a, b] = design
@@ -293,7 +293,7 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
     let decides = 100.0 * best.power.decides;
     all.push(match design.prospect {
         Prospect::Twins => format!(
-            "{} and {} show the same in every experiment that was tried within these limits: no experiment of this kind tells them apart. Another sensor, or a look at the plant, may.",
+            "{} and {} give the same response in every experiment that was tried within these limits: no experiment of this kind tells them apart. Another sensor, or an inspection of the plant, may.",
             words.placed(a),
             words.placed(b)
         ),
@@ -309,7 +309,7 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         .all(|alternative| alternative.bic_gain < NEEDED)
     {
         all.push(format!(
-            "These records ask for neither of the two: {a} and {b}, alone, do not lower the criterion by {NEEDED}. The experiments are reckoned with the small sizes above."
+            "These records support neither of the two: {a} and {b}, alone, do not lower the criterion by {NEEDED}. The experiments are evaluated with the small sizes above."
         ));
     }
     let held: Vec<String> = design
@@ -334,7 +334,7 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         all.push(format!("Hold {}.", held.join(", ")));
     }
     if let Some(times) = design.times_as_long.filter(|_| !design.twins()) {
-        all.push(format!("Played {times} times over it would decide."));
+        all.push(format!("Repeated {times} times it would decide."));
     }
     if !file.controllers.is_empty() && !design.twins() {
         all.push("The experiment is in open loop: switch the controller to manual.".to_string());

@@ -1,4 +1,4 @@
-//! What a model of its user's own is missing.
+//! Diagnosis of a user's own model.
 
 use effect_search::{Diagnosis, Left, Options, Step, Thresholds, Verdict};
 
@@ -27,7 +27,7 @@ pub fn diagnose(
     effect_search::diagnose(&problem, options, progress).map_err(|error| blamed(&problem, &error))
 }
 
-/// What a person reads of a diagnosis.
+/// Text output of a diagnosis.
 pub(crate) fn said(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
     let words = EffectWords::of(&file.base, &file.candidates);
     let mut text = format!("{}\n\n", look.heading(&diagnosis.model));
@@ -58,7 +58,7 @@ pub(crate) fn heading(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// What was found, in sentences.
+/// Findings in sentences.
 pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<String> {
     let mut all = Vec::new();
     for group in &diagnosis.groups {
@@ -92,7 +92,7 @@ pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<Strin
     all
 }
 
-/// How much the effects explain, and what remains.
+/// Share of the error that the effects explain, and tests of the residual.
 pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
     let mut all = Vec::new();
     if let Some(share) = diagnosis.share {
@@ -103,24 +103,24 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
     }
     match (&diagnosis.left, diagnosis.verdict) {
         (Some(left), Verdict::Unexplained) => all.push(format!(
-            "What the model leaves is not noise: {}. No candidate explains it.",
+            "The residual of the model is not noise: {}. No candidate explains it.",
             said_of(left)
         )),
         (Some(left), _) => all.push(format!("What remains is not noise: {}.", said_of(left))),
         (None, Verdict::Adequate) => {
-            all.push("What the model leaves looks like noise.".to_string())
+            all.push("The residual of the model looks like noise.".to_string())
         }
         (None, _) => all.push("What remains looks like noise.".to_string()),
     }
     let many = Thresholds::DEFAULT.many_effects;
     if diagnosis.effects.len() >= many {
         all.push(format!(
-            "{many} effects or more together may imitate one that no candidate holds: take them for a description of the records until each is confirmed."
+            "{many} effects or more together may compensate for an effect that is not among the candidates: treat them as a description of the records until each is confirmed."
         ));
     }
     if !diagnosis.left_out.is_empty() {
         all.push(format!(
-            "Left out by the time limit: {}; --effort thorough goes on longer.",
+            "Left out by the time limit: {}; --effort thorough searches longer.",
             diagnosis.left_out.join(", ")
         ));
     }
@@ -161,7 +161,7 @@ fn said_of(left: &Left) -> String {
             ct_signals::duration(*to)
         ),
         Left::Level { output } => {
-            format!("the residual of {output} depends on what the model gives there")
+            format!("the residual of {output} depends on the model's output")
         }
         Left::Spectrum { output, record } => format!(
             "the spectrum of the residual of {output} changes during {record}: one noise model does not explain it"
@@ -170,7 +170,7 @@ fn said_of(left: &Left) -> String {
             format!("a function of {variable} lowers the error by more than noise would: {effect}")
         }
         Left::Slow { output } => format!(
-            "the residual of {output} wanders too slowly to be taken for noise in records of this length"
+            "the residual of {output} drifts too slowly to be noise in records of this length"
         ),
     }
 }
@@ -250,7 +250,7 @@ fn errors(diagnosis: &Diagnosis, look: Look) -> String {
     text + &state_rows(first)
 }
 
-/// On how many rows the initial states of held-out records were fitted.
+/// Number of rows for the fit of the held-out records' initial states.
 pub(super) fn state_rows(step: &Step) -> String {
     let Some(rows) = &step.state_rows else {
         return String::new();
@@ -261,7 +261,7 @@ pub(super) fn state_rows(step: &Step) -> String {
     } else {
         format!("the first {} rows of the records", rows.join(", "))
     };
-    format!("  held out: without {whose}, to which the initial states are fitted\n")
+    format!("  held out: without {whose} that the initial states are fitted to\n")
 }
 
 fn estimates(step: &Step, look: Look) -> String {

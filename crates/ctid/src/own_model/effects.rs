@@ -1,4 +1,4 @@
-//! `effects = [...]` of a model file with a model of its user's own, and what `[effect."lag(u)"]` keeps of an effect.
+//! `effects = [...]` of a model file with a user's own model, and the kept values in `[effect."lag(u)"]`.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use crate::{Error, names};
 /// The tables of effects, by identifier.
 pub(super) type RawEffects = BTreeMap<Spanned<String>, BTreeMap<Spanned<String>, Setting>>;
 
-/// The key of the numbers of the record, beside the names of parameters.
+/// Key of the numbers of the record, next to the names of parameters.
 pub(crate) const RECORD: &str = "record";
 /// The key of the parameters that are not fitted.
 const FIXED: &str = "fixed";
@@ -34,19 +34,19 @@ pub(super) enum Setting {
 /// The effects of a model file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OwnEffects {
-    /// Identifiers of those that are on, in order.
+    /// Identifiers of the effects in the model, in order.
     pub on: Vec<String>,
-    /// What is kept of them.
+    /// Values kept from earlier results.
     pub kept: BTreeMap<String, Kept>,
-    /// Parameters of theirs that are not fitted, and their values.
+    /// Fixed parameters of the effects, and their values.
     pub fixed: BTreeMap<String, f64>,
-    /// All their parameters, by the names in the model that they are in, with the effect of each.
+    /// Parameters of all effects by their names in the extended model, with the effect of each.
     pub parameters: BTreeMap<String, String>,
-    /// Tables of effects that are not on.
+    /// Tables of effects that are not in the model.
     pub waiting: Vec<String>,
 }
 
-/// An identifier without the blanks that somebody has typed.
+/// An identifier without the blanks that the user typed.
 pub(crate) fn plain(id: &str) -> String {
     id.chars().filter(|c| !c.is_whitespace()).collect()
 }
@@ -54,7 +54,7 @@ pub(crate) fn plain(id: &str) -> String {
 /// Reads and checks the effects of a model file.
 ///
 /// # Errors
-/// One line that names the file, the line, what is wrong and the mend.
+/// One line that names the file, the line, what is wrong and the correction.
 pub(super) fn read(
     spec: &ModelSpec,
     own: &BTreeMap<String, OwnCandidate>,
@@ -97,7 +97,7 @@ pub(super) fn read(
     Ok(effects)
 }
 
-/// The effects of these identifiers, each with what is kept of it.
+/// The effects of these identifiers, each with its kept values.
 ///
 /// # Errors
 /// In words where one cannot act in the model, or stands there twice.
@@ -127,7 +127,7 @@ pub(super) fn of_ids(
     Ok(effects)
 }
 
-/// All parameters of effects, with the effect of each.
+/// Parameters of effects, with the effect of each.
 fn parameters_of(on: &[&Candidate]) -> BTreeMap<String, String> {
     let parameters = on.iter().flat_map(|candidate| {
         let names = candidate.parameters.iter().map(|p| p.name.clone());
@@ -136,7 +136,7 @@ fn parameters_of(on: &[&Candidate]) -> BTreeMap<String, String> {
     parameters.collect()
 }
 
-/// All that can act in a model, of the catalogue and of the model file.
+/// All effects that can act in a model, from the catalogue and from the model file.
 ///
 /// # Errors
 /// As [`all_candidates`], which a model file passes first.
@@ -148,7 +148,7 @@ pub(crate) fn every_candidate(
         .map_err(|error| Error::Columns(error.to_string()))
 }
 
-/// The candidate of an identifier.
+/// The candidate with this identifier.
 ///
 /// # Errors
 /// In one line where there is none, with the identifiers that may have been meant.
@@ -187,7 +187,7 @@ pub(crate) fn find<'c>(
 
 type Settings = (Kept, BTreeMap<String, f64>);
 
-/// The table of an effect: what is kept of it, and what is not fitted.
+/// The table of an effect: its kept values, and its fixed parameters.
 fn settings(
     candidate: &Candidate,
     table: &BTreeMap<Spanned<String>, Setting>,

@@ -1,4 +1,4 @@
-//! A model of its user's own with its fitted values as text, and the curves of its fit.
+//! A user's own model with its fitted values as text, and the curves of its fit.
 
 use std::path::PathBuf;
 
@@ -14,13 +14,13 @@ use crate::numbers;
 use crate::output::Found;
 use crate::simulate::{Curves, FittedRecord, TimeColumn};
 
-/// What `ctid export` writes.
+/// Output of `ctid export`.
 #[derive(Debug, Serialize)]
 pub(crate) struct Exported {
     pub schema: u32,
     /// The model's name.
     pub model: String,
-    /// The records that it was fitted to; none where the values are those of its text.
+    /// The records of the fit; empty if the values are those of the text.
     pub fitted_to: Vec<String>,
     /// The text.
     #[serde(skip)]
@@ -40,7 +40,7 @@ impl Found for Exported {
     }
 }
 
-/// The text of a model with the values that it has, and those of `[known]`; `source`: where it is from, for its first line.
+/// The text of a model with its values, and those of `[known]`; `source`: origin, for the first line.
 ///
 /// # Errors
 /// Where the model file lacks a number that its effects need.
@@ -64,8 +64,8 @@ fn with_known(file: &OwnModelFile) -> ModelSpec {
 }
 
 impl FittedModel {
-    /// The model's text with its fitted values, and their standard errors in comments; it begins where the first record does. `source`: where
-    /// the model is from, for the first line.
+    /// The model's text with its fitted values, and their standard errors in comments; the initial states are those of the first record.
+    /// `source`: origin of the model, for the first line.
     ///
     /// # Errors
     /// Where the simulation is not finite at the fit.
@@ -80,7 +80,7 @@ impl FittedModel {
         for (parameter, value) in spec.parameters.iter_mut().zip(&fit.x) {
             parameter.value = *value;
         }
-        // Where a simulation begins: as the first record does.
+        // A simulation begins with the initial states of the first record.
         for (state, value) in spec.states.iter_mut().zip(&fit.x[count..]) {
             if !state.fixed {
                 state.start = number(*value);
@@ -113,17 +113,17 @@ impl FittedModel {
     }
 }
 
-/// The names of records, parts of one file once.
+/// The names of records; parts of one file once.
 fn names_of(records: &[Record]) -> Vec<String> {
     let mut names: Vec<String> = records.iter().map(|record| record.name.clone()).collect();
     names.dedup();
     names
 }
 
-/// The model with the values of its text and of `[known]` or, where there are records, those of a fit to them.
+/// The model with the values of its text and of `[known]` or, with records, those of a fit to them.
 ///
 /// # Errors
-/// One line that names the file, the place and the mend.
+/// One line that names the file, the place and the correction.
 pub(crate) fn export(
     file: &OwnModelFile,
     records: Option<(Records, &[PathBuf])>,
@@ -191,7 +191,7 @@ pub(crate) fn export(
     Ok((exported, records.summaries.clone()))
 }
 
-/// A number as a text has it.
+/// A number in the notation of a text.
 pub(crate) fn number(value: f64) -> Expression {
     let size = Expression::Number(value.abs());
     if value < 0.0 {

@@ -1,4 +1,4 @@
-//! The model file of a model of its user's own, and the records that go with it.
+//! The model file of a user's own model, and its records.
 
 mod parse;
 
@@ -31,50 +31,50 @@ pub struct OwnModelFile {
     pub name: String,
     /// The model as its text has it.
     pub base: ModelSpec,
-    /// The same, or after [`OwnModelFile::mended`] the one with the effects in it.
+    /// The model; after [`OwnModelFile::mended`], the model with its effects.
     pub model: Model,
-    /// The effects of the file.
+    /// Numbers of a record that the effects in the model contain.
     pub effects: OwnEffects,
     /// What of a record the effects in the model are written in.
     pub record_numbers: RecordNumbers,
-    /// Where its text is.
+    /// Path of the model text.
     pub text: PathBuf,
-    /// Which column is which input and output, in the order of the model.
+    /// Columns of the inputs and outputs, in the order of the model.
     pub columns: Columns,
     /// Parameters that are not fitted.
     pub known: BTreeMap<String, f64>,
     /// Side measurements of parameters.
     pub priors: BTreeMap<String, PriorValue>,
-    /// What the inputs do between rows.
+    /// Hold of the inputs between rows.
     pub hold: Hold,
     /// Effects of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
-    /// What moved inputs in a loop.
+    /// Controllers that drive inputs.
     pub(crate) controllers: Vec<OwnController>,
-    /// What stands in the file and is not used yet.
+    /// Entries of the file that are not used.
     pub unused: Vec<String>,
 }
 
-/// What is said of a model in place of a model file.
+/// Settings for a model without a model file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct OwnSettings {
-    /// Which column is which input and output, in the order of the model; the time.
+    /// Columns of the inputs and outputs, in the order of the model; the time.
     pub columns: Columns,
     /// Parameters that are not fitted \[unit of the text\].
     pub known: BTreeMap<String, f64>,
     /// Side measurements of parameters.
     pub priors: BTreeMap<String, PriorValue>,
-    /// What the inputs do between rows.
+    /// Hold of the inputs between rows.
     pub hold: Hold,
     /// Identifiers of the effects that are in the model, in order.
     pub effects: Vec<String>,
-    /// What is kept of them.
+    /// Kept values of the effects.
     pub kept: BTreeMap<String, Kept>,
     /// Effects of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
 }
 
-/// Records as the model takes them.
+/// Records in the order and units of the model.
 #[derive(Debug, Clone)]
 pub struct Records {
     /// Fitted.
@@ -83,15 +83,15 @@ pub struct Records {
     pub test: Vec<Record>,
     /// Seconds in one unit of the model's time.
     pub time_unit: f64,
-    /// How each was read, fitted ones first.
+    /// Summary of each record that was read, fitted ones first.
     pub summaries: Vec<ct_signals::ReadSummary>,
 }
 
-/// A model file, of a plant or of its user's own.
+/// A model file of a plant or of a user's own model.
 pub enum AnyModelFile {
-    /// It names one of the plants.
+    /// The file names one of the plants.
     Plant(Box<ModelFile>),
-    /// It names a text.
+    /// The file names a model text.
     Own(Box<OwnModelFile>),
 }
 
@@ -99,7 +99,7 @@ impl AnyModelFile {
     /// Reads the model file once: it may be a pipe.
     ///
     /// # Errors
-    /// As [`model_file::read`]; one line that names the file, the line, what is wrong and the mend.
+    /// As [`model_file::read`]; one line that names the file, the line, what is wrong and the correction.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = model_file::read_text(path)?;
         let table = text.parse::<toml::Table>().ok();
@@ -112,7 +112,7 @@ impl AnyModelFile {
 }
 
 impl AnyModelFile {
-    /// What is said of a loop that a model of its user's own declares and no simulation has; empty where there is none.
+    /// Warning about a loop that the file declares and that is not simulated; empty if there is none.
     pub fn loop_said(&self, look: Look) -> String {
         match self {
             Self::Plant(_) => String::new(),
@@ -120,7 +120,7 @@ impl AnyModelFile {
         }
     }
 
-    /// The same with the effects of a model of its user's own in it, as they stand in the file.
+    /// The model file with its effects inserted into the model.
     ///
     /// # Errors
     /// Where the file lacks a number that they need.
@@ -133,7 +133,7 @@ impl AnyModelFile {
 }
 
 impl OwnModelFile {
-    /// What is said of the model beside its text.
+    /// Settings of the model apart from its text.
     #[must_use]
     pub fn settings(&self) -> OwnSettings {
         OwnSettings {
@@ -147,10 +147,11 @@ impl OwnModelFile {
         }
     }
 
-    /// The same with one effect more, or with what a diagnosis found of one that it has: sizes, where fits begin, and the numbers of its records.
+    /// The model file with one more effect, or with updated values of an effect that it has: sizes, start values, and the numbers of its
+    /// records.
     ///
     /// # Errors
-    /// Where it cannot act in the model, or the diagnosis says nothing of it.
+    /// Where it cannot act in the model, or the diagnosis contains no information about it.
     pub fn with_effect(&self, effect: &str, found: &Diagnosis) -> Result<Self, Error> {
         let all = effects::every_candidate(&self.base, &self.candidates)?;
         let candidate = effects::find(&self.base, &all, effect).map_err(Error::UnknownEffect)?;
@@ -179,7 +180,7 @@ impl OwnModelFile {
     /// Reads the records of a problem.
     ///
     /// # Errors
-    /// One line that names the file, the place and the mend.
+    /// One line that names the file, the place and the correction.
     pub fn records(&self, files: &Files) -> Result<Records, Error> {
         let options = ct_signals::ReadOptions {
             hold: self.hold,
@@ -196,7 +197,7 @@ impl OwnModelFile {
         self.gathered(all, files.data.len(), self.time_unit(&files.data[0])?)
     }
 
-    /// Readings of records, of which so many come first that are fitted, as the model takes them; `time_unit`: seconds in one of the model's.
+    /// Records in the form of the model, of which the first `fitted` ones are fitted; `time_unit`: seconds in one unit of the model's time.
     ///
     /// # Errors
     /// Where a column's unit is none of its signal.
@@ -216,7 +217,7 @@ impl OwnModelFile {
         crate::input::on_one_clock(&mut all);
         crate::input::check_clocks(&all[..fitted], &summaries)?;
         let test = all.split_off(fitted);
-        // An input that is missing is held for a row; a longer gap parts the record.
+        // A missing input is held for one row; a longer gap splits the record.
         let whole = |records: Vec<Record>| -> Vec<Record> {
             let parts = records
                 .iter()
@@ -231,7 +232,7 @@ impl OwnModelFile {
         })
     }
 
-    /// An error of the columns with the mend for this model, whose signals have names of their own under `[columns]`.
+    /// An error of the columns with the correction for this model, whose signals have names of their own under `[columns]`.
     pub fn named(&self, error: ct_signals::Error) -> Error {
         let ct_signals::Error::Column { file, row, fault } = &error else {
             return error.into();
@@ -257,8 +258,8 @@ impl OwnModelFile {
         }
     }
 
-    /// Puts the channels into the units of the model, where the model file reads them in others, and gives them the names of its signals:
-    /// results name these, whatever the columns are called.
+    /// Converts the channels to the units of the model, if the model file gives other ones, and renames them: results have the names of the
+    /// model's signals.
     ///
     /// # Errors
     /// Where a column is in a unit of another dimension.
@@ -295,7 +296,7 @@ impl OwnModelFile {
         Ok(self.time_unit_of(&headings))
     }
 
-    /// The same, where the header of the first record is known.
+    /// Unit of the time, if the header of the first record is known.
     pub fn time_unit_of(&self, headings: &[Heading]) -> f64 {
         let guessed = || Columns::guessed(headings).time;
         let time = self.columns.time.clone().or_else(guessed);
@@ -324,7 +325,7 @@ pub(super) fn convert(record: &str, channel: &mut Channel, about: &About) -> Res
     Ok(())
 }
 
-/// How values of a column in this unit are put into that of a signal; `None` where they are in it, or one of them says nothing.
+/// Conversion of a column's values to the unit of a signal; `None` if the units are equal or one of them is not known.
 ///
 /// # Errors
 /// In words where the units do not go together.
@@ -349,7 +350,7 @@ pub(crate) fn conversion(
 /// Reads the text of a model.
 ///
 /// # Errors
-/// One line that names the file, line and column, what is wrong and the mend.
+/// One line that names the file, line and column, what is wrong and the correction.
 pub(crate) fn read_model(path: &Path) -> Result<ModelSpec, Error> {
     let text = model_file::read_text(path)?;
     ModelSpec::parse_to_simulate(&text).map_err(|source| Error::Text {

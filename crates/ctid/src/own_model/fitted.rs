@@ -1,4 +1,4 @@
-//! A model of its user's own fitted to records: what comparisons, simulations and exports begin with.
+//! A user's own model fitted to records: the basis of comparisons, simulations and exports.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,7 +14,7 @@ use super::simulate::simulated;
 use crate::Error;
 use crate::simulate::{ReadInputs, Simulated};
 
-/// The effects of the file are added one after the other within this share of the time.
+/// Share of the time for adding the effects of the file one after the other.
 const OF_EFFECTS: f64 = 0.5;
 
 /// A model, the records that it is fitted to, and the fit.
@@ -28,7 +28,7 @@ pub struct FittedModel {
     effort: Effort,
 }
 
-/// What ends a fit before its end: it takes no further steps then, and is what it is.
+/// Time limit of a fit: at the limit the fit stops, and its present estimate is the result.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FitLimit<'a> {
     /// A time.
@@ -37,7 +37,7 @@ pub struct FitLimit<'a> {
     pub interrupt: Option<&'a AtomicBool>,
 }
 
-/// How well a simulation agrees with an output that was measured.
+/// Agreement of a simulation with a measured output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutputScore {
     /// The output.
@@ -99,7 +99,7 @@ impl FittedModel {
         })
     }
 
-    /// The same of a fit that was kept: of this model to these records.
+    /// Restores a saved fit of this model to these records.
     ///
     /// # Errors
     /// Where it is none of this model and these records.
@@ -128,7 +128,7 @@ impl FittedModel {
         })
     }
 
-    /// The model as it was given, its effects beside it.
+    /// The model without inserted effects, and the effects separately.
     #[must_use]
     pub fn given(&self) -> &OwnModelFile {
         &self.given
@@ -152,13 +152,13 @@ impl FittedModel {
         &self.fit
     }
 
-    /// How it was fitted.
+    /// Options of the fit.
     #[must_use]
     pub fn options(&self) -> &FitOptions {
         &self.options
     }
 
-    /// The limit on the time of the fit, and what it cut short.
+    /// The time limit of the fit, and the steps that were cut short.
     #[must_use]
     pub fn effort(&self) -> &Effort {
         &self.effort
@@ -172,7 +172,7 @@ impl FittedModel {
         setup_of(&self.model, &self.records)
     }
 
-    /// The uncertainty of all that was fitted, under the noise of the residual; `None` where the simulation at the fit is not finite.
+    /// The uncertainty of all fitted parameters, with the noise model of the residual; `None` if the simulation at the fit is not finite.
     ///
     /// # Errors
     /// As [`FittedModel::setup`].
@@ -181,7 +181,7 @@ impl FittedModel {
         Ok(setup.robust(&self.fit, self.options.noise_order).ok())
     }
 
-    /// How well the parameters are known; `None` where the records do not determine all of them.
+    /// Uncertainty of the parameters; `None` if the records do not determine all of them.
     pub(super) fn uncertainty(&self, setup: &ModelSetup) -> Result<Option<FitUncertainty>, Error> {
         let count = setup.parameter_count();
         let known = FitUncertainty::of(setup, &self.fit, count, self.options.noise_order);
@@ -192,7 +192,7 @@ impl FittedModel {
     /// more where these do not tell. `level`: the probability with which the band holds, within 0 and 1.
     ///
     /// # Errors
-    /// Where an input is not whole, or the simulation does not go on, with the place and the mend.
+    /// Where an input is not whole, or the simulation does not go on, with the place and the correction.
     pub fn simulate(&self, reading: Reading, first: usize, level: f64) -> Result<Simulated, Error> {
         let name = std::path::PathBuf::from(&reading.record.name);
         let columns = Columns {
@@ -216,8 +216,8 @@ impl FittedModel {
         simulated(of, (&read, &name, first), level, &self.options)
     }
 
-    /// How well simulations of other records agree with what was measured there, output by output. Initial states are fitted to the first
-    /// rows of each record, which are not scored; all else stays.
+    /// Scores of simulations of other records, output by output. Initial states are fitted to the first rows of each record, which are not
+    /// scored; all other parameters are fixed.
     ///
     /// # Errors
     /// Where a record is not one of this model, or its initial states cannot be fitted.
@@ -239,7 +239,7 @@ impl FittedModel {
         Ok(self.scores(all.map(|(o, &rmse)| (rmse, scored(o)))))
     }
 
-    /// How well the model agrees with the records that it was fitted to, output by output.
+    /// Scores of the model on its fitted records, output by output.
     #[must_use]
     pub fn score_of_fit(&self) -> Vec<OutputScore> {
         let of = |(o, &rmse): (usize, &f64)| {
@@ -250,7 +250,7 @@ impl FittedModel {
         self.scores(self.fit.rmse.iter().enumerate().map(of))
     }
 
-    /// Of each output, from its error and the readings that are scored.
+    /// Scores of each output, from its error and the scored readings.
     fn scores(&self, errors: impl Iterator<Item = (f64, Vec<f64>)>) -> Vec<OutputScore> {
         let spec = self.model.model.spec();
         let outputs = spec.outputs.iter().zip(errors);
@@ -280,7 +280,7 @@ fn setup_of<'a>(model: &'a OwnModelFile, records: &'a Records) -> Result<ModelSe
     setup.map_err(|error| blame(&records.records, &error))
 }
 
-/// An error of the computation, with the records that it is of.
+/// An error of the computation, with its records.
 pub(super) fn blame(records: &[Record], error: &greybox::Error) -> Error {
     let mut names: Vec<&str> = records.iter().map(|r| r.name.as_str()).collect();
     names.dedup();

@@ -1,4 +1,4 @@
-//! The linear model that `ctid identify` finds, beside the transfer function of a model of its user's own.
+//! The linear model from `ctid identify`, compared with the transfer function of a user's own model.
 
 use std::path::Path;
 
@@ -34,15 +34,15 @@ pub(crate) struct OwnTransferFunction {
     pub input: String,
     /// The output.
     pub output: String,
-    /// Of the input, by powers of s.
+    /// Coefficients of the input's polynomial, by powers of s.
     pub b: Vec<f64>,
-    /// Of the output, by powers of s.
+    /// Coefficients of the output's polynomial, by powers of s.
     pub a: Vec<f64>,
-    /// Inputs that are taken to stand still.
+    /// Inputs that are assumed constant.
     pub others: Vec<String>,
 }
 
-/// What was found, and the transfer function of the model.
+/// The identified model, and the transfer function of the user's model.
 #[derive(Debug, Serialize)]
 pub(crate) struct Beside<'t, T> {
     #[serde(flatten)]
@@ -58,7 +58,7 @@ impl<T: Found> Found for Beside<'_, T> {
 }
 
 impl<'f> OneByOne<'f> {
-    /// The input and the output that were chosen, or the only ones.
+    /// The chosen input and output, or the only ones.
     ///
     /// # Errors
     /// Where the model is not linear, or there are several and none was chosen, or none has this name.
@@ -128,7 +128,7 @@ impl<'f> OneByOne<'f> {
         })
     }
 
-    /// The columns of the two, and what the input does between samples.
+    /// The columns of both, and the hold of the input between samples.
     pub fn columns(&self) -> (Columns, Hold) {
         let all = &self.file.columns;
         let columns = Columns {
@@ -144,13 +144,13 @@ impl<'f> OneByOne<'f> {
         (columns, self.file.hold)
     }
 
-    /// The controller that drives this input by this output.
+    /// The controller between this output and this input.
     fn loop_controller(&self) -> Option<&OwnController> {
         let mut controllers = self.file.controllers.iter();
         controllers.find(|own| own.input == self.input && own.output == self.output)
     }
 
-    /// The same with times in seconds; `data`: a record, whose header says the unit of the time where the model file does not.
+    /// Controller with times in seconds; `data`: a record whose header gives the unit of the time if the model file does not.
     ///
     /// # Errors
     /// Where the record cannot be read.
@@ -160,7 +160,8 @@ impl<'f> OneByOne<'f> {
         controller.map(in_seconds).transpose()
     }
 
-    /// Puts a record of the two into the units of the model. A reference that no controller names says nothing of this loop, and is left out.
+    /// Converts a record to the units of the model. A reference that no controller names contains no information about this loop, and is
+    /// dropped.
     ///
     /// # Errors
     /// Where a unit is of another dimension.
@@ -182,7 +183,7 @@ impl<'f> OneByOne<'f> {
         Ok(())
     }
 
-    /// The transfer function with the values of the text and of `[known]`; `None` where something is delayed.
+    /// The transfer function with the values of the text and of `[known]`; `None` if the model has a delay.
     ///
     /// `data`: a record, whose header says the unit of the time where the model file does not.
     ///
@@ -210,7 +211,7 @@ impl<'f> OneByOne<'f> {
         let scale = if a[0].abs() > 1e-12 * largest {
             a[0]
         } else {
-            // It integrates.
+            // The model has an integrator.
             a[0] = 0.0;
             a[1.min(a.len() - 1)]
         };
@@ -229,7 +230,7 @@ impl<'f> OneByOne<'f> {
     }
 }
 
-/// Without the poles that zeros cancel, which this input does not move or this output does not see, and without leading zeros.
+/// Cancels common poles and zeros (modes that this input does not excite or this output does not contain), and removes leading zeros.
 fn reduced(mut found: TransferFunction) -> Result<TransferFunction, Error> {
     let largest = found.numerator.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let rounding = 1e-14 * largest;
@@ -273,7 +274,7 @@ impl OwnTransferFunction {
         (self.a.len() - 1, self.b.len() - 1)
     }
 
-    /// What a person reads of it beside what was identified: name, value and standard error of each coefficient.
+    /// Text that compares the model with the identified one: name, value and standard error of each coefficient.
     pub fn said(&self, found: Option<(Order, &[missing_effect::Parameter])>, look: Look) -> String {
         let title = format!(
             "{}: its own transfer function from {} to {}, with the values of its text and [known]",
@@ -324,7 +325,7 @@ impl OwnTransferFunction {
         }
         if !self.others.is_empty() {
             notes.push(format!(
-                "{} {} no part here: what is identified is right where {} still",
+                "{} {} no part here: the identified model is right only if {} still",
                 self.others.join(", "),
                 if self.others.len() == 1 {
                     "has"

@@ -1,4 +1,4 @@
-//! Models of their user's own: a text in a flat subset of Modelica, fitted to records and searched for what it lacks.
+//! Users' own models: a text in a flat subset of Modelica, fitted to records and searched for missing effects.
 //!
 //! | question | answer |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! What can act where in a model of its user's own.
+//! Effects and ports of a user's own model.
 
 use ct_model::ModelSpec;
 use ct_model::effects::{Candidate, Place, Port, Visited, candidates};
@@ -20,7 +20,7 @@ const HEADINGS: [&str; 6] = [
     "of the model file",
 ];
 
-/// Which of the headings a candidate stands under.
+/// Heading of a candidate's group.
 fn group(candidate: &Candidate) -> usize {
     match candidate.port {
         Port::Input(_) => 0,
@@ -34,7 +34,7 @@ fn group(candidate: &Candidate) -> usize {
     }
 }
 
-/// All that a search looks at: of the catalogue and of the model file.
+/// All candidates of a search: from the catalogue and from the model file.
 fn searched(file: &OwnModelFile) -> Result<Vec<Candidate>, Error> {
     let mut all = every_candidate(&file.base, &file.candidates)?;
     all.retain(|candidate| !candidate.is_shape());
@@ -61,7 +61,7 @@ pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
     Ok(text)
 }
 
-/// Candidates, those of one effect that follow each other together, with its physics.
+/// Candidates, with consecutive ones of the same effect together, and the effect's physics.
 fn by_effect(all: &[&Candidate], words: &EffectWords, look: Look) -> String {
     let mut text = String::new();
     let mut rest = all;
@@ -77,7 +77,7 @@ fn by_effect(all: &[&Candidate], words: &EffectWords, look: Look) -> String {
     text
 }
 
-/// `ctid effects --like WORD --model M.toml`: those that go with what somebody says of the plant, best first.
+/// `ctid effects --like WORD --model M.toml`: the effects that match a symptom, best first.
 ///
 /// # Errors
 /// Where none does.
@@ -91,7 +91,7 @@ pub(crate) fn like(file: &OwnModelFile, sought: &Sought, look: Look) -> Result<S
     Ok(by_effect(&found, &words, look))
 }
 
-/// `ctid check`: the ports with the names of what can act there, a few lines.
+/// `ctid check`: a short list of the ports with the names of their effects.
 pub(crate) fn summary(spec: &ModelSpec, look: Look) -> String {
     let all = candidates(spec, &Visited::nominal(spec));
     let ports = [

@@ -1,4 +1,4 @@
-//! A model file and its records as the search takes them, and the model with the effects of its file in it.
+//! A model file and its records as a search problem, and the model with the effects of its file inserted.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,10 @@ use super::file::{OwnModelFile, Records};
 use crate::effort::EffortLevel;
 use crate::{Error, interrupt, numbers};
 
-/// The numbers of a record that effects are written in, by the effects' identifiers.
+/// Numbers of a record that the effects contain, by the effects' identifiers.
 pub type RecordNumbers = BTreeMap<String, BTreeMap<String, f64>>;
 
-/// How a command searches, which Ctrl-C ends.
+/// Options of a search that Ctrl-C ends.
 pub(crate) fn options(seed: u64, effort: EffortLevel) -> Options<'static> {
     Options {
         seed,
@@ -23,7 +23,7 @@ pub(crate) fn options(seed: u64, effort: EffortLevel) -> Options<'static> {
     }
 }
 
-/// What the search works on.
+/// The problem for a search.
 pub(super) fn problem(file: &OwnModelFile, records: &Records) -> Problem {
     Problem {
         spec: file.base.clone(),
@@ -50,8 +50,8 @@ pub(super) fn blamed(problem: &Problem, error: &effect_search::Error) -> Error {
 }
 
 impl OwnModelFile {
-    /// The model with its effects in it. With records the effects are fitted to them one after the other, and parameters begin there; what the
-    /// file does not keep of an earlier record is taken from these. Without any the file has to say all of it.
+    /// The model with its effects in it. With records the effects are fitted to them one after the other, and parameters begin there; what
+    /// the file does not keep of an earlier record is taken from these. Without any the file has to say all of it.
     ///
     /// # Errors
     /// Where the records do not allow a fit, or without any where the file lacks a number.
@@ -59,7 +59,7 @@ impl OwnModelFile {
         self.mended_within(records, &Options::default())
     }
 
-    /// The same within a limit on the time, or until an interruption.
+    /// Inserts and fits the effects within a time limit, or until an interruption.
     ///
     /// # Errors
     /// As [`OwnModelFile::mended`].
@@ -88,7 +88,7 @@ impl OwnModelFile {
         })
     }
 
-    /// The model with its effects as the file has them.
+    /// The model with its effects and their values in the file.
     fn as_it_stands(&self) -> Result<Believed, Error> {
         let refuse = |what: String| Error::File {
             file: self.name.clone(),
@@ -132,7 +132,7 @@ impl OwnModelFile {
         })
     }
 
-    /// All that can act in the model without records: with what the file keeps of earlier ones.
+    /// All effects that can act in the model without records: with the values that the file keeps.
     fn every_kept_candidate(&self) -> Result<Vec<Candidate>, Error> {
         let declared = self.columns.time.is_some();
         let time_unit = declared.then(|| self.columns.time_header().1);
@@ -145,7 +145,7 @@ impl OwnModelFile {
             .map_err(|error| Error::Columns(error.to_string()))
     }
 
-    /// Those of these that the file lists as its effects, in its order.
+    /// The candidates that the file lists as its effects, in its order.
     fn listed<'c>(&self, all: &'c [Candidate]) -> Result<Vec<&'c Candidate>, Error> {
         let find = |id: &String| {
             let found = all.iter().find(|candidate| candidate.id == *id);
@@ -157,8 +157,8 @@ impl OwnModelFile {
         self.effects.on.iter().map(find).collect()
     }
 
-    /// Each candidate of the file that is not among its effects, and the model with its effects and that candidate. One that repeats another is
-    /// left out where that one is not in the model: alone the two are the same.
+    /// For each candidate of the file that is not among its effects: the candidate, and the model with its effects and that candidate. A
+    /// candidate that repeats another one is left out if that one is not in the model: alone the two are equal.
     ///
     /// # Errors
     /// Where a candidate cannot act beside the effects.
@@ -182,7 +182,8 @@ impl OwnModelFile {
         .collect()
     }
 
-    /// Which effects are written in numbers of the records at hand, as the file keeps none: a sentence for each. `used`: those of a result.
+    /// Notes on effects whose record numbers come from the present records because the file has none: one sentence each. `used`: the record
+    /// numbers of a result.
     pub fn not_kept(&self, used: &RecordNumbers) -> Vec<String> {
         let on = self.effects.on.iter();
         let lacking = on.filter_map(|id| {
@@ -205,7 +206,7 @@ impl OwnModelFile {
     }
 }
 
-/// Where a parameter of a candidate of the model file starts.
+/// Start value of a parameter of a candidate in the model file.
 fn own_start(parameter: &ct_model::effects::EffectParameter) -> f64 {
     let first = parameter.starts.first().copied();
     match parameter.role {
@@ -214,7 +215,7 @@ fn own_start(parameter: &ct_model::effects::EffectParameter) -> f64 {
     }
 }
 
-/// The unit of time of so many seconds.
+/// The unit of time with this number of seconds.
 fn unit_of(seconds: f64) -> &'static str {
     [(0.001, "ms"), (60.0, "min"), (3600.0, "h"), (86_400.0, "d")]
         .into_iter()

@@ -1,4 +1,4 @@
-//! The report of a comparison or a diagnosis of a model of its user's own: the document of the plants, filled from the model's signals.
+//! The report of a comparison or a diagnosis of a user's own model: the document of the plants, filled from the model's signals.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use super::words::{EffectWords, Site, shown_unit};
 use crate::output::Found;
 use crate::report::{self, ComparedPort, MissingTerm};
 
-/// What was found, written as JSON as it stands, and its page.
+/// A result that is written as JSON, and its page.
 #[derive(Debug, Serialize)]
 pub(crate) struct Paged<'t, T> {
     #[serde(flatten)]
@@ -30,7 +30,7 @@ pub(crate) struct Paged<'t, T> {
 }
 
 impl<'t, T> Paged<'t, T> {
-    /// With the page that shows this, where one is asked for.
+    /// With the page for this document, if one is requested.
     pub fn new(found: &'t T, shown: Option<&Document>) -> Self {
         Self {
             found,
@@ -39,7 +39,7 @@ impl<'t, T> Paged<'t, T> {
         }
     }
 
-    /// With the shape of what no candidate explains as a file.
+    /// With the shape of the unexplained error as a file.
     pub fn with_unknown(self, unknown: Option<String>) -> Self {
         Self { unknown, ..self }
     }
@@ -55,12 +55,12 @@ impl<T: Serialize> Found for Paged<'_, T> {
     }
 }
 
-/// What the report shows.
+/// Content of the report.
 #[derive(Debug, Clone)]
 pub struct Document {
     /// Curves, table and sentences.
     pub diagnosis: Diagnosis,
-    /// What nothing explains, as a function at a port.
+    /// The unexplained error, as a function at a port.
     pub(crate) term: Option<MissingTerm>,
 }
 
@@ -72,7 +72,7 @@ impl Document {
     }
 }
 
-/// The shape of what no candidate explains, as it is shown.
+/// The shape of the error that no candidate explains, as it is shown.
 pub(crate) fn missing_term(words: &EffectWords, unknown: &Unknown) -> MissingTerm {
     let shown_term = match words.sites(&unknown.effect) {
         [Site::Input(u), ..] => format!("added to the input {u}"),
@@ -103,9 +103,9 @@ pub(crate) fn missing_term(words: &EffectWords, unknown: &Unknown) -> MissingTer
     }
 }
 
-/// What the report shows of a comparison.
+/// Report of a comparison.
 pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Document {
-    let source = "what the past of the model's residual does not predict";
+    let source = "innovation of the residual: the part that its past does not predict";
     let mut shown = document(file, records, (&found.steps, &found.noise), source);
     shown.effort.clone_from(&found.effort);
     shown.seconds = found.seconds;
@@ -115,7 +115,7 @@ pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> D
     }
 }
 
-/// What the report shows of a diagnosis.
+/// Report of a diagnosis.
 pub fn diagnosed(
     file: &OwnModelFile,
     records: &Records,
@@ -155,7 +155,7 @@ pub fn diagnosed(
     }
 }
 
-/// The number of an only output; NaN of several.
+/// The number of a single output; NaN for several.
 fn only(values: &[f64]) -> f64 {
     match values {
         [one] => *one,
@@ -163,7 +163,7 @@ fn only(values: &[f64]) -> f64 {
     }
 }
 
-/// Root mean square of the errors, each divided by its output's noise; each output counts as one.
+/// Root mean square of the errors, each divided by its output's noise; all outputs have equal weight.
 fn weighted(outputs: &[String], errors: &BTreeMap<String, f64>, floors: &[f64]) -> f64 {
     let errors = outputs.iter().filter_map(|name| errors.get(name).copied());
     let errors: Vec<f64> = errors.collect();
@@ -180,7 +180,7 @@ fn parameter(estimate: &Estimate) -> Parameter {
     }
 }
 
-/// A document without a finding; `source`: where the noise is from. Records, steps, where they fail, tests of their residuals.
+/// A document without a finding; `source`: source of the noise. Records, steps, locations of the failures, tests of the residuals.
 fn document(
     file: &OwnModelFile,
     records: &Records,
@@ -359,7 +359,7 @@ fn of_step(
     }
 }
 
-/// Tests of a residual, on the first record: whiteness, and the input that leaves the clearest trace, its chance counted over all inputs.
+/// Tests of a residual, on the first record: whiteness, and the input with the smallest p-value, corrected for the number of inputs.
 fn tests(record: &Record, residual: &[f64]) -> ResidualTests {
     let samples = residual.iter().filter(|e| !e.is_nan()).count();
     let lags = (samples / 10).clamp(2, 60);

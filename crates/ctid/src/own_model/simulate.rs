@@ -1,4 +1,4 @@
-//! A model of its user's own on new inputs.
+//! A user's own model on new inputs.
 
 use std::path::Path;
 
@@ -13,10 +13,10 @@ use crate::simulate::{
     first_readings, read_inputs,
 };
 
-/// Simulates the model on the inputs of a record, after a fit to others where there are any.
+/// Simulates the model on the inputs of a record, after a fit to other records if there are any.
 ///
 /// # Errors
-/// One line that names the file, the place and the mend.
+/// One line that names the file, the place and the correction.
 pub(crate) fn simulate(
     file: &OwnModelFile,
     mut records: Option<Records>,
@@ -68,8 +68,7 @@ pub(crate) fn simulate(
     Ok((found, summaries))
 }
 
-/// A model with its effects in it on the inputs of a record, of which the initial states are fitted to so many first readings. `path` is what
-/// is blamed.
+/// A model with its effects on the inputs of a record, with initial states fitted to the first readings. `path` is the name in errors.
 ///
 /// # Errors
 /// Where the simulation does not go on.
@@ -189,7 +188,7 @@ pub(super) fn simulated(
     })
 }
 
-/// The initial states: fitted to the first readings, on more of them where these do not tell, or as the text has them.
+/// The initial states: fitted to the first readings, to more of them if these are not sufficient, or from the text.
 fn states(
     setup: &ModelSetup,
     parameters: &[f64],
@@ -234,14 +233,14 @@ fn states(
     Ok((states, StateSource::Text))
 }
 
-/// When the simulation ends, and the mend.
+/// Message for a simulation that diverges: time, and correction.
 fn runs_away(setup: &ModelSetup, record: &Record, path: &Path, x: &[f64], model: &str) -> Error {
     let goes = |rows: usize| {
         let part = [record.rows(0..rows)];
         let setup = setup.with_records(&part);
         setup.is_ok_and(|setup| setup.simulate(x).is_some())
     };
-    // The last row that is reached.
+    // The last row before the simulation diverges.
     let (mut good, mut bad) = (0, record.len());
     while bad - good > 1 {
         let middle = usize::midpoint(good, bad);

@@ -1,4 +1,4 @@
-//! What a person reads of a comparison.
+//! Text output of a comparison.
 
 use super::compare::{Comparison, Curves};
 use super::diagnose::state_rows;
@@ -7,7 +7,7 @@ use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
 
-/// The whole comparison, the first record drawn.
+/// The complete comparison, with a plot of the first record.
 pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     let [step] = &comparison.steps;
     let name = [std::slice::from_ref(&comparison.model), &comparison.effects].concat();
@@ -47,7 +47,7 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     text += &state_rows(step);
     if step.rmse_per_output.len() > 1 {
         text += &format!(
-            "  together {} times the noise, which is what a linear prediction from the past leaves\n",
+            "  together {} times the noise, the error of a linear prediction from the past\n",
             numbers::significant(step.weighted_rmse, 3)
         );
     }
@@ -81,10 +81,10 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     for together in &comparison.not_determined {
         let what = match together.as_slice() {
             [one] => format!(
-                "{one} leaves no trace in these records: fix it under [known], or measure more"
+                "{one} has no effect on the readings of these records: fix it under [known], or measure more"
             ),
             [a, b] => format!(
-                "these records tell {a} and {b} together only: fix one of them under [known], give a [prior], or excite the plant more"
+                "these records determine only a combination of {a} and {b}: fix one of them under [known], give a [prior], or excite the plant more"
             ),
             all => format!(
                 "these records do not determine {}: fix some of them under [known], or give a [prior]",

@@ -1,4 +1,4 @@
-//! The shape of what no candidate explains, as a person reads it and as a file.
+//! The unexplained function, as text and as a file.
 
 use effect_search::Unknown;
 
@@ -7,7 +7,7 @@ use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::term_file::of_curve;
 
-/// What it is, in a sentence or two.
+/// Describes the function in one or two sentences.
 pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
     let left_out = unknown.share_left_out.map_or(String::new(), |share| {
         if share > 0.0 {
@@ -20,7 +20,7 @@ pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
         }
     });
     format!(
-        "Its shape was sought at every port against every state, input and time: the best is a function of {}. {} explains {:.0} % of the squared error above the noise{left_out}; `ctid add '{}' --from RESULT.json` keeps it until its physics is known.",
+        "A function of every state, input and time was fitted at every port: the best is a function of {}. {} explains {:.0} % of the squared error above the noise{left_out}; `ctid add '{}' --from RESULT.json` keeps it until its physics is known.",
         unknown.variable,
         words.placed(&unknown.effect),
         100.0 * unknown.share,
@@ -30,7 +30,7 @@ pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
 
 /// Some of its values, as a table.
 pub(super) fn values(unknown: &Unknown, look: Look) -> String {
-    /// Every so many of them.
+    /// Distance between listed values.
     const EVERY: usize = 4;
     let head = |name: &str, unit: &str| match shown_unit(unit) {
         "" => name.to_string(),
@@ -64,7 +64,7 @@ pub(crate) fn file(unknown: &Unknown) -> String {
     let values = unknown.at.iter().zip(&unknown.value);
     let rows = values.zip(&unknown.std_error);
     of_curve(
-        // Its ports are told apart by a comma.
+        // A comma separates the two variables of a port.
         (&format!("\"{}\"", unknown.effect), &unknown.variable),
         (&unknown.variable_unit, &unknown.unit),
         rows.map(|((at, value), error)| (*at, *value, *error)),

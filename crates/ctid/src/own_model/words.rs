@@ -1,4 +1,4 @@
-//! Effects at the ports of a model in words: where each acts, and what it does there.
+//! Descriptions of effects at the ports of a model: place and action.
 
 use std::collections::BTreeMap;
 
@@ -8,10 +8,10 @@ use ct_signals::escaped;
 
 use super::effects::every_candidate;
 
-/// What is said of the effects of a model.
+/// Descriptions of the effects of a model.
 pub(crate) struct EffectWords(BTreeMap<String, Words>);
 
-/// A port that effects sit at, by the name of its variable.
+/// A port with effects, by the name of its variable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Site {
     Input(String),
@@ -23,7 +23,7 @@ pub(crate) enum Site {
 }
 
 impl Site {
-    /// What it is.
+    /// Kind of the effect.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Input(_) => "input",
@@ -42,9 +42,9 @@ struct Words {
 }
 
 impl EffectWords {
-    /// Of all that can act in a model.
+    /// Descriptions of all effects that can act in a model.
     pub fn of(spec: &ModelSpec, own: &BTreeMap<String, OwnCandidate>) -> Self {
-        // A model file has been read with these candidates.
+        // The candidates were checked when the model file was read.
         let all = every_candidate(spec, own).unwrap_or_default();
         let words = |candidate: &Candidate| match own.get(&candidate.id) {
             Some(own) => of_own(spec, own),
@@ -67,12 +67,12 @@ impl EffectWords {
         }
     }
 
-    /// The ports that it sits at.
+    /// The ports of the effect.
     pub fn sites(&self, id: &str) -> &[Site] {
         self.0.get(id).map_or(&[], |words| &words.sites)
     }
 
-    /// What it does, in a sentence without its end.
+    /// The physics of an effect, in a sentence without its final point.
     pub fn physics(&self, id: &str) -> &str {
         let words = self.0.get(id).map_or("", |words| &words.physics);
         words.trim_end_matches('.')
@@ -95,12 +95,12 @@ fn sites(spec: &ModelSpec, port: Port) -> Vec<Site> {
     }
 }
 
-/// A unit as it is shown: nothing behind a number without dimension.
+/// A unit for display: empty for a dimensionless number.
 pub(crate) fn shown_unit(unit: &str) -> &str {
     if unit == "1" { "" } else { unit }
 }
 
-/// A candidate of the model file, by what its terms are added to.
+/// A candidate of the model file, by the targets of its terms.
 fn of_own(spec: &ModelSpec, own: &OwnCandidate) -> Words {
     let ports = own.terms.keys().filter_map(|key| port_of_term(spec, key));
     let ports: Vec<Port> = ports.collect();
@@ -119,7 +119,7 @@ fn of_own(spec: &ModelSpec, own: &OwnCandidate) -> Words {
     }
 }
 
-/// What a term of the model file is added to.
+/// Port to which a term of the model file is added.
 fn port_of_term(spec: &ModelSpec, name: &str) -> Option<Port> {
     match spec.find(name)? {
         Variable::State(i) => Some(Port::Balance(i)),
@@ -131,7 +131,7 @@ fn port_of_term(spec: &ModelSpec, name: &str) -> Option<Port> {
     }
 }
 
-/// A variable with what its text says of it.
+/// A variable with the description from the model text.
 fn named(about: &About) -> String {
     match about.description.as_str() {
         "" => about.name.clone(),
@@ -139,11 +139,11 @@ fn named(about: &About) -> String {
     }
 }
 
-/// Where a port is.
+/// Description of a port.
 fn place(spec: &ModelSpec, port: Port) -> String {
     let of = |variable: Variable| named(spec.about(variable));
     let state = |i: usize| of(Variable::State(i));
-    // The text says more of what is measured than of the reading that is equal to it.
+    // The measured variable is better described in the text than an equal reading.
     let output = |i: usize| {
         let about = spec.about(spec.outputs[i].variable);
         let measured = match spec.outputs[i].variable {

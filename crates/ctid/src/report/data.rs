@@ -1,4 +1,4 @@
-//! What the report's script draws, as JSON: the curves thinned for display, the rest as it stands.
+//! Data for the report's script, as JSON: the curves thinned for display, the other data unchanged.
 
 use ct_signals::Clock;
 use missing_effect::{Diagnosis, Failures, OutputStep, ResidualTests, Score, Shown, Step, Unknown};
@@ -9,7 +9,7 @@ use super::missing_term::MissingTerm;
 use super::text;
 use crate::findings;
 
-/// Points of one curve that are drawn at most.
+/// Largest number of points of a curve.
 const POINTS: usize = 5_000;
 
 #[derive(Serialize)]
@@ -21,15 +21,15 @@ struct Report<'a> {
     records: Vec<Record<'a>>,
     steps: Vec<Model<'a>>,
     scores: &'a [Score],
-    /// Which of the scores are of effects that were added.
+    /// For each score whether its effect was added.
     added: Vec<bool>,
-    /// Which of the scores are of effects that cannot be told from an added one.
+    /// For each score whether the data cannot distinguish its effect from an added one.
     equal: Vec<bool>,
-    /// What nothing explains.
+    /// The unexplained error.
     unknown: Option<Missing<'a>>,
 }
 
-/// Of a plant, or of a model of its user's own.
+/// The unexplained error of a plant, or of a user's own model.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Missing<'a> {
@@ -44,7 +44,7 @@ struct Output<'a> {
     noise_floor: f64,
 }
 
-/// How times are drawn: as numbers in this unit or, where the records have dates, as those.
+/// Time axis: numbers in this unit, or dates if the records have dates.
 #[derive(Serialize)]
 pub(crate) struct Axis {
     unit: &'static str,
@@ -69,7 +69,7 @@ impl From<&Clock> for Axis {
 struct Record<'a> {
     name: &'a str,
     held_out: bool,
-    /// In the order of the outputs.
+    /// Curves in the order of the outputs.
     outputs: Vec<Curve>,
     inputs: Vec<Input<'a>>,
 }
@@ -85,13 +85,13 @@ struct Input<'a> {
 #[derive(Serialize)]
 struct Model<'a> {
     label: String,
-    /// Where it fails, of all outputs.
+    /// Sentences about where the model fails, for all outputs.
     sentences: Vec<String>,
     /// In the order of the outputs.
     outputs: Vec<ModelOutput<'a>>,
 }
 
-/// What a model shows at one output.
+/// Results of a model at one output.
 #[derive(Serialize)]
 struct ModelOutput<'a> {
     rmse: f64,
@@ -100,7 +100,7 @@ struct ModelOutput<'a> {
     input_test: String,
     tests: &'a ResidualTests,
     failures: &'a Failures,
-    /// Over each record that was simulated.
+    /// Simulation of each record.
     runs: Vec<Run>,
     cloud: Option<Cloud>,
 }
@@ -112,8 +112,8 @@ struct Run {
     residual: Curve,
 }
 
-/// Samples of the fitted records, spread evenly over them: what the residual depends on. The
-/// extremes alone would show a wider cloud than there is.
+/// Samples of the fitted records at equal distances, for plots of the residual against a variable. Selecting only extremes would show too
+/// wide a scatter.
 #[derive(Serialize)]
 struct Cloud {
     level: Vec<f64>,
@@ -132,7 +132,7 @@ pub(crate) fn json(diagnosis: &Diagnosis) -> String {
     json_with(diagnosis, None)
 }
 
-/// The same of a model of its user's own, with what nothing explains there.
+/// Data of a diagnosis of a user's own model, with its unexplained error.
 pub(super) fn json_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> String {
     let report = Report {
         clock: (&diagnosis.clock).into(),
@@ -165,7 +165,7 @@ pub(super) fn json_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> St
     script_safe(&report)
 }
 
-/// The same of records alone, before there is a model.
+/// Data of records alone, before there is a model.
 pub(crate) fn records(
     records: &[Shown],
     input_unit: &str,
@@ -201,7 +201,7 @@ fn scores(diagnosis: &Diagnosis, are: fn(&Diagnosis, &Score) -> bool) -> Vec<boo
 
 /// JSON without what could close a `<script>` element.
 pub(super) fn script_safe(data: &impl Serialize) -> String {
-    // Writing plain structs to memory cannot fail; an empty object would draw an empty report.
+    // Writing plain structs to memory cannot fail; an empty object would give an empty report.
     serde_json::to_string(data)
         .unwrap_or_else(|_| "{}".to_owned())
         .replace('<', "\\u003c")
@@ -303,7 +303,7 @@ fn cloud(series: &[Series]) -> Option<Cloud> {
     if residual.is_empty() {
         return None;
     }
-    // Sample for sample with the residual.
+    // Has the same samples as the residual.
     let level: Vec<f64> = fitted()
         .flat_map(|series| series.simulated.iter().take(series.measured.len()))
         .copied()
@@ -341,7 +341,7 @@ fn pick(values: &[f64], at: &[usize]) -> Vec<f64> {
         .collect()
 }
 
-/// Rounds to significant digits: nobody sees more, and the file is half as large.
+/// Rounds to significant digits: more are not visible in a plot, and the file is half as large.
 pub(crate) fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
 }

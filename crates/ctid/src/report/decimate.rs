@@ -11,7 +11,7 @@ pub(crate) fn min_max(values: &[f64], limit: usize) -> Vec<usize> {
     let stretches = (limit.max(4) - 2) / 2;
     let mut kept = vec![0];
     for stretch in 0..stretches {
-        // The first and the last sample are kept anyway: the stretches share what lies between.
+        // The first and the last sample are always kept: the intervals divide the samples between.
         let from = 1 + stretch * (last - 1) / stretches;
         let to = 1 + (stretch + 1) * (last - 1) / stretches;
         let finite = || (from..to).filter(|&i| values[i].is_finite());

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::data::rounded;
 use super::decimate::min_max;
 
-/// Draws them.
+/// Script that draws the figures.
 pub(super) const SCRIPT: &str = include_str!("figures.js");
 
 /// Points of one curve that are drawn at most.
@@ -14,28 +14,28 @@ const POINTS: usize = 3_000;
 /// Panels one above the other, over one abscissa.
 #[derive(Debug, Serialize)]
 pub(super) struct Figure {
-    /// Of its place in the page.
+    /// Identifier of the figure's place in the page.
     pub id: String,
     /// In pixels.
     pub height: u32,
     pub x_title: &'static str,
     pub x_unit: String,
     pub x_range: Option<[f64; 2]>,
-    /// A stretch of the abscissa that is shaded.
+    /// A shaded interval of the abscissa.
     pub x_band: Option<[f64; 2]>,
-    /// The ordinate is of names instead of numbers.
+    /// The ordinate has names instead of numbers.
     pub categories: bool,
     pub panels: Vec<Panel>,
     pub curves: Vec<Curve>,
 }
 
-/// One ordinate.
+/// A panel with one ordinate.
 #[derive(Debug, Serialize)]
 pub(super) struct Panel {
     pub title: String,
     pub unit: String,
     pub log: bool,
-    /// In powers of ten where it is logarithmic.
+    /// Powers of ten for a logarithmic axis.
     pub range: Option<[f64; 2]>,
     /// Part of the height.
     pub share: f64,
@@ -43,13 +43,13 @@ pub(super) struct Panel {
     pub lines: Vec<f64>,
 }
 
-/// What a curve is drawn in.
+/// Colour of a curve.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(untagged)]
 pub(super) enum Colour {
-    /// One of those of the page.
+    /// A named colour of the page.
     Named(&'static str),
-    /// One of those that are told apart.
+    /// One of a set of distinct colours.
     Of(usize),
 }
 
@@ -64,25 +64,25 @@ pub(super) enum Values {
 #[derive(Debug, Serialize)]
 pub(super) struct Curve {
     pub name: String,
-    /// Which panel, from 0.
+    /// Index of the panel, from 0.
     pub panel: usize,
     pub colour: Colour,
     pub dash: &'static str,
     pub width: f64,
-    /// A symbol where there are points instead of a line.
+    /// Symbol of points without a line.
     pub marker: Option<&'static str>,
-    /// Whether a value stands until the next.
+    /// Whether a value is held until the next one.
     pub held: bool,
     pub legend: bool,
     pub x: Vec<f64>,
     pub y: Values,
-    /// A band about the curve, or nothing.
+    /// A band around the curve, or nothing.
     pub lower: Vec<f64>,
     pub upper: Vec<f64>,
 }
 
 impl Figure {
-    /// Over time.
+    /// A figure over time.
     pub(super) fn over_time(id: &str, height: u32, panels: Vec<Panel>, curves: Vec<Curve>) -> Self {
         Self {
             id: id.to_owned(),
@@ -136,7 +136,7 @@ impl Curve {
         }
     }
 
-    /// The same with a band of this half width about it.
+    /// Adds a band of this half width.
     pub(super) fn with_band(mut self, (time, values): (&[f64], &[f64]), half: &[f64]) -> Self {
         let at = kept(time, values);
         let edge = |sign: f64| -> Vec<f64> {

@@ -127,7 +127,7 @@ fn fit() -> String {
         "fit",
         "Measured against simulated",
         "Drag to zoom, double-click to see all again.",
-        &figure("fit", "Output, what is left of it, and input", ""),
+        &figure("fit", "Output, residual, and input", ""),
     )
 }
 
@@ -147,16 +147,16 @@ fn parameters(found: &Identification) -> String {
     let (title, caption) = match (&found.settings, &found.trajectory) {
         (Some(_), _) => (
             "At the end of the record",
-            "Standard errors hold for noise of any colour, and for a model that is right; those of the recursion with its memory, \
+            "Standard errors hold for white and coloured noise, and for a model that is right; those of the recursion with its memory, \
              not of the whole record.",
         ),
         (None, Some(_)) => (
             "At the end of the record",
-            "Standard errors are those of the recursion with its memory, and take the residual for white.",
+            "Standard errors are those of the recursion with its memory, and assume a white residual.",
         ),
         (None, None) => (
             "Of the whole record",
-            "Standard errors hold for noise of any colour and for a model that is right: nothing of the input shows in its error, and nothing but the input, or the loop's reference, moves the plant.",
+            "Standard errors hold for white and coloured noise and for a model that is right: its error is uncorrelated with the input, and no unmeasured disturbance acts on the plant.",
         ),
     };
     let table = table(
@@ -169,7 +169,7 @@ fn parameters(found: &Identification) -> String {
         Some(_) => figure(
             "trajectory",
             "Over the record",
-            "Band: one standard error, once enough has been seen.",
+            "Band: one standard error, once enough samples were used.",
         ),
         None => String::new(),
     };
@@ -178,7 +178,7 @@ fn parameters(found: &Identification) -> String {
             "drift",
             "Gain and time constant over the level",
             &format!(
-                "Second half of the record, means over stretches of the level that the recursion remembers. Band: one standard error. {}",
+                "Second half of the record, means over ranges of the level within the memory of the recursion. Band: one standard error. {}",
                 drift_verdict(found)
             ),
         ),

@@ -1,4 +1,4 @@
-//! What nothing explains in a model of its user's own: a smooth function at one of its ports, as the report and the page show it.
+//! The unexplained error of a user's own model: a smooth function at one of its ports, for the report and the page.
 
 use missing_effect::numbers;
 use serde::Serialize;
@@ -7,27 +7,26 @@ use super::page::{figure, section};
 use super::tables::table;
 use super::text::{escape, prose, unit};
 
-/// A function that stands for what is missing. The page and the report draw it as they draw the unknown of a plant: the fields that both have
-/// are called the same.
+/// The unexplained error as a function. The page and the report draw it like the unknown of a plant: common fields have the same names.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct MissingTerm {
-    /// Its identifier: `shape(T,u)`.
+    /// Identifier of the function: `shape(T,u)`.
     pub effect: String,
-    /// The same with its port in words.
+    /// Identifier with its port in words.
     pub placed: String,
-    /// What it depends on.
+    /// Variable that the function depends on.
     pub variable: String,
     pub variable_unit: String,
-    /// What it is to its port: `added to the equation of T`.
+    /// How the function enters the port: `added to the equation of T`.
     pub shown_term: String,
     /// Unit of the term.
     pub unit: String,
-    /// Where it is given, over the visited range.
+    /// Arguments at which the function is given, over the visited range.
     pub knots: Vec<f64>,
     pub ordinates: Vec<f64>,
     /// Standard errors; `None` where the records do not determine them.
     pub ordinate_errors: Vec<Option<f64>>,
-    /// The command that keeps it in the model file.
+    /// The command that adds the function to the model file.
     pub command: String,
     /// Ports and variables that were compared, the best first.
     pub places: Vec<ComparedPort>,
@@ -39,7 +38,7 @@ pub(crate) struct ComparedPort {
     pub placed: String,
     /// Fall of the criterion.
     pub bic_gain: String,
-    /// Fall of the squared error on parts that were left out of the fit; nothing where that was not computed.
+    /// Fall of the squared error on parts that were left out of the fit; empty if not computed.
     pub left_out: String,
 }
 
@@ -57,11 +56,11 @@ impl ComparedPort {
     }
 }
 
-/// What [`ComparedPort`] holds, for the reader.
+/// Explanation of [`ComparedPort`] for the reader.
 pub(crate) const COMPARED: &str = "Each function was fitted together with all parameters. Left-out error: by how much the squared error falls on parts of the records \
      that the function was not fitted to; it was computed for the best functions of a state or an input.";
 
-/// Its section in a report.
+/// Section of the report on the unexplained error.
 pub(super) fn html(term: &MissingTerm) -> String {
     let heading = format!(
         "{} against {}",
@@ -111,7 +110,7 @@ pub(super) fn html(term: &MissingTerm) -> String {
     );
     section(
         "unknown",
-        "What nothing explains",
+        "The unexplained error",
         &lead,
         &format!("{picture}{compared}"),
     )

@@ -38,20 +38,19 @@ use self::text::{escape, significant};
 pub use self::udink::html as udink;
 use crate::findings::{self, Reader};
 
-/// Draws a diagnosis, here and on the page that is served.
+/// Script that draws a diagnosis, in the report and on the served page.
 pub(crate) const DIAGNOSIS_FIGURES: &str = include_str!("diagnosis_figures.js");
 const SCRIPT: &str = concat!(
     include_str!("diagnosis_figures.js"),
     include_str!("report.js")
 );
 
-/// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and
-/// no scores; what is empty is left out.
+/// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and no scores; empty parts are omitted.
 pub fn html(diagnosis: &Diagnosis) -> String {
     html_with(diagnosis, None)
 }
 
-/// The same of a model of its user's own, with what nothing explains there.
+/// The report of a user's own model, with its unexplained error.
 pub(crate) fn html_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> String {
     let title = format!("ctid: {}", escape(&diagnosis.plant));
     let data = data::json_with(diagnosis, term);
@@ -78,7 +77,7 @@ pub(crate) fn html_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> St
     })
 }
 
-/// The verdict, the fall of the error in large numbers, and what was looked at.
+/// The verdict, the fall of the error in large numbers, and the analysed data.
 fn headline(diagnosis: &Diagnosis) -> String {
     let effort = findings::effort(&diagnosis.effort, Reader::Commands);
     let sentences: String = diagnosis
@@ -109,7 +108,7 @@ fn verdict(diagnosis: &Diagnosis) -> String {
                 _ => "The missing effects are found",
             };
             let rest = if diagnosis.residual_unexplained {
-                "; something remains"
+                "; the residual is not noise"
             } else {
                 ""
             };
@@ -118,14 +117,14 @@ fn verdict(diagnosis: &Diagnosis) -> String {
         Verdict::Undecided => "Something is missing; more than one effect fits these data",
         Verdict::Partial => return escape(&findings::partial_headline(diagnosis)),
         Verdict::Unexplained => {
-            "What is left is not noise, and no effect of the catalogue explains it"
+            "The residual is not noise, and no effect of the catalogue explains it"
         }
         Verdict::Adequate => "The model is adequate",
     }
     .to_owned()
 }
 
-/// Nothing was scored: the report of `compare`.
+/// Whether no effect was scored: the report of `compare`.
 fn is_comparison(diagnosis: &Diagnosis) -> bool {
     diagnosis.scores.is_empty() && diagnosis.steps.len() < 2
 }
@@ -156,7 +155,7 @@ fn trail(diagnosis: &Diagnosis) -> String {
         .collect();
     let held_out = |step: &Step| step.outputs.iter().any(|output| output.rmse_test.is_some());
     let held_out = if diagnosis.steps.iter().any(held_out) {
-        "; below it the same on the held-out data, which took part in no fit and no choice"
+        "; below it the same on the held-out data, which were not used for fits or selection"
     } else {
         ""
     };
@@ -189,7 +188,7 @@ fn errors_of_outputs(diagnosis: &Diagnosis, step: &Step) -> String {
     step.outputs.iter().enumerate().map(line).collect()
 }
 
-/// What the plots show: buttons that choose the model, and the choice of the output, each where there are several.
+/// Controls of the plots: buttons that choose the model, and a choice of the output, each only if there are several.
 fn shown(diagnosis: &Diagnosis) -> String {
     let (buttons, output) = (step_buttons(diagnosis), output_choice(diagnosis));
     if buttons.is_empty() && output.is_empty() {
@@ -201,7 +200,7 @@ fn shown(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// Chooses the output of the plots that show one.
+/// Selection of the output for the plots of one output.
 fn output_choice(diagnosis: &Diagnosis) -> String {
     if !findings::several(diagnosis) || diagnosis.steps.is_empty() {
         return String::new();
@@ -267,8 +266,8 @@ fn fit(diagnosis: &Diagnosis) -> String {
         "fit",
         "Measured against model",
         &format!(
-            "{above}, below the input. Shaded: where the chosen model clearly fails \
-             on the first fitted record, the stronger the worse. Drag to zoom (on a touch screen choose the \
+            "{above}, below the input. Shaded: where the error of the chosen model clearly exceeds the noise on the \
+             first fitted record; a darker shade is a larger error. Drag to zoom (on a touch screen choose the \
              magnifier first), double-click to see all again; the names switch the curves on and off."
         ),
         &figures,
@@ -283,8 +282,8 @@ fn ranking(diagnosis: &Diagnosis) -> String {
         "ranking",
         "Which effect is missing?",
         "Each effect of the catalogue was added to the base model alone and everything was fitted again. \
-         The larger the fall of the Bayesian information criterion (BIC), the better; a fall below 6 \
-         is no evidence, and effects within 6 of each other are not told apart.",
+         The larger the fall of the Bayesian information criterion (BIC), the better; a fall below 6 is not significant, and effects within 6 \
+         of each other are not distinguished.",
         &format!(
             "{}{}{}{}{}",
             tables::groups(diagnosis),

@@ -1,21 +1,21 @@
-//! What every page shares: the shell that holds style, data and scripts, and the places for what it shows.
+//! Parts that every page shares: the frame that contains style, data and scripts, and the places for its content.
 
 use super::text::escape;
 
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
                       img-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'";
 pub(crate) const STYLE: &str = include_str!("report.css");
-/// Colours, axes and the unpacking of plotly.js: comes before the page's own script.
+/// Colours, axes and the unpacking of plotly.js: included before the page's own script.
 pub(crate) const PLOTS: &str = include_str!("plots.js");
 /// plotly.js, gzipped, in base64.
 pub(crate) const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
 
-/// Stands where the plots need a script.
+/// Message on a page whose scripts do not run.
 pub(super) const NOTICES: &str = "<noscript><p class=\"notice\">The plots need a browser that runs scripts; \
      the findings and the tables do not.</p></noscript>\n\
      <p class=\"notice\" id=\"no-plots\" hidden></p>\n";
 
-/// A page to be.
+/// Parts of a page.
 pub(super) struct Page<'a> {
     /// HTML.
     pub title: &'a str,
@@ -23,11 +23,11 @@ pub(super) struct Page<'a> {
     pub body: &'a str,
     /// JSON, safe inside a `<script>` element.
     pub data: &'a str,
-    /// What draws it.
+    /// Script that draws the figures.
     pub script: &'a str,
 }
 
-/// How every page begins, with its mark: a file that begins so may be overwritten by a new one.
+/// Beginning of every page, with a mark of ctid: a file with this mark may be overwritten.
 #[must_use]
 pub fn head() -> String {
     format!(
@@ -88,7 +88,7 @@ pub(super) fn figure_with(id: &str, heading: &str, caption: &str) -> String {
     )
 }
 
-/// A number in large type, what it is, and what stands below that: an item of a list of class `trail`; all of it is HTML.
+/// A number in large type, its label, and further text below: an item of a list of class `trail`; all arguments are HTML.
 pub(super) fn large(number: &str, unit: &str, label: &str, below: &str) -> String {
     format!(
         "<li><span class=\"number\">{number} <small>{unit}</small></span>\

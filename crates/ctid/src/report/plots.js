@@ -101,7 +101,7 @@ const plots = (() => {
       document.documentElement.dataset.drawn = "yes";
     }).catch((error) => {
       const notice = document.getElementById("no-plots");
-      notice.textContent = `The plots could not be drawn (${error.message}). The findings and the tables stand; a browser from 2023 or later draws the plots.`;
+      notice.textContent = `The plots could not be drawn (${error.message}). The findings and the tables are complete; a browser from 2023 or later draws the plots.`;
       notice.hidden = false;
       document.querySelectorAll("#steps, .choice, figure").forEach((part) => { part.hidden = true; });
     });

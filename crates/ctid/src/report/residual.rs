@@ -1,4 +1,4 @@
-//! What is left over: where the model fails, what nothing explains, and the tests of the residual.
+//! Residual: where the model fails, the unexplained error, and the residual tests.
 
 use missing_effect::{Diagnosis, Failures, ResidualTests, Shown};
 
@@ -58,7 +58,7 @@ pub(super) fn failures(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// What nothing explains, where it has a shape.
+/// The unexplained error, if it is a function of a variable.
 pub(super) fn unknown(diagnosis: &Diagnosis) -> String {
     let Some(unknown) = &diagnosis.unknown else {
         return String::new();
@@ -66,19 +66,19 @@ pub(super) fn unknown(diagnosis: &Diagnosis) -> String {
     let mut figures = figure(
         "unknown-path",
         "The missing term against time",
-        "Smoothed, with its 95 % band, on the first fitted record; shaded where the band does not hold zero.",
+        "Smoothed, with its 95 % band, on the first fitted record; shaded where the band excludes zero.",
     );
     if unknown.variable != "time" {
         figures.push_str(&figure(
             "unknown-shape",
             &format!("Against the {}", variable(unknown.variable)),
-            "Fitted with all parameters of the plant, without what those imitate; with its 95 % band.",
+            "Fitted with all parameters of the plant; the part that these parameters explain as well is removed. With its 95 % band.",
         ));
     }
     section(
         "unknown",
-        "What nothing explains",
-        "The term that has to be added to the last model so that it meets the data. <code>ctid diagnose --unknown F.csv</code> writes \
+        "The unexplained error",
+        "The term that has to be added to the last model so that it fits the data. <code>ctid diagnose --unknown F.csv</code> writes \
          its shape, <code>ctid add NAME --from F.csv</code> keeps it as a term of your own.",
         &format!("{figures}{}", tables::shares(unknown)),
     )
@@ -96,7 +96,7 @@ pub(super) fn variable(name: &str) -> &str {
 const BINNED: &str = "Above the samples with the mean of each bin, below the root mean square of each bin; \
                       first fitted record.";
 
-/// Chooses the record of the residual plot and whether the axes stay, where there is a choice.
+/// Selection of the record of the residual plot and of common axes, if there is a choice.
 fn choices(diagnosis: &Diagnosis) -> String {
     let mut choices = String::new();
     if diagnosis.records.len() > 1 {
@@ -144,7 +144,7 @@ pub(super) fn residual_tests(diagnosis: &Diagnosis) -> String {
     if !any {
         return String::new();
     }
-    // The script leaves those of the chosen output.
+    // The script shows only those of the chosen output.
     let said = |of: fn(&ResidualTests) -> String| {
         let said = last.outputs.iter().map(|output| {
             let finding = of(&output.tests);
@@ -169,9 +169,9 @@ pub(super) fn residual_tests(diagnosis: &Diagnosis) -> String {
     );
     section(
         "tests",
-        "Is anything left in the residual?",
-        "A model that has taken all there is leaves noise: nearly all stems inside the band, \
-         which holds 95 % of them when nothing is left.",
+        "Is the residual noise?",
+        "The residual of a complete model is noise: nearly all stems are inside the \
+         band. The band contains 95 % of the stems of white noise.",
         &format!(
             "<div class=\"pairs\">{}{}</div>\n",
             figure_with(

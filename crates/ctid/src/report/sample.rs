@@ -1,5 +1,5 @@
-//! A diagnosis to try the report on: two tanks whose upper one overflows and whose pump has a dead
-//! zone, with the base model, the overflow, and both. The simulations are real, the scores made up.
+//! A diagnosis for tests of the report: two tanks with an overflow of the upper one and a dead zone of the pump, with the base model, the
+//! overflow, and both. The simulations are real, the scores are invented.
 
 mod signals;
 mod variants;
@@ -231,7 +231,7 @@ pub(crate) fn two_tanks() -> Diagnosis {
     diagnosis(&["y"])
 }
 
-/// The same of a record of both levels.
+/// Sample diagnosis of a record with both levels.
 pub(crate) fn two_outputs() -> Diagnosis {
     let mut diagnosis = diagnosis(&["lower", "upper"]);
     for score in &mut diagnosis.scores {

@@ -16,7 +16,7 @@ pub fn html(found: &SideBySide) -> String {
             "fit",
             "Measured against all simulations",
             "Drag to zoom, double-click to see all again; click a name to hide its curve.",
-            &figure("fit", "Output, what is left of it, and input", ""),
+            &figure("fit", "Output, residual, and input", ""),
         ),
         parameters(found),
         assumptions(found),
@@ -217,7 +217,7 @@ fn fit_figure(found: &SideBySide) -> Figure {
     for (k, (row, outcome)) in with_results(found).enumerate() {
         let (name, colour) = (row.method.id(), Colour::Of(k));
         let simulated = (&shown.time[..], &outcome.simulated[..]);
-        // Six curves cannot be distinguished by colour alone.
+        // What was analysed: plant, records, noise floor.
         let dash = ["solid", "dash", "dot"][k / 3 % 3];
         curves.push(Curve::line(name, 0, colour, simulated).dashed(dash).named());
         let residual: Vec<f64> = output

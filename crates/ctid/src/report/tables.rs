@@ -9,7 +9,7 @@ use super::text::{code, escape, significant, unit, with_error};
 use crate::findings;
 use crate::numbers::duration;
 
-/// What was looked at: plant, records, noise floor.
+/// Analysed plant and records, and noise floor.
 pub(super) fn facts(diagnosis: &Diagnosis) -> String {
     let several = findings::several(diagnosis);
     let mut facts = vec![("Model", escape(&diagnosis.plant))];
@@ -23,7 +23,7 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
         } else {
             "Fitted to"
         };
-        // The readings of all outputs are counted.
+        // Number of readings of all outputs.
         let count = if several { "readings" } else { "samples" };
         let mut text = format!("{}: {} {count}", escape(&record.name), record.samples());
         if let (Some(first), Some(last)) = (record.time.first(), record.time.last()) {
@@ -53,7 +53,7 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
     format!("<dl class=\"facts\">\n{items}</dl>\n")
 }
 
-/// The effects that were added, each with all that cannot be told apart from it.
+/// The added effects, each with the effects that cannot be distinguished from it.
 pub(super) fn groups(diagnosis: &Diagnosis) -> String {
     let items: String = diagnosis
         .groups
@@ -74,7 +74,7 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
             let tank = findings::tank(diagnosis, k)
                 .map_or(String::new(), |tank| format!(" ({})", escape(tank)));
             let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
-                "; in doubt: its size ends at the edge of what is plausible"
+                "; uncertain: its size is at a bound of its plausible range"
             } else {
                 ""
             };
@@ -97,7 +97,7 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
     format!("<p>Added to the model, in this order:</p>\n<ol class=\"groups\">\n{items}</ol>\n")
 }
 
-/// The acceptance test in numbers, and why the effects are not the whole answer.
+/// The acceptance test in numbers, and the reasons for a partial explanation.
 pub(super) fn acceptance(diagnosis: &Diagnosis) -> String {
     let Some(test) = &diagnosis.acceptance else {
         return String::new();
@@ -119,7 +119,7 @@ pub(super) fn acceptance(diagnosis: &Diagnosis) -> String {
         let why = if diagnosis.effects.is_empty() {
             "Why they were refused:"
         } else {
-            "Why they are a part of the answer only:"
+            "Why they explain the error only in part:"
         };
         format!("<p>{why}</p>\n<ul>{reasons}</ul>\n")
     };
@@ -127,8 +127,8 @@ pub(super) fn acceptance(diagnosis: &Diagnosis) -> String {
         &escape(&findings::acceptance_title(diagnosis, test)),
         "<tr><th scope=\"col\">Measure</th><th scope=\"col\" class=\"number\">Found</th><th scope=\"col\">Required</th></tr>",
         &rows,
-        "The squared error above the floor is the mean squared simulation error less the variance of the noise. Effects that leave \
-         noise alone need no share of it.",
+        "The squared error above the floor is the mean squared simulation error less the variance of the noise. Effects whose residual is noise need \
+         no minimum share.",
     ) + &reasons
 }
 
@@ -158,7 +158,7 @@ pub(super) fn rankings(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// How much of a missing term each variable predicts.
+/// Share of the unexplained error that each variable predicts.
 pub(super) fn shares(unknown: &Unknown) -> String {
     let rows: String = unknown
         .shares
@@ -185,14 +185,14 @@ pub(super) fn shares(unknown: &Unknown) -> String {
         "<tr><th>place</th><th>variable</th><th class=\"number\">predicted</th></tr>",
         &rows,
         "How much of it a curve in one variable predicts on parts of the data that were left out of its fit. \
-         What depends on a variable alone is predicted nearly in full; where none is, it is a function of time, as far as \
-         these data tell.",
+         A function of one variable is predicted nearly in full. Where no variable \
+         predicts it, it is a function of time, as far as these data show.",
     )
 }
 
 const SCORED: &str = "Simulation error: root mean square on the fitted data after the refit.";
-const SIGNATURES: &str = " Visible part: how much of the effect's signature the fitted parameters cannot imitate. Visible from: an effect of a smaller \
-     size would have stayed hidden in these data.";
+const SIGNATURES: &str = " Visible part: share of the effect's signature that the fitted parameters cannot compensate for. Visible \
+     from: minimum detectable size; a smaller effect would not be detected in these data.";
 
 /// The catalogue, best effect first.
 pub(super) fn scores(diagnosis: &Diagnosis) -> String {
@@ -201,7 +201,7 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
     } else {
         unit(&diagnosis.output_unit)
     };
-    // A model of its user's own is scored without a signature of each effect.
+    // A user's own model has scores without signatures of the effects.
     let visible = diagnosis.scores.iter().any(|s| s.visibility.is_finite());
     let of_signature = |cell: String| if visible { cell } else { String::new() };
     let rows: String = diagnosis
@@ -281,7 +281,7 @@ fn percent(part: f64) -> String {
     }
 }
 
-/// A table that scrolls inside its own box, also by the keyboard.
+/// A table that scrolls inside its box, also by the keyboard.
 pub(super) fn table(name: &str, head: &str, rows: &str, caption: &str) -> String {
     format!(
         "<h3>{name}</h3>\n<div class=\"scroll\" role=\"region\" aria-label=\"{name}\" tabindex=\"0\">\n\

@@ -1,6 +1,6 @@
 use super::*;
 
-/// What a browser would fetch: `src`, `href`, `url(` and the like that do not point into the file.
+/// Addresses that a browser would load: `src`, `href`, `url(` and the like that point outside the file.
 fn loads(page: &str) -> Vec<&str> {
     [
         " src=",
@@ -63,7 +63,7 @@ fn every_step_and_every_record_is_there() {
 #[test]
 fn an_effect_is_added_in_its_own_tank_alone() {
     let mut diagnosis = sample::two_tanks();
-    // The upper tank overflows; sensor_saturation gives its place to an overflow of the lower one.
+    // The upper tank overflows; sensor_saturation is replaced by an overflow of the lower one.
     diagnosis.scores[1].effect = "overflow".to_owned();
     diagnosis.scores[1].place = Some("lower".to_owned());
     let page = html(&diagnosis);
@@ -100,11 +100,11 @@ fn the_headline_counts_and_says_what_remains() {
     diagnosis.residual_unexplained = true;
     headline(
         &diagnosis,
-        "The missing effects are found; something remains",
+        "The missing effects are found; the residual is not noise",
     );
     assert!(
         html(&diagnosis).contains(
-            "from <code>pump_<wbr>nonlinearity</code>; in doubt: its size ends at the edge"
+            "from <code>pump_<wbr>nonlinearity</code>; uncertain: its size is at a bound"
         )
     );
     diagnosis.effects.truncate(1);
@@ -265,7 +265,7 @@ fn several_outputs_are_told_by_name_and_as_multiples_of_their_noise() {
     ] {
         assert!(words.contains(part), "{part}");
     }
-    // A number that there is not must not show as a dash.
+    // A missing number must not be shown as a dash.
     assert!(!words.contains("<span class=\"number\">– "));
     let alone = html(&sample::two_tanks());
     for part in ["shown-output", "times the noise", "All outputs", "readings"] {
@@ -341,7 +341,7 @@ fn long_records_with_gaps_make_a_page_of_sensible_size() {
     assert!(!words.contains("NaN") && !words.contains("inf "));
 }
 
-/// Writes the samples to look at: `cargo test -p ctid write_the_samples -- --ignored`.
+/// Writes the samples for inspection: `cargo test -p ctid write_the_samples -- --ignored`.
 #[test]
 #[ignore = "writes files to look at"]
 fn write_the_samples() {

@@ -1,4 +1,4 @@
-//! Words and numbers as HTML shows them: escaping, the signs of print, units, p-values in words.
+//! Words and numbers in HTML: escaping, typographic signs, units, p-values in words.
 
 use crate::numbers::{self, exponent};
 
@@ -18,7 +18,7 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-/// A sentence as HTML: what stands between back quotes is a command.
+/// A sentence as HTML: text between back quotes is a command.
 pub(super) fn prose(text: &str) -> String {
     let escaped = escape(text);
     let parts: Vec<&str> = escaped.split('`').collect();
@@ -59,7 +59,7 @@ pub(super) fn unit(unit: &str) -> String {
     html
 }
 
-/// A number with this many significant digits; a dash where there is none.
+/// A number with this many significant digits; a dash if there is none.
 pub(super) fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return "–".to_owned();
@@ -102,7 +102,7 @@ pub(super) fn with_error(value: f64, std_error: Option<f64>) -> String {
     }
 }
 
-/// What the Ljung-Box test says.
+/// Result of the Ljung-Box test.
 pub(super) fn whiteness(p: f64) -> String {
     let finding = match p {
         p if !p.is_finite() => return "The whiteness of the residual was not tested.".to_owned(),
@@ -113,12 +113,12 @@ pub(super) fn whiteness(p: f64) -> String {
     format!("{finding} (Ljung-Box test, {}).", p_value(p))
 }
 
-/// What the cross-correlation test with the input says.
+/// Result of the cross-correlation test with the input.
 pub(super) fn input_test(p: f64) -> String {
     let finding = match p {
         p if !p.is_finite() => return "Residual against input was not tested.".to_owned(),
         p if p >= 0.05 => "No trace of the input is left in the residual",
-        p if p >= 0.01 => "It is doubtful whether the input is still seen in the residual",
+        p if p >= 0.01 => "It is doubtful whether the residual depends on the input",
         _ => "The input is still seen in the residual: the model misses part of how it acts",
     };
     format!("{finding} (cross-correlation test, {}).", p_value(p))
@@ -133,7 +133,7 @@ fn p_value(p: f64) -> String {
     }
 }
 
-/// Fixed decimals with the sign of print.
+/// Fixed decimals with a typographic minus sign.
 fn decimals(value: f64, places: i32) -> String {
     numbers::decimals(value, places).replace('-', "−")
 }

@@ -1,4 +1,4 @@
-//! The routes of the page's requests; the head of the module `serve` says what each takes and gives.
+//! Routes of the page's requests; the head of the module `serve` describes their inputs and outputs.
 
 mod run;
 
@@ -27,9 +27,9 @@ use super::{App, downloads, own, state};
 use crate::edit;
 use crate::term_file::TermFile;
 
-/// Requests in JSON are no larger \[bytes\].
+/// Largest request in JSON \[bytes\].
 pub(super) const LARGEST_REQUEST: usize = 1 << 20;
-/// Characters of a record's name at most.
+/// Largest number of characters of a record's name.
 const LONGEST_NAME: usize = 100;
 
 type Answer = Result<Json<Value>, Refusal>;
@@ -49,11 +49,11 @@ pub(super) fn routes(app: &Arc<App>) -> Router<Arc<App>> {
         .route("/api/forget", post(forget))
         .merge(downloads::routes())
         .layer(middleware::from_fn_with_state(app.clone(), read_first))
-        // It reads its body itself.
+        // The handler reads the body itself.
         .route("/api/record", post(record))
 }
 
-/// Reads the request before anything is done with it.
+/// Reads the request before it is processed.
 async fn read_first(
     State(app): State<Arc<App>>,
     request: Request,
@@ -70,7 +70,7 @@ async fn read_first(
     Ok(next.run(Request::from_parts(parts, body.into())).await)
 }
 
-/// Which tab asks.
+/// The requesting tab.
 #[derive(Debug, Deserialize)]
 pub(super) struct Tab {
     pub session: String,
@@ -86,20 +86,20 @@ pub(super) fn find(app: &App, id: &str) -> Result<Shared, Refusal> {
     })
 }
 
-/// Something that may take a while, such as reading a large file, away from the threads that serve.
+/// Runs a slow operation, such as reading a large file, outside the threads of the server.
 pub(super) async fn aside<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Refusal> + Send + 'static,
 ) -> Result<T, Refusal> {
     let broke = |_| {
         Refusal::new(
             StatusCode::INTERNAL_SERVER_ERROR,
-            "the request broke off, which is a fault of ctid",
+            "the request failed because of an error in ctid",
         )
     };
     spawn_blocking(work).await.map_err(broke)?
 }
 
-/// Does something with the session, and answers with its state.
+/// Applies a function to the session, and answers with the session's state.
 async fn with(
     app: &App,
     id: &str,
@@ -164,7 +164,7 @@ struct NewRecord {
     held_out: bool,
 }
 
-/// A name for messages and tables; it names no file of this machine.
+/// A name for messages and tables; it is not used as a file name.
 pub(super) fn plain_name(name: &str) -> String {
     let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
     let printable = last.chars().filter(|c| !c.is_control());
@@ -230,7 +230,7 @@ async fn settings(
 #[derive(Debug, Deserialize)]
 struct Text {
     text: String,
-    /// The one that was shown.
+    /// The displayed text.
     #[serde(default)]
     from: String,
 }
@@ -268,7 +268,7 @@ async fn own(
 enum Way {
     Add,
     Remove,
-    /// Adds what the diagnosis left unexplained, as a term of this name.
+    /// Adds the unexplained error of the diagnosis, as a term of this name.
     Keep,
 }
 
@@ -291,7 +291,7 @@ async fn effect(
         let shape = match (way, unknown) {
             (Way::Keep, None) => {
                 return Err(Refusal::input(
-                    "nothing is unexplained that has a shape; diagnose first",
+                    "the residual shows no function of a variable; diagnose first",
                 ));
             }
             (Way::Keep, Some(unknown)) => Some(TermFile::from(unknown)),

@@ -1,4 +1,4 @@
-//! What the page is made of. Every file is in the program; the plots' script is that of the report.
+//! Files of the page. All are built into the program; the script of the plots is that of the report.
 
 use std::sync::{Arc, LazyLock};
 
@@ -15,7 +15,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 const PAGE: &str = "text/html; charset=utf-8";
 
-/// Path, kind and content of what does not change.
+/// Path, kind and content of constant files.
 const FILES: [(&str, &str, &str); 18] = [
     ("/", PAGE, include_str!("page/index.html")),
     ("/report.css", STYLE, report::STYLE),
@@ -47,7 +47,7 @@ const FILES: [(&str, &str, &str); 18] = [
 
 /// plotly.js, gzipped.
 static PLOTLY: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    // The build script has written it: it can be read.
+    // The build script has written it, so it can be read.
     let packed = base64::engine::general_purpose::STANDARD.decode(report::PLOTLY);
     packed.unwrap_or_default()
 });

@@ -1,4 +1,4 @@
-//! The body of a request, read whole: so many bytes, which keep coming, and so many over all that are under way.
+//! Reading of a request's body, with limits for its size, its transfer time, and the total of all transfers.
 
 use std::future::poll_fn;
 use std::pin::Pin;
@@ -11,13 +11,13 @@ use tokio::time::timeout;
 
 use super::guard::Refusal;
 
-/// The next part of a body is here within this time after the one before it.
+/// Time limit between two parts of a body.
 const LONGEST_SILENCE: Duration = Duration::from_secs(10);
-/// All of it is here within this time.
+/// Time limit for receiving a whole body.
 const LONGEST: Duration = Duration::from_secs(60);
 
-/// The body, and its share of the room, a permit for each byte that is under way. Nobody waits for another's body: where there is no
-/// room it is refused.
+/// Reads the body within the memory limit for transfers, with a permit for each byte. If there is not enough memory, the request is
+/// rejected at once.
 pub(super) async fn whole<'a>(
     body: Body,
     most: usize,
@@ -45,10 +45,10 @@ async fn parts<'a>(
     let full = |_| {
         Refusal::new(
             StatusCode::SERVICE_UNAVAILABLE,
-            "too many files are on their way at once; drop it again when the others are there",
+            "too many files are being transferred at once; drop it again when the others have arrived",
         )
     };
-    let broken = |_| Refusal::input("the file broke off on its way; drop it again");
+    let broken = |_| Refusal::input("the transfer of the file was interrupted; drop it again");
     let mut content = Vec::new();
     let mut share = room.try_acquire_many(0).map_err(full)?;
     loop {
@@ -56,7 +56,7 @@ async fn parts<'a>(
         let next = timeout(silence, next).await.map_err(|_| {
             Refusal::new(
                 StatusCode::REQUEST_TIMEOUT,
-                "the file stopped on its way; copy it to this machine and drop it again",
+                "the transfer of the file stalled; copy it to this machine and drop it again",
             )
         })?;
         let Some(frame) = next.transpose().map_err(broken)? else {
@@ -93,7 +93,7 @@ mod tests {
             .map_err(|refusal| refusal.to_string())
     }
 
-    /// A body of which nothing ever comes.
+    /// A body without any data.
     struct Silent;
 
     impl HttpBody for Silent {

@@ -1,9 +1,8 @@
-//! The connections: so many at once, and none that stands still keeps another out.
+//! Connections: their number is limited, and an idle connection does not block others.
 //!
-//! On a new connection nobody has shown yet that he knows the secret. Such connections have places of their own, so that other users
-//! of the machine, who can connect too, take none of the owner's; they end with their first answer, a refusal. Where all places are
-//! taken the next connection is let in and the one that has stood still for the longest time is closed: of those that do not know the
-//! secret the oldest, whatever it sends.
+//! A new connection has not sent the access key yet. Such connections have a separate limit, so that other users of the machine cannot use
+//! up the owner's connections; without the key they end with their first answer, an error. If the limit is reached, a new connection is
+//! accepted and the one that was idle for the longest time is closed; among connections without the key, the oldest one.
 
 use std::convert::Infallible;
 use std::io::{self, IoSlice};
@@ -29,21 +28,21 @@ use tokio::time::{Sleep, sleep};
 use super::guard::{Guard, restrict};
 use super::session::lock;
 
-/// After it could not take a connection, as where too many files are open.
+/// Pause after a failed accept, for example with too many open files.
 const PAUSE: Duration = Duration::from_millis(100);
-/// Bytes of a request that are held before they are looked at; the head is smaller.
+/// Bytes of a request that are buffered before they are parsed; the head is smaller.
 const BUFFER: usize = 64 << 10;
 
-/// What a client may take.
+/// Limits of a client.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {
-    /// Connections at once on which the secret was known. A browser opens six.
+    /// Limit of simultaneous connections with the access key. A browser opens six.
     pub known: usize,
-    /// Connections at once on which it was not known yet.
+    /// Limit of simultaneous connections without the access key.
     pub unknown: usize,
-    /// The head of a request is here within this time after the connection or the request before it; else the connection ends.
+    /// Time limit for the head of a request after the connection or the preceding request; else the connection ends.
     pub head: Duration,
-    /// Some of an answer is taken within this time; else the connection ends.
+    /// Time limit for the transfer of a part of an answer; else the connection ends.
     pub silence: Duration,
 }
 
@@ -58,11 +57,11 @@ impl Default for Bounds {
     }
 }
 
-/// What is known of a connection.
+/// State of a connection.
 #[derive(Debug)]
 struct Client {
     knows: AtomicBool,
-    /// When something was read or written last; where the secret is not known, when it began.
+    /// Time of the last read or write; before the access key is checked, time of the start.
     moved: Mutex<Instant>,
 }
 
@@ -78,12 +77,13 @@ impl Client {
     }
 }
 
-/// Those that are open.
+/// Open connections.
 #[derive(Debug, Default)]
 struct Clients(Mutex<Vec<(Arc<Client>, AbortHandle)>>);
 
 impl Clients {
-    /// Closes those that have stood still for the longest time, until there are at most so many that know the secret, or do not.
+    /// Closes the connections that were idle for the longest time, until at most `most` of this kind (with or without the access key) are
+    /// left.
     fn keep(&self, knowing: bool, most: usize) {
         let mut all = lock(&self.0);
         loop {
@@ -102,7 +102,7 @@ impl Clients {
     }
 }
 
-/// What all connections share.
+/// Data that all connections share.
 struct Door {
     guard: Guard,
     router: TowerToHyperService<Router>,
@@ -110,7 +110,7 @@ struct Door {
     bounds: Bounds,
 }
 
-/// Serves for ever.
+/// Runs the server without end.
 pub(super) async fn serve(listener: TcpListener, guard: Guard, router: Router, bounds: Bounds) {
     let door = Arc::new(Door {
         guard,
@@ -143,10 +143,10 @@ pub(super) async fn serve(listener: TcpListener, guard: Guard, router: Router, b
         let service = service_fn(move |request| answer(at.clone(), of.clone(), request));
         let connection = http.serve_connection(TokioIo::new(watched), service);
         let (at, of) = (door.clone(), client.clone());
-        // The lock is held until it is among them: it may be over at once.
+        // The lock is held until the connection is in the list, because it may end at once.
         let mut all = lock(&door.clients.0);
         let task = tokio::spawn(async move {
-            // A client that goes away is no fault.
+            // A client that disconnects is no error.
             let _ = connection.await;
             at.clients.leave(&of);
         });
@@ -154,7 +154,7 @@ pub(super) async fn serve(listener: TcpListener, guard: Guard, router: Router, b
     }
 }
 
-/// Answers where the guard admits it.
+/// Answers requests that the guard admits.
 async fn answer(
     door: Arc<Door>,
     client: Arc<Client>,
@@ -179,7 +179,7 @@ async fn answer(
     Ok(response)
 }
 
-/// A stream that tells of its movement and fails where nothing of an answer is taken for long.
+/// A stream that records the time of transfers, and fails if the client reads no part of an answer for long.
 struct Watched {
     stream: TcpStream,
     client: Arc<Client>,

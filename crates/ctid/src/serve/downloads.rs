@@ -1,4 +1,4 @@
-//! What the page draws and what can be downloaded.
+//! Data for the page's plots, and downloads.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/api/file", get(file))
 }
 
-/// The records as they are, before anything is fitted.
+/// The records before any fit.
 async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Response, Refusal> {
     let session = find(&app, &tab.session)?;
     let text = aside(move || {
@@ -53,7 +53,7 @@ async fn data(State(app): State<Arc<App>>, Query(tab): Query<Tab>) -> Result<Res
         let shown = shown.map(|(record, held_out)| Shown::of(record, held_out));
         let mut shown: Vec<Shown> = shown.collect();
         let (outputs, [input, output]) = signals.unwrap_or_default();
-        // As in the report, those that are fitted come first.
+        // Fitted records come first, as in the report.
         shown.sort_by_key(|record| record.held_out);
         let clock = Clock::of(&read);
         Ok(report::drawing_of_records(
@@ -99,12 +99,12 @@ async fn model(
     .await
 }
 
-/// What can be downloaded.
+/// Available downloads.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Wanted {
     Model,
-    /// The text of a model of its user's own.
+    /// The text of a user's own model.
     Text,
     Report,
     Experiment,
@@ -154,7 +154,7 @@ async fn file(
                 )
             }
             Wanted::Report => {
-                // Whatever was computed last.
+                // The latest result.
                 let latest = [&session.fitted, &session.diagnosis].into_iter().flatten();
                 let latest = latest.max_by_key(|found| found.id);
                 let latest =

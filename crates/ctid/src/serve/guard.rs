@@ -1,12 +1,11 @@
-//! Who may ask: who knows the secret of this run, on pages that this server has sent.
+//! Access control: requests need the access key of this run, and have to come from pages of this server.
 //!
-//! Every address begins with the secret, which stands in the address that is printed and nowhere else: other users of the machine
-//! can connect, but without it nothing is answered. It is no cookie, which a browser would also send to the servers of others at
-//! other ports of this machine.
+//! Every address begins with the access key, which is only in the printed address: other users of the machine can connect, but get no
+//! answer without the key. It is no cookie, which a browser would also send to the servers of others at other ports of this machine.
 //!
-//! A page of another site that is open in the same browser can send requests to any local server. Its requests carry its own
-//! `Origin`, which is refused. A name that it has pointed at 127.0.0.1 after it was loaded stands in `Host`, which is refused too.
-//! And it does not know the secret.
+//! A page of another site that is open in the same browser can send requests to any local server. Its requests have its own `Origin`,
+//! which is rejected. A host name that it resolves to 127.0.0.1 later is in `Host`, which is rejected too.
+//! And it does not have the access key.
 
 use std::hint::black_box;
 
@@ -16,15 +15,15 @@ use axum::http::{HeaderMap, HeaderValue, Request, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
-/// The largest body that is taken \[bytes\].
+/// The largest accepted body \[bytes\].
 pub(super) const LARGEST_BODY: usize = 64 << 20;
 
-/// What the browser may do with the page: everything comes from here. Plotly writes styles into its elements, and draws the
-/// picture that it saves from a blob.
+/// Content security policy of the page: everything comes from this server. Plotly writes styles into its elements, and draws saved pictures
+/// from a blob.
 const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; object-src 'none'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// An answer that says what is wrong and the mend.
+/// An answer with the error and the correction.
 #[derive(Debug)]
 pub(super) struct Refusal {
     status: StatusCode,
@@ -39,7 +38,7 @@ impl Refusal {
         }
     }
 
-    /// What was sent cannot be used.
+    /// The content of the request cannot be used.
     pub(super) fn input(what: impl ToString) -> Self {
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, what.to_string())
     }
@@ -77,7 +76,7 @@ impl IntoResponse for Refusal {
     }
 }
 
-/// Who may speak for this server, and the secret.
+/// Names of this server that requests may use, and the access key.
 #[derive(Debug)]
 pub(super) struct Guard {
     hosts: Vec<String>,
@@ -88,7 +87,7 @@ impl Guard {
     pub(super) fn new(port: u16) -> Self {
         let names = ["127.0.0.1", "localhost"];
         let mut hosts = names.map(|host| format!("{host}:{port}")).to_vec();
-        // A browser leaves out the port that it would take anyway.
+        // Browsers omit the default port.
         if port == 80 {
             hosts.extend(names.map(str::to_owned));
         }
@@ -103,7 +102,7 @@ impl Guard {
         &self.secret
     }
 
-    /// Whether the request may be answered; its address is then the one behind the secret.
+    /// Whether the request may be answered; its address is then the part after the access key.
     ///
     /// # Errors
     /// Why it is refused.
@@ -112,7 +111,7 @@ impl Guard {
         let behind = self.behind_the_secret(request.uri());
         *request.uri_mut() = behind.ok_or_else(|| {
             forbidden(
-                "the address lacks the secret of this run of ctid; open the one that ctid printed",
+                "the address lacks the access key of this run of ctid; open the one that ctid printed",
             )
         })?;
         Ok(())
@@ -147,7 +146,7 @@ impl Guard {
     }
 }
 
-/// Whether two texts of one length are the same; how long that takes does not tell where they differ.
+/// Whether two texts of one length are equal, in constant time, so that the duration does not show where they differ.
 fn is_same(given: &str, secret: &str) -> bool {
     let pairs = given.bytes().zip(secret.bytes());
     pairs.fold(0, |differing, (a, b)| black_box(differing | (a ^ b))) == 0
@@ -162,7 +161,7 @@ fn text(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
     Some(value.to_str().unwrap_or("?"))
 }
 
-/// Refuses a body that says itself that it is too large, before it is read.
+/// Rejects a body whose header gives too large a length, before it is read.
 pub(super) fn check_length(headers: &HeaderMap) -> Result<(), Refusal> {
     let length = text(headers, header::CONTENT_LENGTH).and_then(|text| text.parse::<u64>().ok());
     if length.is_some_and(|length| length > LARGEST_BODY as u64) {
@@ -171,7 +170,7 @@ pub(super) fn check_length(headers: &HeaderMap) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Tells the browser what the answer may do.
+/// Sets the security headers of the answer.
 pub(super) fn restrict<B>(response: &mut Response<B>) {
     for (name, value) in [
         (header::CONTENT_SECURITY_POLICY, POLICY),

@@ -1,4 +1,4 @@
-//! What is held in memory, in bytes: what grows with the records and stays.
+//! Memory in bytes of the data that grow with the records.
 
 use ct_signals::Record;
 use missing_effect::Diagnosis;
@@ -14,7 +14,7 @@ pub(super) fn of_record(record: &Record) -> usize {
     bytes(std::iter::once(&record.time).chain(channels))
 }
 
-/// Its copy of the records, what its models give on them, and the path of what nothing explains.
+/// Copy of the records, simulations of the models, and the unexplained error.
 pub(super) fn of_diagnosis(diagnosis: &Diagnosis) -> usize {
     let records = diagnosis.records.iter();
     let records = records.flat_map(|shown| {

@@ -1,4 +1,4 @@
-//! The computations: one for each tab, on a thread of its own. The functions of the commands do the work.
+//! Computations: one for each tab, in a separate thread, with the functions of the commands.
 
 use std::num::NonZeroU8;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -26,35 +26,35 @@ use crate::model_file::{self, ModelFile};
 use crate::own_model::Comparison;
 use crate::{Error, edit};
 
-/// What is to be computed.
+/// A computation.
 #[derive(Debug, Clone)]
 pub(super) enum Task {
     /// Fits the model.
     Compare,
-    /// Fits the model with these effects in place of its own; the model stays.
+    /// Fits the model with these effects instead of its own; the stored model does not change.
     Chain(Vec<(String, Option<String>)>),
-    /// Searches what is missing; at most so many effects, where that is said.
+    /// Searches missing effects, optionally at most a given number.
     Diagnose {
         max_effects: Option<NonZeroU8>,
         effort: EffortLevel,
     },
-    /// The experiment within these limits that tells apart two effects of a group of the diagnosis.
+    /// Designs the experiment within these limits that distinguishes two effects of a group of the diagnosis.
     Design {
         group: usize,
         between: [String; 2],
         limits: Limits,
-        /// Of a model of its user's own: what each input may do.
+        /// For a user's own model: the permitted changes of each input.
         inputs: Vec<AppliedInput>,
     },
 }
 
-/// What a task works on.
+/// Input of a task.
 enum Input {
     Plant(Box<Work>),
     Own(Box<own::Work>),
 }
 
-/// What came out.
+/// Outcome of a task.
 enum Outcome {
     Own(Box<Comparison>),
     OwnDiagnosed(Box<effect_search::Diagnosis>),
@@ -64,7 +64,7 @@ enum Outcome {
     Designed(Box<Design>, Columns),
 }
 
-/// What a computation works on.
+/// Input of a computation.
 struct Work {
     text: String,
     pub(super) model: ModelFile,
@@ -117,7 +117,7 @@ impl Work {
         })
     }
 
-    /// What was found, with what it was found from.
+    /// The result, with the input that it was computed from.
     fn found<F>(self, id: u64, found: F) -> Arc<Found<F>> {
         Arc::new(Found {
             id,
@@ -140,7 +140,7 @@ impl Work {
     }
 }
 
-/// Begins a computation in place of the one that runs; what it gives is put into the session.
+/// Starts a computation and stops the running one; its result is stored in the session.
 ///
 /// # Errors
 /// Where records and model do not allow it.
@@ -209,7 +209,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
     let run = move || {
         let show = |now: Progress| {
             let mut shown = lock(&progress);
-            // The threads report in any order: it never runs back within a phase.
+            // The threads report in any order: the progress never goes back within a phase.
             let back =
                 shown.is_some_and(|old: Progress| old.phase == now.phase && old.done > now.done);
             if !back {
@@ -222,7 +222,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                 compute(work, &task, options, &show)
             }
             Input::Own(work) => {
-                // What was stopped ends its step first: the next one waits for that.
+                // A stopped computation finishes its current step first; the next computation waits for this.
                 let _alone = lock(&own_fits);
                 if stop.load(Ordering::Relaxed) {
                     return Err(Error::Usage("stopped".to_string()));
@@ -250,7 +250,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
                 }
             }
         }));
-        // The tab may be gone, and so is whoever waits.
+        // The tab may be closed.
         let Some(shared) = place.upgrade() else {
             return;
         };
@@ -264,7 +264,7 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
         match outcome {
             Ok(Ok(outcome)) => settle(&mut session, work, outcome),
             Ok(Err(error)) => session.fail(error.to_string()),
-            Err(_) => session.fail("the computation broke off, which is a fault of ctid; what it said is in the terminal".into()),
+            Err(_) => session.fail("the computation failed because of an error in ctid; the terminal shows the message".into()),
         }
     };
     if let Err(error) = thread::Builder::new()
@@ -311,7 +311,7 @@ fn compute(
     outcome.map_err(|error| work.files.blame(error))
 }
 
-/// Puts what came out where the page finds it.
+/// Stores the result for the page.
 fn settle(session: &mut Session, work: Input, outcome: Outcome) {
     let work = match (work, &outcome) {
         (Input::Own(work), Outcome::Own(found)) => return work.settle(session, found),
@@ -368,7 +368,7 @@ fn with_effects(session: &Session, effects: &[(String, Option<String>)]) -> Resu
     Ok(text)
 }
 
-/// The model that was diagnosed with what was found beside a group: two of the group are to be told apart there.
+/// The diagnosed model with the accepted effects outside a group: a design distinguishes two effects of the group in addition to these.
 fn beside(session: &Session, group: usize, between: &[String; 2]) -> Result<String, Refusal> {
     let name = session.model_name();
     let Some(of) = &session.diagnosis else {

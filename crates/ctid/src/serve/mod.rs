@@ -17,10 +17,10 @@
 //! every request, so that page and commands can be mixed.
 //!
 //! # The requests
-//! Every tab has a session, named in the query; what is sent is JSON but for a record, what comes back is JSON but for
-//! a download. No parameter ever reaches the file system. Every address begins with the secret of the run, `/SECRET/api/state`, which
-//! the table leaves out. A refusal is `{"error": "..."}` with a status of 400 or more: one line with the mend, as the commands write it. What the page never sends,
-//! such as broken JSON, is refused in plain text.
+//! Every tab has a session, named in the query; what is sent is JSON but for a record, what comes back is JSON but for a download. No
+//! parameter ever reaches the file system. Every address begins with the secret of the run, `/SECRET/api/state`, which the table leaves
+//! out. A refusal is `{"error": "..."}` with a status of 400 or more: one line with the correction, as the commands write it. What the page
+//! never sends, such as broken JSON, is refused in plain text.
 //!
 //! | request | takes | gives |
 //! |---|---|---|
@@ -40,17 +40,19 @@
 //! | `GET /api/model?session=&id=` | the number of a fit or of the diagnosis | its curves, parameters and sentences |
 //! | `GET /api/file?session=&of=` | `model`, `text`, `report` or `experiment` | the file |
 //!
-//! The state is `{version, own, file, text, model_error, settings, effects, waiting, records, warnings, headings, guessed, current, trail, models,
-//! chains, loop, diagnosis, design, job, failure}`: `current` is the number of the fit of the model as it stands, `trail` the fits of its first
-//! effects, `job` `{what, phase, done, total, seconds, limit, ending}` while something is computed. A fit stops where the model becomes another.
+//! The state is `{version, own, file, text, model_error, settings, effects, waiting, records, warnings, headings, guessed, current, trail,
+//! models, chains, loop, diagnosis, design, job, failure}`: `current` is the number of the fit of the model as it stands, `trail` the fits
+//! of its first effects, `job` `{what, phase, done, total, seconds, limit, ending}` while something is computed. A fit stops where the
+//! model becomes another.
 //!
 //! # What is bounded
 //! Eight tabs. 64 connections on which the secret was known, and 128 others whose request begins within ten seconds and which end with
-//! their one refusal; where there are more, the one that has stood still for the longest time is closed. An answer that is not taken, and a
-//! body of which nothing more comes, for ten seconds end their connection; nobody waits for them. Of the bodies 256 MB are under way at once.
-//! 64 MB of files and 20 records in a tab, 500 columns in a file,
-//! twelve fits in a tab. Over all tabs 512 MB of files, of what is read from them (at most four times as much) and of what was computed; the
-//! tab that was seen last may hold more, and is then alone. One computation in a tab, which takes a copy of what was read; it stops when another begins, when its tab is forgotten, and three minutes after its page has asked last.
+//! their one refusal; where there are more, the one that was idle for the longest time is closed. An answer that is not taken, and
+//! a body of which nothing more comes, for ten seconds end their connection; nobody waits for them. Of the bodies 256 MB are under way at
+//! once. 64 MB of files and 20 records in a tab, 500 columns in a file, twelve fits in a tab. Over all tabs 512 MB of files, of what is
+//! read from them (at most four times as much) and of what was computed; the tab that was seen last may hold more, and is then alone. One
+//! computation in a tab, which takes a copy of what was read; it stops when another begins, when its tab is forgotten, and three minutes
+//! after its page has asked last.
 
 mod api;
 mod assets;
@@ -94,44 +96,44 @@ use ct_signals::ReadOptions;
 use crate::input::Files;
 use crate::own_model::AnyModelFile;
 
-/// Where the page is, if nothing else is there.
+/// Default port of the page.
 const PORT: u16 = 8420;
-/// So many ports from the first on are tried.
+/// Number of ports that are tried, from the first on.
 const TRIED: u16 = 20;
-/// Files of the largest size that may be on their way at once.
+/// Number of files of the largest size that may be transferred at once.
 const FILES_AT_ONCE: usize = 4;
 /// Other requests of the largest size.
 const REQUESTS_AT_ONCE: usize = 64;
 
-/// What may be typed.
+/// Command line options.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Records (CSV) that are there from the start; others can be dropped on the page
+    /// Records (CSV) that are loaded at the start; others can be dropped on the page
     #[arg(value_name = "DATA.csv")]
     data: Vec<PathBuf>,
-    /// Model file, which the page edits; without it the page keeps one that can be downloaded
+    /// Model file that the page edits; without it the page holds one that can be downloaded
     #[arg(long, value_name = "M.toml")]
     model: Option<PathBuf>,
     /// Held-out record; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
-    /// Port on 127.0.0.1; the next that is free where it is taken, 0 for any
+    /// Port on 127.0.0.1; if it is in use, the next free one; 0 for any
     #[arg(long, value_name = "PORT", default_value_t = PORT)]
     port: u16,
 }
 
-/// What all requests share.
+/// Data that all requests share.
 #[derive(Debug)]
 struct App {
     sessions: Sessions,
-    /// Bytes of files that may be on their way.
+    /// Number of bytes of files that may be transferred at once.
     uploading: Semaphore,
-    /// Bytes of other requests that may be.
+    /// Number of bytes of other requests.
     asking: Semaphore,
 }
 
 impl Arguments {
-    /// Serves the page until the process ends; the address goes to `out` first.
+    /// Runs the server until the process ends; prints the address to `out` first.
     pub(crate) fn run(&self, out: &mut dyn Write) -> Result<(), Error> {
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
@@ -148,13 +150,13 @@ impl Arguments {
                 "The page is at http://{address}/{secret}/, on this machine, for whoever knows this address; Ctrl-C ends it.\n"
             ),
         )?;
-        // What the page edits is the model file of a plant.
+        // The page edits only the model file of a plant.
         let file = self.model.clone().filter(|_| own.is_none());
         let sessions = Sessions::new(file, own, records);
         runtime.block_on(serve(listener, guard, sessions))
     }
 
-    /// The records of the command line; what is wrong with them or the model is said before anything is served.
+    /// The records of the command line; errors in the records or the model are reported before the server starts.
     fn records(&self) -> Result<(Vec<Upload>, Option<Own>), Error> {
         let files = Files {
             data: self.data.clone(),
@@ -201,7 +203,7 @@ fn read(path: &Path, name: &str, held_out: bool) -> Result<Upload, Error> {
     Upload::new(name, held_out, content.into()).map_err(|refusal| Error::Usage(refusal.to_string()))
 }
 
-/// The port, or the next that is free.
+/// The port, or the next free one.
 async fn listen(port: u16) -> Result<TcpListener, Error> {
     let mut tried = port;
     loop {
@@ -232,7 +234,7 @@ async fn serve(listener: TcpListener, guard: Guard, sessions: Sessions) -> Resul
         loop {
             clock.tick().await;
             let watched = watched.clone();
-            // A tab that is busy is waited for.
+            // Waits for a busy tab.
             let _ = tokio::task::spawn_blocking(move || {
                 watched.sessions.stop_abandoned();
                 watched.sessions.make_room();

@@ -1,5 +1,5 @@
-//! A model of its user's own on the page: its text and its model file are kept for the tab, checked as they are typed, and fitted to the
-//! records of the tab by the function of `ctid compare`.
+//! A user's own model on the page: its text and its model file are kept for the tab, checked as they are typed, and fitted to the records
+//! of the tab by the function of `ctid compare`.
 //!
 //! Nothing of it reaches the file system: the `model` that a model file names is the text that the page holds, whatever name stands there.
 
@@ -28,9 +28,9 @@ use crate::{Error, check, edit};
 
 /// Points of a curve that are drawn.
 const DRAWN: usize = 2000;
-/// How the model file is called in messages and downloads.
+/// Name of the model file in messages and downloads.
 pub(super) const FILE: &str = "model.toml";
-/// What the page begins with, where nobody has typed anything.
+/// Initial text of the page.
 const TEMPLATE: &str = include_str!("page/template.mo");
 
 /// An example: name, text, model file, record.
@@ -63,17 +63,17 @@ const EXAMPLES: [Example; 8] = examples!(
 pub(super) struct Own {
     /// The text of the model.
     pub text: String,
-    /// The model file: columns, what is known, side measurements.
+    /// The model file: columns, known parameters, side measurements.
     pub file: String,
-    /// What was fitted last.
+    /// Latest fit.
     pub fit: Option<Fit>,
-    /// What was diagnosed last.
+    /// Latest diagnosis.
     pub diagnosis: Option<Diagnosed>,
     /// The experiment that was designed last.
     pub design: Option<Designed>,
-    /// What the report shows: the last of both.
+    /// Content of the report: the latest of both.
     pub shown: Option<Arc<report::Document>>,
-    /// Columns and what is held, as they were read last: a text that is being typed is no model for a while.
+    /// Columns and hold from the last valid model: a text that is being typed is invalid for a while.
     read: (Columns, ReadOptions),
 }
 
@@ -81,39 +81,39 @@ pub(super) struct Own {
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub id: u64,
-    /// Of which texts and records.
+    /// Texts and records of the result.
     text: String,
     file: String,
     data: u64,
-    /// What the page shows, as JSON.
+    /// JSON for the page.
     pub body: Bytes,
 }
 
-/// What is changed.
+/// A change of the model.
 #[derive(Debug, serde::Deserialize)]
 #[serde(tag = "do", rename_all = "lowercase")]
 pub(super) enum Change {
-    /// A model of one's own in place of a plant.
+    /// A user's own model instead of a plant.
     Begin,
-    /// One of the plants again.
+    /// Return to the built-in plants.
     End,
-    /// An example in place of all that is there.
+    /// Loads an example in place of the present model and records.
     Example { name: String },
     /// Text, model file, or both.
     Write {
         text: Option<String>,
         file: Option<String>,
     },
-    /// Which column a signal is, or the time.
+    /// Sets the column of a signal or of the time.
     Column { signal: String, column: String },
-    /// An effect into the model file, with what the diagnosis found of it.
+    /// Adds an effect to the model file, with its values from the diagnosis.
     Add { effect: String },
-    /// An effect out of it.
+    /// Removes an effect from the model file.
     Remove { effect: String },
 }
 
 impl Own {
-    /// The model file that the command line names, and the text that it names.
+    /// The model file from the command line, and its text.
     pub(super) fn read(path: &Path) -> Result<Self, Error> {
         let file = read_text(path)?;
         let table: toml::Table = file.parse().unwrap_or_default();
@@ -135,17 +135,17 @@ impl Own {
     /// Text and file together.
     ///
     /// # Errors
-    /// One line that names the place and the mend.
+    /// One line that names the place and the correction.
     pub(super) fn model(&self) -> Result<OwnModelFile, Error> {
         OwnModelFile::parse_with(Path::new(FILE), &self.file, self.named_text())
     }
 
-    /// Columns and what is held.
+    /// Columns and hold.
     pub(super) fn layout(&self) -> (Columns, ReadOptions) {
         self.read.clone()
     }
 
-    /// The same with the columns of its texts, where these can be read.
+    /// Adds the columns of the texts, if they can be read.
     fn looked_at(mut self) -> Self {
         if let Ok(model) = self.model() {
             self.read = (model.columns.clone(), model.hold.into());
@@ -164,7 +164,7 @@ impl Own {
         self.text.len() + self.file.len() + fit.map_or(0, of_fit) + shown + design
     }
 
-    /// The text in the place of the file that a model file names.
+    /// The text instead of the file that a model file names.
     fn named_text(&self) -> impl Fn(&Path) -> Result<ModelSpec, Error> {
         |named: &Path| {
             self.spec().map_err(|source| Error::Text {
@@ -174,7 +174,7 @@ impl Own {
         }
     }
 
-    /// What the page shows of it.
+    /// State of the model for the page.
     pub(super) fn state(&self, data: u64) -> Value {
         let spec = self.spec();
         let model = self.model();
@@ -198,7 +198,7 @@ impl Own {
             });
             signals.collect::<Vec<_>>()
         });
-        // A mistake of the text is that of the file too, and said once.
+        // An error of the text is also an error of the file, and is reported once.
         let file_error = match (&spec, &model) {
             (Ok(_), Err(error)) => Some(error.to_string()),
             _ => None,
@@ -244,7 +244,7 @@ pub(super) fn examples() -> Vec<&'static str> {
     EXAMPLES.iter().map(|(name, ..)| *name).collect()
 }
 
-/// The model file that says no more than which text it goes with.
+/// A minimal model file that only names its text.
 fn bare_file(text: &str) -> String {
     let name = ModelSpec::parse(text).map_or("model".to_string(), |spec| spec.name);
     format!("model = \"{name}.mo\"\n\n[columns]\n")
@@ -322,7 +322,7 @@ fn no_model() -> Refusal {
     Refusal::input("there is no model of your own yet")
 }
 
-/// How far a search is that goes through these phases.
+/// Progress of a search with these phases.
 fn progress(now: effect_search::Progress, phases: &[&str]) -> Progress {
     let done = phases.iter().position(|phase| *phase == now.phase);
     Progress {

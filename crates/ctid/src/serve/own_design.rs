@@ -1,4 +1,4 @@
-//! The next experiment of a model of its user's own, as the page asks for it and shows it.
+//! The design of an experiment for a user's own model: request and answer of the page.
 
 use ct_signals::Hold;
 use effect_search::design::{Design, Limits};
@@ -10,20 +10,20 @@ use crate::output::Found as _;
 use crate::own_model::{OwnModelFile, OwnProposal, design_limits, design_sentences, experiments};
 use crate::report::rounded;
 
-/// The seed of `ctid design` where none is given.
+/// The default seed of `ctid design`.
 const SEED: u64 = 1;
 
-/// What the page's form says of an input.
+/// Settings of an input in the page's form.
 #[derive(Debug, Clone, Deserialize)]
 pub(super) struct AppliedInput {
     name: String,
-    /// It may be moved.
+    /// Whether the experiment may change the input.
     apply: bool,
     range: Option<(f64, f64)>,
     slew: Option<f64>,
 }
 
-/// The limits of an experiment. An input whose range or slew is given may be moved.
+/// The limits of an experiment. An input with a range or a slew may change.
 pub(super) fn limits(inputs: &[AppliedInput], duration: Option<f64>) -> Limits {
     let applied = inputs.iter();
     let applied = applied.filter(|i| i.apply || i.range.is_some() || i.slew.is_some());
@@ -46,7 +46,7 @@ pub(super) fn limits(inputs: &[AppliedInput], duration: Option<f64>) -> Limits {
 /// A design.
 #[derive(Debug, Clone)]
 pub(super) struct Designed {
-    /// What the page shows.
+    /// JSON for the page.
     pub body: Value,
     /// The experiment as CSV; none where none is worth making.
     pub record: Option<String>,
@@ -63,7 +63,7 @@ impl Designed {
 
     pub(super) fn held(&self) -> usize {
         let record = self.record.as_ref().map_or(0, String::len);
-        // The body has the same numbers once more.
+        // The JSON for the page contains the same numbers.
         2 * record
     }
 }

@@ -1,5 +1,4 @@
-//! What a diagnosis of a model of its user's own found, as the page shows it: the effects, where each sits among the model's ports, and how
-//! the error falls.
+//! Diagnosis of a user's own model for the page: the effects, their ports in the model, and the fall of the error.
 
 use ct_model::{About, ModelSpec, Variable};
 use effect_search::{Diagnosis, Step};
@@ -16,19 +15,19 @@ use crate::report::COMPARED;
 #[derive(Debug, Clone)]
 pub(super) struct Diagnosed {
     pub id: u64,
-    /// Of which texts and records.
+    /// Texts and records of the result.
     pub text: String,
     pub file: String,
     pub data: u64,
-    /// What is kept of it in the model file.
+    /// Values that the model file keeps.
     pub findings: Findings,
     /// The effects that were added.
     pub effects: Vec<String>,
-    /// What the page shows.
+    /// JSON for the page.
     pub body: Value,
 }
 
-/// What the page shows of a diagnosis.
+/// JSON of a diagnosis for the page.
 pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
     let words = EffectWords::of(&model.base, &model.candidates);
     let one = |id: &String| json!({ "effect": id, "placed": words.placed(id), "physics": words.physics(id) });
@@ -77,7 +76,7 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
     })
 }
 
-/// The ports of a model, each with the effects that are on there and those that were found there.
+/// The ports of a model, each with the effects that are in the model and those that were found.
 pub(super) fn ports(model: &OwnModelFile, found: &[String]) -> Value {
     let spec = &model.base;
     let words = EffectWords::of(spec, &model.candidates);

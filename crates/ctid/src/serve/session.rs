@@ -1,4 +1,4 @@
-//! What one tab works on: records, the model, what was fitted and found, and the computation that runs.
+//! State of one tab: records, model, results, and the running computation.
 
 mod fits;
 
@@ -27,12 +27,12 @@ use crate::model_file::{self, ModelFile};
 const MOST_RECORDS: usize = 20;
 /// Bytes of a model file at most.
 const LARGEST_MODEL: usize = 1 << 20;
-/// Fitted models that are kept.
+/// Largest number of stored fits.
 const MOST_MODELS: usize = 12;
-/// How the model is called where it is in no file.
+/// Name of a model without a file.
 pub(super) const UNNAMED: &str = "model.toml";
 
-/// What was found, and of what.
+/// A result and its input.
 #[derive(Debug)]
 pub(super) struct Found<T> {
     pub id: u64,
@@ -46,13 +46,13 @@ pub(super) struct Found<T> {
 /// Kinds of computations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// The fit of the model as it stands.
+    /// The fit of the present model.
     Compare,
     /// The fit of the model with other effects.
     Chain,
     Diagnose,
     Design,
-    /// The fit of a model of its user's own.
+    /// The fit of a user's own model.
     Own,
 }
 
@@ -61,43 +61,43 @@ pub(super) enum Kind {
 pub(super) struct Job {
     pub number: u64,
     pub kind: Kind,
-    /// What it computes with; `None` for a model of its user's own.
+    /// Model of the computation; `None` for a user's own model.
     pub model: Option<ModelFile>,
     pub begun: Instant,
     /// Limit on the time of a search.
     pub limit: Option<Duration>,
     pub stop: Arc<AtomicBool>,
-    /// When set, the search ends soon with the best that it has found.
+    /// When set, the search ends soon and returns the best result so far.
     pub interrupt: Arc<AtomicBool>,
     pub progress: Arc<Mutex<Option<Progress>>>,
 }
 
-/// What one tab works on.
+/// State of one tab.
 #[derive(Debug)]
 pub(super) struct Session {
-    /// The model file, where there is one; else the text is kept here alone.
+    /// Path of the model file, if there is one; else the text exists in memory only.
     pub file: Option<PathBuf>,
     pub text: String,
-    /// A model of its user's own, where one is looked at in place of a plant.
+    /// A user's own model, if it replaces a plant.
     pub own: Option<Own>,
-    /// Its fits run one after the other, those that were stopped too.
+    /// Serialises the fits of a user's own model, including stopped ones.
     pub own_fits: Arc<Mutex<()>>,
     pub records: Vec<Upload>,
-    /// Counts the changes of the records.
+    /// Number of changes of the records.
     pub data: u64,
-    /// Counts the changes of everything that the page shows.
+    /// Number of changes of the displayed state.
     pub version: u64,
     pub models: VecDeque<Arc<Fitted>>,
-    /// What was fitted last, for the report.
+    /// Latest fit, for the report.
     pub fitted: Option<Arc<Found<Diagnosis>>>,
     pub diagnosis: Option<Arc<Found<Diagnosis>>>,
     pub design: Option<Arc<Found<(Design, Columns)>>>,
     pub job: Option<Job>,
-    /// Why the last computation or change came to nothing.
+    /// Reason why the last computation or change failed.
     pub failure: Option<String>,
-    /// The models run on the measured command, also where the loop could be simulated.
+    /// The models run on the measured command although the loop could be simulated.
     pub measured: bool,
-    /// The model file could not be read when it was looked at last.
+    /// The model file could not be read at the last attempt.
     lost: bool,
     numbers: u64,
 }
@@ -132,7 +132,7 @@ impl Session {
         session
     }
 
-    /// Bytes that it holds: records as they were sent and as they were read, and what was computed.
+    /// Memory in bytes: records as sent and as read, and results.
     pub(super) fn held(&self) -> usize {
         let records: usize = self.records.iter().map(Upload::held).sum();
         let fits: usize = self.models.iter().map(|fitted| fitted.body.len()).sum();
@@ -148,7 +148,7 @@ impl Session {
         self.numbers
     }
 
-    /// What messages call the model.
+    /// Name of the model in messages.
     pub(super) fn model_name(&self) -> String {
         self.file
             .as_ref()
@@ -184,7 +184,7 @@ impl Session {
         }
     }
 
-    /// Tells the page of another text, and stops a fit that is of no use for it.
+    /// Reports a changed text to the page, and stops a fit of the old text.
     fn text_changed(&mut self) {
         self.failure = None;
         self.version += 1;
@@ -193,7 +193,7 @@ impl Session {
             (Kind::Compare, Ok(model), Some(own)) => same(own, &model),
             (Kind::Chain, Ok(model), Some(own)) => without_effects(own) == without_effects(&model),
             (Kind::Compare | Kind::Chain, ..) => false,
-            // What it finds is said to be of the model that it was asked for.
+            // The result refers to the model at the start of the computation.
             (Kind::Diagnose | Kind::Design | Kind::Own, ..) => true,
         };
         if !of_use {
@@ -201,7 +201,7 @@ impl Session {
         }
     }
 
-    /// Which way a loop is treated; what was fitted the other way is kept for the way back.
+    /// Sets how a loop is simulated; fits of the other setting are kept for a return to it.
     pub(super) fn treat_loop(&mut self, measured: bool) {
         if self.measured == measured {
             return;
@@ -218,12 +218,12 @@ impl Session {
         }
     }
 
-    /// The model as it stands.
+    /// The present model.
     pub(super) fn model(&self) -> Result<ModelFile, Error> {
         model_file::parse(&self.model_name(), &self.text)
     }
 
-    /// The unit of a model's output: that of the first record that can be read, else that of the model's columns.
+    /// The unit of a model's output: that of the first readable record, else that of the model's columns.
     pub(super) fn output_unit<'a>(&'a self, model: &'a ModelFile) -> &'a str {
         let mut read = self.records.iter().filter_map(Upload::as_read);
         let output = read.next().and_then(|record| record.outputs.first());
@@ -234,7 +234,7 @@ impl Session {
         Domain::of(model.plant, self.output_unit(model))
     }
 
-    /// Columns and hold as the model names them; what can be guessed where there is no model yet.
+    /// Columns and hold from the model; guessed values if there is no model yet.
     pub(super) fn layout(&self) -> (Columns, ReadOptions) {
         if let Some(own) = &self.own {
             return own.layout();
@@ -267,7 +267,7 @@ impl Session {
         Ok(done)
     }
 
-    /// Another model in place of the text that was shown.
+    /// Replaces the displayed text by another model.
     ///
     /// # Errors
     /// Where it is no model file, or another text stands there meanwhile; everything is then as it was.
@@ -289,7 +289,7 @@ impl Session {
         Ok(())
     }
 
-    /// Takes a record; one of the same name is replaced.
+    /// Adds a record; a record with the same name is replaced.
     ///
     /// # Errors
     /// Where there is no room, or it is here under another name.
@@ -327,19 +327,19 @@ impl Session {
         Ok(())
     }
 
-    /// Takes a record in place of all others.
+    /// Replaces all records by one.
     pub(super) fn take_alone(&mut self, upload: Upload) {
         self.records = vec![upload];
         self.data_changed();
     }
 
-    /// Takes a record away; there may be none of that name.
+    /// Removes a record; a missing name is no error.
     pub(super) fn drop_record(&mut self, name: &str) {
         self.records.retain(|record| record.name != name);
         self.data_changed();
     }
 
-    /// Nothing that was computed is of these records.
+    /// Discards the results of earlier records.
     fn data_changed(&mut self) {
         self.stop();
         self.data += 1;
@@ -351,7 +351,7 @@ impl Session {
         self.failure = None;
     }
 
-    /// Stops what nobody has asked after for so long, in words where the page would not begin it again by itself.
+    /// Stops a computation whose page has sent no request for this time; returns a message if the page would not restart it.
     pub(super) fn stop_abandoned(&mut self) {
         let Some(job) = &self.job else { return };
         let what = match job.kind {
@@ -362,12 +362,12 @@ impl Session {
         self.stop();
         if let Some((what, button)) = what {
             self.fail(format!(
-                "{what} was stopped, because this page had not asked after it for three minutes, as one that sleeps does not; {button} starts it again"
+                "{what} was stopped, because this page sent no request for three minutes, for example because the computer slept; {button} starts it again"
             ));
         }
     }
 
-    /// Ends the search that runs with the best that it has found.
+    /// Ends the running search with its best result so far.
     pub(super) fn finish(&mut self) {
         if let Some(job) = &self.job {
             job.interrupt.store(true, Ordering::Relaxed);
@@ -378,14 +378,14 @@ impl Session {
     pub(super) fn stop(&mut self) {
         if let Some(job) = self.job.take() {
             job.stop.store(true, Ordering::Relaxed);
-            // A search of a model of its user's own knows this flag alone.
+            // A search of a user's own model checks only this flag.
             job.interrupt.store(true, Ordering::Relaxed);
             self.version += 1;
         }
     }
 }
 
-/// The lock of something that no panic leaves half changed.
+/// Locks data that stay consistent if a thread panics.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,4 +1,4 @@
-//! The sessions of all tabs: each has a number that nobody can guess, there are a few of them, and what they hold is bounded.
+//! Sessions of all tabs: each has a random number that cannot be guessed; the number of sessions and their memory are limited.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -8,18 +8,17 @@ use super::own::Own;
 use super::session::{Session, lock};
 use super::upload::Upload;
 
-/// Tabs at most; the one that was not seen for the longest time goes.
+/// Largest number of tabs; the tab with the oldest request is dropped.
 const MOST: usize = 8;
-/// Bytes over all tabs: records as they were sent and as they were read, and what was computed. One tab may hold more, and is then
-/// alone.
+/// Limit in bytes over all tabs: records as sent and as read, and results. A single tab may use more.
 const BYTES: usize = 512 << 20;
-/// A computation whose page has not asked for so long is nobody's. Browsers let a page in the background ask once a minute.
+/// A computation is stopped if its page sends no request for this time. Browsers let a page in the background send one request per minute.
 const ALONE: Duration = Duration::from_secs(180);
 
 /// A tab's session.
 pub(super) type Shared = Arc<Mutex<Session>>;
 
-/// A tab. When its page asked last stands beside its session, which may be busy: no tab waits for another's.
+/// A tab. The time of the page's last request is stored outside the session, which may be locked: no tab waits for another one.
 #[derive(Debug)]
 struct Tab {
     id: String,
@@ -27,7 +26,7 @@ struct Tab {
     session: Shared,
 }
 
-/// All of them, and what a new one begins with.
+/// All sessions, and the initial state of a new one.
 #[derive(Debug)]
 pub(super) struct Sessions {
     model: Option<PathBuf>,
@@ -74,7 +73,7 @@ impl Sessions {
         (id, session)
     }
 
-    /// Makes room where the tabs hold too much; the one that was seen last stays.
+    /// Drops sessions if their memory is too large; the latest one stays.
     pub(super) fn make_room(&self) {
         self.make_room_for(BYTES);
     }
@@ -92,7 +91,7 @@ impl Sessions {
         while held() > bytes && last().is_some_and(|id| self.forget_oldest(&id)) {}
     }
 
-    /// Stops what nobody waits for.
+    /// Stops computations of closed pages.
     pub(super) fn stop_abandoned(&self) {
         self.stop_unseen_for(ALONE);
     }
@@ -109,7 +108,7 @@ impl Sessions {
         some.map(|tab| tab.session.clone()).collect()
     }
 
-    /// The one that was not seen for the longest time, but `id`; what it computes stops. Whether there was one.
+    /// Drops the tab with the oldest last request, except `id`; its computation stops. Returns whether there was one.
     fn forget_oldest(&self, id: &str) -> bool {
         let mut all = lock(&self.all);
         let others = all.iter().enumerate().filter(|(_, tab)| tab.id != id);
@@ -146,7 +145,7 @@ mod tests {
         assert_eq!(lock(&sessions.all).len(), MOST);
     }
 
-    /// Two records that take little as they were sent, and more once they are read.
+    /// Two records with small files and larger memory after reading.
     #[test]
     fn what_is_read_needs_room_too() {
         let sessions = Sessions::new(None, None, Vec::new());
@@ -170,7 +169,7 @@ mod tests {
         assert_eq!(lock(&sessions.all).len(), 2);
         sessions.make_room_for(sent + 2 * 500 * 3 * 8 - 1);
         assert!(sessions.find(&tabs[0].0).is_none(), "the older one goes");
-        // Alone it stays, whatever it holds.
+        // A single session stays, whatever its memory is.
         sessions.make_room_for(0);
         assert!(sessions.find(&tabs[1].0).is_some());
     }
@@ -213,12 +212,12 @@ mod tests {
                 "{said}"
             );
         }
-        // A fit begins again by itself: there is nothing to say.
+        // The page restarts a fit by itself, so no message is needed.
         lock(&session).failure = None;
         lock(&session).job = Some(job(Kind::Compare));
         sessions.stop_unseen_for(Duration::ZERO);
         assert!(lock(&session).job.is_none() && lock(&session).failure.is_none());
-        // Where nothing runs there is nothing to stop.
+        // Stopping without a running computation has no effect.
         sessions.stop_unseen_for(Duration::ZERO);
         assert!(lock(&session).failure.is_none());
     }

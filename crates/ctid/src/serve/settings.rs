@@ -1,4 +1,4 @@
-//! What the page's form says of the model: read from a model file, and written into it, comments and layout kept.
+//! Settings of the model in the page's form: read from a model file, and written into it with comments and layout preserved.
 
 use ct_signals::{Columns, Hold};
 use plants::{EffectInfo, Plant};
@@ -8,7 +8,7 @@ use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 use crate::edit::{self, Edited};
 use crate::{Error, model_file};
 
-/// The part of a model file that the form shows. Everything may be missing; it is checked as a model file once it is written.
+/// The part of a model file in the form. Every entry is optional; the content is checked as a model file after writing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(super) struct Settings {
@@ -36,7 +36,7 @@ struct Known {
     input_range: Option<f64>,
 }
 
-/// The tanks whose levels are measured: one, or as many as there are outputs.
+/// Tanks with measured levels: one, or as many as there are outputs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 enum Measured {
@@ -58,7 +58,7 @@ struct Controller {
     u_max: Option<f64>,
 }
 
-/// What a form sends: what it says, and what stood in it before anybody typed. A form of an empty model was empty.
+/// Content of a form: the current values, and the values before editing. The form of an empty model was empty.
 #[derive(Debug, Deserialize)]
 pub(super) struct Form {
     #[serde(flatten)]
@@ -68,7 +68,7 @@ pub(super) struct Form {
 }
 
 impl Form {
-    /// The text with what the form says.
+    /// Writes the settings of the form into the text.
     ///
     /// # Errors
     /// [`Error::Changed`] where the text says something else than the form was filled from; where the result is no model file.
@@ -85,9 +85,9 @@ impl Form {
     }
 }
 
-/// What two settings differ in, by the keys of the model file.
+/// Keys of the model file in which two settings differ.
 fn differing(a: &Settings, b: &Settings) -> Vec<String> {
-    // As the page has them: there what is not finite is null.
+    // Compared as the page has them: values that are not finite are null there.
     let [a, b] = [a, b].map(|settings| serde_json::to_value(settings).unwrap_or_default());
     let keys = a.as_object().into_iter().flat_map(|all| all.keys());
     let mut differing = Vec::new();
@@ -105,17 +105,17 @@ fn differing(a: &Settings, b: &Settings) -> Vec<String> {
 }
 
 impl Settings {
-    /// Those of a text; what cannot be read is empty, and [`model_file::parse`] says why.
+    /// Settings of a text; unreadable parts are empty, and [`model_file::parse`] reports the error.
     pub(super) fn of(text: &str) -> Self {
         toml::from_str(text).unwrap_or_default()
     }
 
-    /// The text with these settings; whatever they do not speak of stays.
+    /// The text with these settings; other entries do not change.
     ///
     /// # Errors
     /// Where the result is no model file.
     fn written_into(&self, file: &str, text: &str) -> Result<Edited, Error> {
-        // Where they cannot be read the form is empty, and all that it does not show would be deleted.
+        // If the settings cannot be read, the form is empty, and writing it would delete entries.
         if toml::from_str::<Self>(text).is_err() {
             model_file::parse(file, text)?;
         }
@@ -195,7 +195,7 @@ impl Settings {
             ("input_range", number(self.known.input_range)),
         ];
         section(&mut document, file, "known", known)?;
-        // Which sensors there are is known now.
+        // The list of sensors is now known.
         forget_places(document.as_table_mut(), &self.plant);
         match &self.controller {
             None => {
@@ -228,8 +228,8 @@ impl Settings {
     }
 }
 
-/// Of effects that are not on, the places that this plant does not have: an effect that was taken out of one would stand in the way of
-/// another plant for ever, and where it stands next is said when it is added.
+/// Removes places that this plant does not have from effects that are not in the model: such a place would cause errors with another plant,
+/// and `ctid add` asks for the place again.
 fn forget_places(root: &mut Table, plant: &str) {
     let Ok(plant) = plant.parse::<Plant>() else {
         return;
@@ -256,7 +256,7 @@ fn forget_places(root: &mut Table, plant: &str) {
     }
 }
 
-/// What the file says of the measured levels.
+/// Measured levels that the file names.
 fn known_outputs(root: &Table, plant: Plant) -> plants::Known {
     let measured = root
         .get("known")
@@ -273,7 +273,7 @@ fn known_outputs(root: &Table, plant: Plant) -> plants::Known {
     }
 }
 
-/// Writes the entries of a table, made where there is something to write and none is there.
+/// Writes the entries of a table; creates the table if there are entries and no table exists.
 fn section<const N: usize>(
     document: &mut DocumentMut,
     file: &str,
@@ -299,7 +299,7 @@ fn section<const N: usize>(
     Ok(())
 }
 
-/// A value for a key; one that says the same stays as it is written, and a comment behind it stays in any case.
+/// Sets the value of a key; an equal value keeps its notation, and a comment after the value stays.
 fn put(table: &mut dyn TableLike, key: &str, value: Option<Value>) {
     let Some(mut value) = value else {
         table.remove(key);

@@ -1,4 +1,4 @@
-//! What the page is told of its session, whenever something has changed.
+//! State of the session for the page, sent after every change.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -15,7 +15,7 @@ use super::words;
 use crate::input::excitation;
 use crate::model_file::ModelFile;
 
-/// How far the computation is, if there is one.
+/// Progress of the computation, if one is running.
 pub(super) fn job(session: &Session) -> Value {
     let Some(job) = &session.job else {
         return Value::Null;
@@ -36,7 +36,7 @@ pub(super) fn job(session: &Session) -> Value {
     })
 }
 
-/// Everything but curves.
+/// The complete state except curves.
 pub(super) fn state(session: &mut Session) -> Value {
     let (columns, options) = session.layout();
     let records: Vec<Value> = session
@@ -54,7 +54,7 @@ pub(super) fn state(session: &mut Session) -> Value {
         .collect();
     let fitted = session.records.iter().filter(|upload| !upload.held_out);
     let fitted: Vec<&Record> = fitted.filter_map(Upload::as_read).collect();
-    // What they say is of one command.
+    // The warnings refer to a single command.
     let excited = if session.own.is_some() {
         Vec::new()
     } else {
@@ -65,7 +65,7 @@ pub(super) fn state(session: &mut Session) -> Value {
     let warnings: Vec<String> = remarks
         .chain(warnings.iter().map(ToString::to_string))
         .collect();
-    // The form offers the columns of the first file; all have to have the same.
+    // The form offers the columns of the first file; all files need the same columns.
     let headings = session
         .records
         .first()
@@ -126,7 +126,7 @@ fn is_of<T>(found: &Found<T>, session: &Session) -> bool {
         && model.is_ok_and(|model| same(&model, &found.model))
 }
 
-/// What a record holds, in words.
+/// Description of a record.
 fn about(record: &Record) -> Value {
     let signal = |signal: &ct_signals::Channel| {
         let (low, high) = signal.range();
@@ -149,7 +149,7 @@ fn about(record: &Record) -> Value {
     })
 }
 
-/// Effects and where each acts, where there is a choice; terms of the user's own by their name.
+/// Effects with their places, if there is a choice; terms of the user's own by their name.
 type Chain = Vec<(String, Option<String>)>;
 
 fn effects_of(model: &ModelFile) -> Chain {
@@ -172,7 +172,7 @@ fn chain_name(chain: &Chain) -> String {
     named.collect::<Vec<_>>().join(" + ")
 }
 
-/// Chains worth a look: none, the model's own, those that were fitted, and each found or ranked effect on the model as it stands.
+/// Sets of effects to compare: none, the model's own, the fitted ones, and each found or ranked effect added to the present model.
 fn choices(session: &Session, model: &ModelFile, kin: &[&Arc<Fitted>]) -> Vec<Chain> {
     let now = effects_of(model);
     let mut all = vec![Chain::new(), now.clone()];
@@ -194,7 +194,7 @@ fn choices(session: &Session, model: &ModelFile, kin: &[&Arc<Fitted>]) -> Vec<Ch
 
 fn point(fitted: &Fitted) -> Value {
     let effects = effects_of(&fitted.model);
-    // Models that were fitted one by one have no noise in common by which errors of several outputs become one number.
+    // Separately fitted models have no common noise, so the errors of several outputs are not combined.
     let several = fitted.errors.0.len() > 1;
     let errors = fitted.errors.0.iter().enumerate();
     let errors = errors.map(|(k, (name, rmse))| {
@@ -226,7 +226,7 @@ pub(super) fn plants() -> Value {
             "known": known_of(plant),
             "pumps": plant.pumps(),
             "levels": vessel_names(plant),
-            // With one reading the others have the last level.
+            // With one reading, a plant whose tanks are not joined measures its last level.
             "joined": plant.joined(),
             "model": equation(plant),
         })
@@ -234,7 +234,7 @@ pub(super) fn plants() -> Value {
     plants.collect()
 }
 
-/// What may be known of a plant, by its keys in the model file.
+/// Known constants that a plant may have, by their keys in the model file.
 fn known_of(plant: Plant) -> Vec<&'static str> {
     let areas: &[&str] = match (plant.outlet(), plant.vessels()) {
         (Outlet::Torricelli, 1) => &["area"],
@@ -254,7 +254,7 @@ fn vessel_names(plant: Plant) -> Vec<&'static str> {
     names
 }
 
-/// Every effect that the domain offers, at every place where it can act on a plant.
+/// Every effect of the domain, at every place where it can act on a plant.
 fn sites(model: &ModelFile, domain: Domain) -> Vec<Value> {
     let (plant, known) = (model.plant, &model.known);
     let offered = CATALOGUE.iter().filter(|effect| domain.offers(effect));

@@ -1,4 +1,4 @@
-//! A record as the page has sent it, and as it was read last.
+//! A record as sent by the page, and as last read.
 
 use std::sync::Arc;
 
@@ -10,9 +10,9 @@ use ct_signals::{
 use super::guard::Refusal;
 use super::held::of_record;
 
-/// Columns of a file at most: what the page can offer for a choice.
+/// Largest number of columns of a file: the page offers them for choice.
 const MOST_COLUMNS: usize = 500;
-/// Bytes in which the header has to be found.
+/// The header has to end within this number of bytes.
 const LARGEST_HEAD: usize = 1 << 20;
 
 /// A record that could be read, and what was missing in it.
@@ -25,12 +25,12 @@ pub(super) struct Upload {
     pub held_out: bool,
     pub headings: Vec<Heading>,
     pub content: Bytes,
-    /// As it was read last, and with which columns.
+    /// Result of the last reading, and its columns.
     read: Option<(Columns, ReadOptions, Result<AsRead, String>)>,
 }
 
 impl Upload {
-    /// Takes a file; the header alone is looked at.
+    /// Accepts a file; only the header is checked.
     ///
     /// # Errors
     /// Where it is no CSV, or has too many columns.
@@ -52,8 +52,8 @@ impl Upload {
         })
     }
 
-    /// Bytes that it holds, as it was sent and as it was read. A number is two bytes at least in the file, with what parts it from
-    /// the next, and eight in memory: what is read takes at most four times the file.
+    /// Memory in bytes, as sent and as read. A number has at least two bytes in the file, including the separator, and eight in memory: a
+    /// read record takes at most four times the size of the file.
     pub(super) fn held(&self) -> usize {
         let read = self
             .read
@@ -62,20 +62,20 @@ impl Upload {
         self.content.len() + read.map_or(0, |(record, _)| of_record(record))
     }
 
-    /// The record as it was read last.
+    /// The record as last read.
     pub(super) fn as_read(&self) -> Option<&Record> {
         let (_, _, read) = self.read.as_ref()?;
         read.as_ref().ok().map(|(record, _)| record.as_ref())
     }
 
-    /// What was missing and what was done when it was read last; `None` where it was read as it stands.
+    /// Note on missing samples and corrections of the last reading; `None` if the record was read unchanged.
     pub(super) fn remark(&self) -> Option<String> {
         let (_, _, read) = self.read.as_ref()?;
         let (_, summary) = read.as_ref().ok()?;
         (!summary.is_plain()).then(|| summary.to_string())
     }
 
-    /// The record with what was missing in it, read again only where the columns have changed.
+    /// The record with a note on missing samples, read again only after a change of the columns.
     pub(super) fn reading(
         &mut self,
         columns: &Columns,
@@ -90,7 +90,7 @@ impl Upload {
         })
     }
 
-    /// The record, read again only where the columns have changed.
+    /// The record, read again only after a change of the columns.
     pub(super) fn record(
         &mut self,
         columns: &Columns,
@@ -101,7 +101,7 @@ impl Upload {
                 read.clone().map(|(record, _)| record)
             }
             _ => {
-                // Whether a fitted record has to move depends on the others.
+                // Whether a fitted record has to change depends on the other records.
                 let reading = parse_csv(&self.name, &self.content, columns, options);
                 let read = reading.map(|reading| (Arc::new(reading.record), reading.summary));
                 let read = read.map_err(|error| error.to_string());
@@ -112,7 +112,7 @@ impl Upload {
     }
 }
 
-/// The first lines of a file. One long line may hold as many columns as bytes, each of them far larger in memory.
+/// The first lines of a file. A long line may have as many columns as bytes, each far larger in memory.
 fn head<'a>(name: &str, content: &'a [u8]) -> Result<&'a [u8], Refusal> {
     let Some(first) = content.get(..LARGEST_HEAD) else {
         return Ok(content);
@@ -120,7 +120,7 @@ fn head<'a>(name: &str, content: &'a [u8]) -> Result<&'a [u8], Refusal> {
     let end = first.iter().rposition(|byte| b"\r\n".contains(byte));
     let end = end.ok_or_else(|| {
         Refusal::input(format!(
-            "{name} is one line for its first {} MB; write one row for each sample, below a header",
+            "{name} is a single line over its first {} MB; write one row for each sample, below a header",
             LARGEST_HEAD >> 20
         ))
     })?;
@@ -135,7 +135,7 @@ mod tests {
 
     use super::*;
 
-    /// As many rows as bytes allow: every command and reading is one digit.
+    /// The largest number of rows for these bytes: every command and reading is one digit.
     #[test]
     fn what_is_read_is_counted_and_takes_at_most_four_times_the_file() {
         let mut text = "t,u,y,u2,r\n".to_string();
@@ -156,7 +156,7 @@ mod tests {
         upload.record(&columns, &options).unwrap();
         assert_eq!(upload.held(), sent + 2000 * 5 * 8);
         assert!(upload.held() <= 5 * sent);
-        // What cannot be read takes nothing.
+        // An unreadable file uses no memory.
         let columns = Columns {
             inputs: vec!["no such".into()],
             ..columns

@@ -1,4 +1,4 @@
-//! Results as the page shows them: what is drawn as the report draws it, numbers as the terminal writes them.
+//! Results for the page: plots as in the report, numbers as in the terminal.
 
 use missing_effect::design::{Candidate, Design, Kind};
 use missing_effect::{Diagnosis, Parameter, Score, Step, Verdict, numbers};
@@ -10,7 +10,7 @@ use crate::findings::{self, Reader};
 use crate::model_file::ModelFile;
 use crate::report;
 
-/// Experiments of a design that the table shows.
+/// Number of experiments in the design's table.
 const EXPERIMENTS: usize = 8;
 
 /// A fitted model: curves, failures, parameters, sentences.
@@ -24,7 +24,7 @@ pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
         parameters: Vec<Value>,
         starts: usize,
         starts_agree: usize,
-        /// What the error on held-out data is made of.
+        /// Parts of the error on held-out data.
         held_out_error: Option<String>,
         sentences: Vec<&'a str>,
         noise: String,
@@ -82,7 +82,7 @@ fn size(parameter: &Parameter) -> String {
     with_unit(&format!("{name} {value}{error}"), &parameter.unit)
 }
 
-/// What a diagnosis found.
+/// Texts of a diagnosis.
 pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
     let diagnosis = &found.found;
     let unit = &diagnosis.output_unit;
@@ -120,7 +120,7 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
         "headline": headline,
         "tone": tone,
         "groups": groups.collect::<Vec<_>>(),
-        // The first sentences are those of the groups.
+        // The first sentences belong to the groups.
         "sentences": diagnosis.sentences.get(diagnosis.groups.len()..).unwrap_or_default(),
         "before": diagnosis.steps.first().map_or("-".to_owned(), |step| errors(diagnosis, step)),
         "noise": noise(diagnosis),
@@ -129,13 +129,13 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
         "held_out_error": diagnosis.steps.last().and_then(|step| held_out_errors(diagnosis, step)),
         "effort": findings::effort(&diagnosis.effort, Reader::Page),
         "ranking": ranked.collect::<Vec<_>>(),
-        // What the shape depends on, where nothing explains it.
+        // Variable of the unexplained error.
         "unknown": diagnosis.unknown.as_ref().map(|unknown| unknown.variable),
         "seconds": diagnosis.seconds,
     })
 }
 
-/// Ranked effects that are worth a fit of their own.
+/// Number of ranked effects that are offered for a separate fit.
 const RANKED: usize = 8;
 
 /// The effects that were found and the best of the ranking, each with its place.
@@ -169,7 +169,7 @@ fn headline(diagnosis: &Diagnosis) -> (String, &'static str) {
         ),
         Verdict::Partial => (findings::partial_headline(diagnosis), "open"),
         Verdict::Unexplained => (
-            "What is left is not noise, and no effect of the catalogue explains it".to_owned(),
+            "The residual is not noise, and no effect of the catalogue explains it".to_owned(),
             "open",
         ),
         Verdict::Adequate => ("The model is adequate".to_owned(), "good"),
@@ -186,7 +186,7 @@ fn own_size(step: &Step, effect: &str) -> Option<String> {
 fn ranked(diagnosis: &Diagnosis, score: &Score) -> Value {
     let info = EffectInfo::find(&score.effect);
     let domain = diagnosis.domain();
-    // How to confirm an effect is written for tanks.
+    // The confirmation texts refer to tanks.
     let confirm = info.filter(|_| domain == Domain::Hydraulic);
     let unit = score.size.as_ref().map_or("", |size| size.unit.as_str());
     let (error, error_unit) = findings::score_error(diagnosis, score);
@@ -249,7 +249,7 @@ pub(super) fn design(id: u64, design: &Design) -> Value {
     })
 }
 
-/// Terms of the user's own that stand in the model file and are not on.
+/// The user's own terms that are in the model file but not in the model.
 pub(super) fn waiting(model: &ModelFile) -> Vec<Value> {
     let waiting = model.waiting.iter();
     let terms = waiting.filter_map(|table| table.strip_prefix("term."));
@@ -258,7 +258,7 @@ pub(super) fn waiting(model: &ModelFile) -> Vec<Value> {
         .collect()
 }
 
-/// The effects and terms of the model as it stands.
+/// The effects and terms of the present model.
 pub(super) fn effects(session: &Session) -> Vec<Value> {
     let Ok(model) = session.model() else {
         return Vec::new();

@@ -13,7 +13,7 @@ pub(crate) struct FittedRecord {
     pub model: Vec<Vec<f64>>,
 }
 
-/// All records that were fitted.
+/// Curves of all fitted records.
 #[derive(Debug, Clone)]
 pub(crate) struct Curves {
     /// Names and units of the inputs.
@@ -24,7 +24,7 @@ pub(crate) struct Curves {
 }
 
 impl Curves {
-    /// A row for each instant: record, time, inputs, and of each output what was measured, the model and the residual.
+    /// A row for each instant: record, time, inputs, and for each output the measured value, the model and the residual.
     pub fn csv(&self) -> String {
         let time = self.records.first().map(|r| r.time.header.clone());
         let mut head = vec!["record".to_string(), time.unwrap_or_default()];

@@ -1,4 +1,4 @@
-//! The record on whose inputs a model is simulated: read, and whole.
+//! The input record of a simulation: read and checked for completeness.
 
 use std::path::{Path, PathBuf};
 
@@ -10,14 +10,14 @@ use ct_signals::{
 use super::TimeColumn;
 use crate::Error;
 
-/// What is asked for.
+/// Requested inputs.
 #[derive(Debug, Clone)]
 pub(crate) struct Inputs {
     /// The file of the inputs.
     pub path: PathBuf,
-    /// How it is read, the hold aside.
+    /// Options for reading, except the hold.
     pub options: ReadOptions,
-    /// First readings of each output to which initial states are fitted.
+    /// Number of first readings of each output for the fit of initial states.
     pub first: usize,
 }
 
@@ -28,10 +28,10 @@ pub(crate) struct ReadInputs {
     pub time: TimeColumn,
 }
 
-/// Reads the inputs; those outputs that the file has come with them. `named`: what a column that is not there is blamed on.
+/// Reads the inputs; those outputs that the file has come with them. `named`: what a column that is not there is named in the error on.
 ///
 /// # Errors
-/// One line that names the file, the place and the mend: where a column is not there, a sample of an input is missing, or rows are.
+/// One line that names the file, the place and the correction: where a column is not there, a sample of an input is missing, or rows are.
 pub(crate) fn read_inputs(
     path: &Path,
     columns: &Columns,
@@ -43,10 +43,10 @@ pub(crate) fn read_inputs(
 }
 
 impl ReadInputs {
-    /// Inputs that were read, which have to be whole; `path` names them in messages.
+    /// Inputs that were read, which have to be complete; `path` is their name in messages.
     ///
     /// # Errors
-    /// Where a sample of an input is missing, or rows are, with the place and the mend.
+    /// Where a sample of an input is missing, or rows are, with the place and the correction.
     pub fn of(path: &Path, reading: Reading, columns: &Columns) -> Result<Self, Error> {
         let (mut record, summary) = (reading.record, reading.summary);
         record.name = escaped(&record.name).into_owned();
@@ -64,7 +64,7 @@ impl ReadInputs {
     }
 }
 
-/// What an input did in a gap nobody knows.
+/// The input inside a gap is not known.
 fn check_whole(path: &Path, record: &Record) -> Result<(), Error> {
     let clock = Clock::of([record]);
     const MEND: &str =
@@ -95,13 +95,13 @@ fn check_whole(path: &Path, record: &Record) -> Result<(), Error> {
     Ok(())
 }
 
-/// Whether some output was measured.
+/// Whether some output has readings.
 pub(crate) fn begins_with_readings(record: &Record) -> bool {
     let has = |output: &Channel| output.missing() < output.values.len();
     record.outputs.iter().any(has)
 }
 
-/// A record up to where the last of its outputs has so many readings, without what the others have beyond theirs.
+/// A record up to the row where each of its outputs has this number of readings, without further readings.
 pub(crate) fn first_readings(record: &Record, count: usize) -> Record {
     let end = |output: &Channel| {
         let present = output.values.iter().enumerate();

@@ -2,7 +2,7 @@
 //!
 //! | what | where |
 //! |---|---|
-//! | a model of the user's own | `own_model/simulate.rs` |
+//! | a user's own model | `own_model/simulate.rs` |
 //! | one of the plants | `plant.rs` |
 //! | the inputs, read and checked | `inputs.rs` |
 //! | what a person reads | `text.rs` |
@@ -30,37 +30,37 @@ pub(crate) use self::text::said;
 pub use self::time_column::TimeColumn;
 use crate::output::Found;
 
-/// The band holds with this probability.
+/// Coverage of the band.
 pub(crate) const LEVEL: f64 = 0.95;
-/// Initial states are fitted to so many first readings of each output, as those of a held-out record are.
+/// Number of first readings of each output for the fit of initial states, as for a held-out record.
 pub(crate) const FIRST_READINGS: usize = 5;
 
 /// Half the widths of the bands of an output \[its unit\].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Band {
-    /// Of the model's output, from the uncertainty of parameters and initial states, row by row.
+    /// Standard error of the model's output from the uncertainty of parameters and initial states, row by row.
     pub output: Vec<f64>,
-    /// Of a reading, whose noise comes to that.
+    /// Standard error of a reading: the model's output and the noise.
     pub reading: Vec<f64>,
 }
 
 /// A simulated output.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SimulatedOutput {
-    /// The column that holds it where it is measured, without its unit.
+    /// Column of the measured signal, without its unit.
     pub name: String,
-    /// Its unit; empty where nobody says.
+    /// Unit; empty if not known.
     pub unit: String,
     /// Row by row.
     pub mean: Vec<f64>,
-    /// Where the model was fitted, and the records determine its parameters.
+    /// Band; only if the model was fitted and the records determine its parameters.
     pub band: Option<Band>,
-    /// What was measured, NaN where nothing was.
+    /// Measured values, NaN if missing.
     #[serde(skip)]
     pub measured: Vec<f64>,
 }
 
-/// Where an initial state comes from.
+/// Source of an initial state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StateSource {
@@ -68,11 +68,11 @@ pub enum StateSource {
     Readings,
     /// The model's text.
     Text,
-    /// The plant rests under the first inputs.
+    /// Steady state of the plant under the first inputs.
     Rest,
 }
 
-/// What `ctid simulate` finds.
+/// Result of `ctid simulate`.
 #[derive(Debug, Serialize)]
 pub struct Simulated {
     /// Version of this layout.
@@ -81,32 +81,32 @@ pub struct Simulated {
     pub model: String,
     /// The record of its inputs.
     pub inputs: String,
-    /// The records that it was fitted to; none where its values stand in its text.
+    /// The records of the fit; empty if the values come from the text.
     pub fitted_to: Vec<String>,
     /// The parameters' names, values and standard errors.
     pub parameters: Vec<(String, f64, Option<f64>)>,
     /// The initial states' names and values.
     pub states: Vec<(String, f64)>,
-    /// Where they come from.
+    /// Source of the initial states.
     pub states_from: StateSource,
-    /// The probability with which each band holds.
+    /// Coverage of each band.
     pub level: f64,
     /// The outputs, in the order of the model.
     pub outputs: Vec<SimulatedOutput>,
-    /// What should be known before it is used.
+    /// Warnings about the use of the simulation.
     pub warnings: Vec<String>,
     /// Length of the record \[s\].
     #[serde(skip)]
     pub length: f64,
-    /// When each row is.
+    /// Time of each row.
     pub time: TimeColumn,
-    /// The bands of readings are written too.
+    /// Whether the bands of readings are written too.
     #[serde(skip)]
     pub readings: bool,
 }
 
 impl Band {
-    /// Of one output, from the standard errors of its mean.
+    /// Band of one output, from the standard errors of its mean.
     pub fn of(errors: &[f64], known: &FitUncertainty, output: usize, level: f64) -> Self {
         let quantile = known.quantile(level);
         let noise = known.reading[output];
@@ -132,14 +132,14 @@ pub(crate) fn header(name: &str, unit: &str) -> String {
 pub(crate) fn csv_text(rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
-        // Into memory nothing fails.
+        // Writing to memory does not fail.
         let _ = writer.write_record(&row);
     }
     let bytes = writer.into_inner().unwrap_or_default();
     String::from_utf8(bytes).unwrap_or_default()
 }
 
-/// A number as a cell; nothing where there is none.
+/// A number as a cell; empty for NaN.
 pub(crate) fn cell(value: f64) -> String {
     if value.is_nan() {
         String::new()

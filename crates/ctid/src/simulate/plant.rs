@@ -1,4 +1,4 @@
-//! One of the plants on new inputs.
+//! Simulation of a built-in plant with new inputs.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::Error;
 use crate::input::{self, Files};
 use crate::model_file::ModelFile;
 
-/// What the fit of initial levels is taken to.
+/// Stopping criteria of the fit of initial levels.
 const STOPPING: Stopping = Stopping {
     evaluations: 60,
     cost: 1e-10,
@@ -26,7 +26,7 @@ const STOPPING: Stopping = Stopping {
 /// Fits a plant with its effects to records, and simulates it on the inputs of another.
 ///
 /// # Errors
-/// One line that names the file, the place and the mend.
+/// One line that names the file, the place and the correction.
 pub(crate) fn simulate(
     model: ModelFile,
     files: &Files,
@@ -62,8 +62,8 @@ pub(crate) fn simulate(
 }
 
 /// A plant on the inputs of a record, after a fit to the records of a problem. `names`: the columns of its outputs, where they are named;
-/// `path` is what is blamed for the record, whose initial levels are fitted to the `first` readings of each output. `level`: the probability with
-/// which the band holds, within 0 and 1.
+/// `path` is what is named in errors about the record, whose initial levels are fitted to the `first` readings of each output. `level`: the
+/// probability with which the band holds, within 0 and 1.
 ///
 /// # Errors
 /// Where the records do not allow a fit, or the simulation does not go on.
@@ -180,7 +180,7 @@ fn simulated(
     } = fitted;
     let records = std::slice::from_ref(record);
     let mut setup = own.with_records(records).map_err(wrong)?;
-    // A simulation takes no time that a search would miss.
+    // Simulations run without a time limit, because they are short compared with a search.
     (setup.time_limit, setup.interrupt) = (None, None);
     let count = setup.parameter_count();
     let parameters = &fit.x[..count];
@@ -189,7 +189,7 @@ fn simulated(
         .ok_or_else(|| {
             Error::file(
                 path,
-                "the plant comes to no rest under its first inputs, so nothing says where it begins; put the first readings of the output into the file: initial levels are fitted to them",
+                "the plant has no equilibrium under its first inputs, so its initial state is not known; put the first readings of the output into the file: initial levels are fitted to them",
             )
         })?;
     let mut x = parameters.to_vec();
@@ -204,7 +204,7 @@ fn simulated(
         Error::file(
             path,
             format!(
-                "the simulation does not go on behind {at}: a level grows without bound; correct the inputs there, or the model file"
+                "the simulation stops at {at}: a level grows without bound; correct the inputs there, or the model file"
             ),
         )
     };
@@ -232,7 +232,7 @@ fn simulated(
     let mut warnings = Vec::new();
     if lacking {
         warnings.push(
-            "the model leaves more than noise of the records that it is fitted to, and what it lacks is in no band: `ctid diagnose` names it".to_string(),
+            "the residual of the fit is not noise, and the band does not include this model error: `ctid diagnose` shows what is missing".to_string(),
         );
     }
     if states_from == StateSource::Rest && begins_with_readings(record) {
@@ -257,7 +257,8 @@ fn simulated(
     })
 }
 
-/// The initial levels: fitted to the first readings, on more of them where these do not tell, or at rest; `None` where there is no rest.
+/// The initial levels: fitted to the first readings, to more of them if these are not sufficient, or at rest; `None` without a steady
+/// state.
 fn states(
     setup: &Setup,
     parameters: &[f64],

@@ -11,7 +11,7 @@ use crate::model_file::ModelFile;
 use crate::numbers;
 use crate::own_model::{Exported, commented, number};
 
-/// Why a plant cannot be written as Modelica; `None` where it can.
+/// Reason why a plant cannot be written as Modelica; `None` if it can.
 pub(crate) fn no_text(model: &ModelFile) -> Option<&'static str> {
     let known = model.known.outputs(model.plant);
     if !model.effects.is_empty() || !model.terms.is_empty() {
@@ -63,7 +63,7 @@ fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> 
 /// Fits a plant with its effects to records.
 ///
 /// # Errors
-/// One line that names the file, the place and the mend.
+/// One line that names the file, the place and the correction.
 pub(crate) fn export(
     model: ModelFile,
     files: &Files,

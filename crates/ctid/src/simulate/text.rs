@@ -1,4 +1,4 @@
-//! What a person reads of a simulation.
+//! Text output of a simulation.
 
 use super::{Simulated, SimulatedOutput, StateSource, header};
 use crate::look::{Look, Side, table};

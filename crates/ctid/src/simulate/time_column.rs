@@ -1,4 +1,4 @@
-//! The time of rows as a file writes it that reads back as the same.
+//! Times of rows in the format of a file, which reads back identically.
 
 use std::path::Path;
 
@@ -10,15 +10,14 @@ use crate::Error;
 /// A column of times.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct TimeColumn {
-    /// Its header.
+    /// Header of the column.
     pub header: String,
-    /// Its cells.
+    /// Cells of the column.
     pub cells: Vec<String>,
 }
 
 impl TimeColumn {
-    /// The times of a record that was read from a file with such columns: dates with their offset from UTC, or numbers in the unit of the
-    /// column.
+    /// The times of a record that was read with these columns: dates with their offset from UTC, or numbers in the unit of the column.
     ///
     /// # Errors
     /// Where the file cannot be read any more.
@@ -49,7 +48,7 @@ impl TimeColumn {
             });
         }
         let number = |time: &f64| {
-            // Without the last digits, which are an accident of the conversion.
+            // Rounds off the last digits, which are rounding errors of the conversion.
             let value = time / seconds;
             let value = format!("{value:.12e}").parse().unwrap_or(value);
             format!("{value}")

@@ -97,7 +97,7 @@ pub(crate) fn paper_mark(cell: &Cell) -> &'static str {
     }
 }
 
-/// How many of the printed figures lie inside the bands, and which do not.
+/// Number of printed figures inside the bands, and the others by name.
 pub(crate) fn printed_inside_bands(study: &Study) -> String {
     let of = study.printed().count();
     let outside: Vec<String> = study
@@ -124,7 +124,7 @@ pub(crate) fn printed_inside_bands(study: &Study) -> String {
     sentence + "."
 }
 
-/// Numbers below this are written in powers of ten.
+/// Numbers below this are written as powers of ten.
 const SMALL: f64 = 0.01;
 
 /// The figure of the runs, to the second digit of its standard deviation.
@@ -136,7 +136,7 @@ pub(crate) fn figure_of(cell: &Cell) -> String {
     numbers::decimals(cell.mean, places.min(MOST_DECIMALS))
 }
 
-/// More decimals are not read, however small the standard deviation is.
+/// Largest number of decimals, however small the standard deviation is.
 const MOST_DECIMALS: i32 = 4;
 
 /// The ends of the band, `> 7.5` where it is open above; empty without a band.
@@ -169,7 +169,7 @@ fn short(number: &str) -> String {
 fn summary(study: &Study, look: Look) -> String {
     let Study { inside, of, .. } = study;
     let verdict = look.strong(format!(
-        "{inside} of {of} figures of the runs inside the bands of a reproduction"
+        "{inside} of {of} figures of the runs inside the bands"
     ));
     let mut text = format!("{verdict}\n");
     text += &look.paragraph("  ", &printed_inside_bands(study));
@@ -183,7 +183,7 @@ fn summary(study: &Study, look: Look) -> String {
     text
 }
 
-/// Sentences on what the cells do not show: iterations, the tangent, the printed controller, figures that are not reproduced.
+/// Sentences on results that the cells do not show: iterations, the tangent, the printed controller, figures that are not reproduced.
 pub(crate) fn notes(study: &Study) -> Vec<String> {
     let mean = |counts: &[usize]| {
         let mean = counts.iter().sum::<usize>() as f64 / counts.len().max(1) as f64;
@@ -267,7 +267,7 @@ fn not_reproduced(study: &Study) -> Option<String> {
 /// A ratio of more than this, or less than its inverse, is another order of magnitude.
 const FAR: f64 = 10.0;
 
-/// A difference of more than this many standard deviations is not taken for chance.
+/// A difference above this number of standard deviations is significant.
 const CHANCE: f64 = 3.0;
 
 fn figure(study: &Study, look: Look) -> String {

@@ -1,4 +1,4 @@
-//! `ctid tables` for a person: the results of the crate `paper-tables` as text, and as files.
+//! `ctid tables`: the results of the crate `paper-tables` as text, and as files.
 
 pub(crate) mod baysse_text;
 pub(crate) mod progress;

@@ -1,9 +1,9 @@
-//! The progress of `ctid tables`, as the bar shows it.
+//! The progress of `ctid tables` for the progress bar.
 
 use missing_effect::Progress;
 use paper_tables::Stage;
 
-/// As the bar takes it.
+/// Progress in the units of the bar.
 pub(crate) fn for_bar(progress: paper_tables::Progress) -> Progress {
     let paper_tables::Progress { stage, done, total } = progress;
     Progress {

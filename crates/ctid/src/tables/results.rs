@@ -34,5 +34,5 @@ pub(crate) struct Studies {
     pub(crate) baysse: baysse::Study,
 }
 
-/// Each paper has a page of its own; the program refuses to write one for both.
+/// Each paper has a separate page; the program refuses to write one page for both.
 impl Found for Studies {}

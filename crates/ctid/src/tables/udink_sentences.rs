@@ -7,18 +7,18 @@ use crate::numbers;
 /// Title of the differences between tables.
 pub(crate) const CONTRASTS: &str = "Differences between tables, run by run";
 
-/// What the differences tell.
-pub(crate) const CONTRASTS_MEANING: &str = "By Euler's rule. Two tables with one noise differ by their settings alone: that their cells lie inside one \
-     by one does not say that their differences do.";
+/// Meaning of the differences.
+pub(crate) const CONTRASTS_MEANING: &str = "By Euler's rule. Two tables with the same noise differ by their settings alone: their cells \
+     can lie inside one by one while their differences do not.";
 
 /// Title of the runs with other settings.
-pub(crate) const OTHER_SETTINGS: &str = "What the comparison would not notice";
+pub(crate) const OTHER_SETTINGS: &str = "Changes that the comparison would not detect";
 
 /// Title of the constant gains.
 pub(crate) const CONSTANT_GAINS: &str =
     "Constant gains: that of table 4, and the diagonal one that the paper found slow";
 
-/// What can be said of the paper's tables, cell by cell.
+/// Verdict on the paper's tables, cell by cell.
 pub(crate) fn verdict(study: &Study) -> &'static str {
     match study.verdict() {
         Verdict::Consistent => "cell by cell statistically consistent",
@@ -29,7 +29,7 @@ pub(crate) fn verdict(study: &Study) -> &'static str {
     }
 }
 
-/// What the verdict on the cells leaves out: the differences of the two tables that have one noise.
+/// Addition to the verdict on the cells: the differences of the two tables with the same noise.
 pub(crate) fn beside_the_verdict(study: &Study) -> String {
     let sentence = |contrast: &Contrast| {
         let [first, second] = contrast.between;
@@ -43,7 +43,7 @@ pub(crate) fn beside_the_verdict(study: &Study) -> String {
     study.contrasts.first().map(sentence).unwrap_or_default()
 }
 
-/// How many of the differences lie inside, and what is known of the noises.
+/// Number of differences inside their range, and the relation of the noises.
 pub(crate) fn contrast(contrast: &Contrast) -> String {
     let [first, second] = contrast.between;
     format!(
@@ -54,17 +54,17 @@ pub(crate) fn contrast(contrast: &Contrast) -> String {
     )
 }
 
-/// How many of the other settings the comparison does not notice.
+/// Number of other settings that the comparison cannot detect.
 pub(crate) fn other_settings(changed: &[Changed]) -> String {
     let unnoticed = changed.iter().filter(|changed| !changed.noticed).count();
     format!(
-        "The tables by Euler's rule with one setting changed: {unnoticed} of {} changes leave the tables \"consistent\", cell by cell. So \
-         much remains open after the comparison.",
+        "The tables by Euler's rule with one setting changed: {unnoticed} of {} changes leave the tables \"consistent\", cell by cell. The comparison cannot exclude \
+         these changes.",
         changed.len()
     )
 }
 
-/// The 5 to 95 % range, both ends with the decimals that its width deserves: of 20 to 200 last digits.
+/// The 5 to 95 % range, both ends with decimals according to its width: 20 to 200 units of the last digit.
 pub(crate) fn range(cell: &Cell, between: &str) -> String {
     let width = cell.q95 - cell.q05;
     if !width.is_finite() {
@@ -75,7 +75,7 @@ pub(crate) fn range(cell: &Cell, between: &str) -> String {
     format!("{low}{between}{high}")
 }
 
-/// The factor of `P(0)` as a person writes it.
+/// The factor of `P(0)` for display.
 pub(crate) fn factor(row: &LargerP) -> String {
     if row.factor < 1e6 {
         format!("{}", row.factor)

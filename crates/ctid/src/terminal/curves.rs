@@ -1,4 +1,4 @@
-//! The plots: measurement and model over time, and what lies between them.
+//! Plots of measurement and model over time, and of the residual.
 
 use console::Style;
 use missing_effect::{Diagnosis, Shown, Step};
@@ -57,14 +57,14 @@ fn in_unit(unit: &str) -> String {
     }
 }
 
-/// `, upper` where there are several outputs.
+/// ` upper` after a comma, if there are several outputs.
 fn of_output(diagnosis: &Diagnosis, output: usize) -> String {
     let name = diagnosis.outputs.get(output);
     let name = name.filter(|_| findings::several(diagnosis));
     name.map_or(String::new(), |name| format!(", {name}"))
 }
 
-/// The residual of each of these steps over time in the first record, those of an output on one scale.
+/// The residual of each of these steps over time in the first record, those of an output with a common scale.
 pub(crate) fn residuals(diagnosis: &Diagnosis, steps: &[&Step], look: Look) -> String {
     let outputs = 0..diagnosis.outputs.len();
     outputs
@@ -114,7 +114,7 @@ fn residuals_of(diagnosis: &Diagnosis, steps: &[&Step], output: usize, look: Loo
     text
 }
 
-/// The first record, with what was measured and simulated of this output.
+/// The first record, with the measured and simulated values of this output.
 fn first_record<'a>(
     diagnosis: &'a Diagnosis,
     step: &'a Step,

@@ -1,4 +1,4 @@
-//! How the error falls from step to step.
+//! Fall of the error from step to step.
 
 use missing_effect::Diagnosis;
 
@@ -6,9 +6,9 @@ use super::{BAR, compared, model_name, step_name, with_unit};
 use crate::look::{Look, Side, table};
 use crate::{findings, numbers};
 
-/// The error from step to step: of each output, and where there are several of all together.
+/// The error from step to step: for each output and, if there are several, for all together.
 pub(crate) fn trail(diagnosis: &Diagnosis, look: Look) -> String {
-    // One model's residual does not tell its noise from its faults.
+    // The residual of a single model does not separate its noise from its model error.
     let floor_known = !compared(diagnosis);
     let several = findings::several(diagnosis);
     let mut text = String::new();
@@ -63,19 +63,19 @@ struct Errors<'a> {
     title: &'a str,
     of_steps: Vec<(f64, Option<f64>)>,
     floor: f64,
-    /// The floor is shown.
+    /// Whether the floor is shown.
     floor_known: bool,
     unit: &'a str,
 }
 
 impl Errors<'_> {
-    /// With bars, above the noise floor.
+    /// Table with bars above the noise floor.
     fn table(&self, diagnosis: &Diagnosis, look: Look) -> String {
         let held_out = self.of_steps.iter().any(|(_, test)| test.is_some());
         let fitted = self.of_steps.iter().map(|(rmse, _)| Some(*rmse));
         let fitted: Vec<Option<f64>> = fitted.chain([Some(self.floor)]).collect();
         let scored = self.of_steps.iter().map(|(_, test)| *test);
-        // One number of decimals for both, so that they can be compared at a glance.
+        // The same number of decimals for both columns, so that they are easy to compare.
         let all: Vec<Option<f64>> = fitted.iter().copied().chain(scored).collect();
         let numbers = numbers::column(&all);
         let (fitted_text, scored_text) = numbers.split_at(fitted.len());
@@ -127,7 +127,7 @@ impl Errors<'_> {
     }
 }
 
-/// What the error on held-out data is made of, of the first and the last model.
+/// Parts of the error on held-out data, for the first and the last model.
 fn held_out_errors(diagnosis: &Diagnosis, look: Look) -> String {
     let last = diagnosis.steps.len().saturating_sub(1);
     let mut text = String::new();

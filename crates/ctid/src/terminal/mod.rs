@@ -1,4 +1,4 @@
-//! What a person reads in the terminal; all of it is derived from the [`Diagnosis`] that `--json` writes.
+//! Text output for the terminal; it is derived from the [`Diagnosis`] that `--json` writes.
 
 mod curves;
 mod errors;
@@ -14,7 +14,7 @@ use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot;
 
-/// How many findings say where a model fails.
+/// Number of findings about where a model fails.
 const FAILURES: usize = 5;
 const BAR: usize = 20;
 
@@ -56,7 +56,7 @@ pub fn diagnosis(diagnosis: &Diagnosis, look: Look) -> String {
     text + &groups(diagnosis, look) + &findings(diagnosis, look)
 }
 
-/// What was looked at.
+/// Analysed plant and records.
 pub(crate) fn header(diagnosis: &Diagnosis, look: Look) -> String {
     // The readings of all outputs are counted.
     let several = findings::several(diagnosis);
@@ -79,7 +79,7 @@ pub(crate) fn header(diagnosis: &Diagnosis, look: Look) -> String {
                 &diagnosis.input_unit,
             ),
         ];
-        // Further outputs stand below the first.
+        // Further outputs are listed below the first.
         for (name, output) in diagnosis.outputs.iter().zip(&record.outputs) {
             let range = range(output, &diagnosis.output_unit);
             row.resize(heading.len() - 1, String::new());
@@ -138,7 +138,7 @@ fn step_name(diagnosis: &Diagnosis, step: &Step) -> String {
     }
 }
 
-/// The whole model of a step, in few words.
+/// The complete model of a step, in few words.
 fn model_name(diagnosis: &Diagnosis, step: &Step) -> String {
     let added = diagnosis
         .steps
@@ -161,7 +161,7 @@ fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
 }
 
-/// Where a model fails, in words, output by output.
+/// Sentences about where a model fails, output by output.
 pub(crate) fn failures(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
     let outputs = step.outputs.iter();
     outputs
@@ -173,7 +173,7 @@ fn failures_of(diagnosis: &Diagnosis, step: &Step, output: &OutputStep, look: Lo
     let name = step_name(diagnosis, step);
     let title = match diagnosis.verdict {
         Verdict::Adequate if !compared(diagnosis) => {
-            format!("What is left in the residual of {name}")
+            format!("Tests of the residual of {name}")
         }
         _ => format!("Where {name} fails"),
     };
@@ -194,7 +194,7 @@ fn failures_of(diagnosis: &Diagnosis, step: &Step, output: &OutputStep, look: Lo
     text
 }
 
-/// What the residual tests say.
+/// Sentences about the residual tests.
 fn residual_tests(tests: &ResidualTests) -> String {
     let p = |p: f64| {
         if p < 0.001 {
@@ -204,20 +204,17 @@ fn residual_tests(tests: &ResidualTests) -> String {
         }
     };
     let input = match tests.input_p {
-        value if value.is_nan() => "the input was not looked for in the residual".to_string(),
-        value if value < 0.01 => format!("the input is still seen in the residual ({})", p(value)),
+        value if value.is_nan() => "the residual was not tested for the input".to_string(),
+        value if value < 0.01 => format!("the residual depends on the input ({})", p(value)),
         value => format!(
-            "no linear trace of the input is left in the residual ({})",
+            "the residual has no significant linear dependence on the input ({})",
             p(value)
         ),
     };
     let white = match tests.whiteness_p {
         value if value.is_nan() => "its whiteness was not tested".to_string(),
         value if value < 0.01 => format!("it is not white noise (Ljung-Box {})", p(value)),
-        value => format!(
-            "it cannot be told from white noise (Ljung-Box {})",
-            p(value)
-        ),
+        value => format!("it is consistent with white noise (Ljung-Box {})", p(value)),
     };
     format!("{input}; {white}")
 }
@@ -256,7 +253,10 @@ pub(crate) fn parameters(diagnosis: &Diagnosis, step: &Step, look: Look) -> Stri
         text += &format!(
             "  {}\n",
             look.faint(match step.starts_agree {
-                0 => format!("none of {} starts around it came as low", step.starts),
+                0 => format!(
+                    "none of {} starts around it reached an equally low minimum",
+                    step.starts
+                ),
                 agree => format!("{agree} of {} starts ended in this minimum", step.starts),
             })
         );
@@ -265,7 +265,7 @@ pub(crate) fn parameters(diagnosis: &Diagnosis, step: &Step, look: Look) -> Stri
     text
 }
 
-/// What cannot be told apart on these data.
+/// Effects that these data cannot distinguish.
 pub(crate) fn groups(diagnosis: &Diagnosis, look: Look) -> String {
     let mut lines = String::new();
     for (effect, group) in diagnosis.effects.iter().zip(&diagnosis.groups) {
@@ -316,7 +316,7 @@ fn rankings(diagnosis: &Diagnosis, look: Look) -> String {
     text
 }
 
-/// Nothing was scored: a comparison.
+/// Whether no effect was scored: a comparison.
 fn compared(diagnosis: &Diagnosis) -> bool {
     diagnosis.scores.is_empty() && diagnosis.steps.len() < 2
 }
@@ -340,7 +340,7 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
             look.warning(look.paragraph("", &part).trim_end())
         }
         Verdict::Unexplained => {
-            look.warning("What is left is not noise, and no effect of the catalogue explains it")
+            look.warning("The residual is not noise, and no effect of the catalogue explains it")
         }
     };
     let mut text = format!("{headline}\n");

@@ -1,4 +1,4 @@
-//! The catalogue, one effect at a time, as wide as the terminal allows.
+//! The catalogue, one effect at a time, for the width of the terminal.
 
 use missing_effect::{Diagnosis, Parameter, Score, Verdict};
 
@@ -6,7 +6,7 @@ use super::{placed, with_unit};
 use crate::look::{Look, Side, table};
 use crate::{findings, numbers};
 
-/// How many effects the ranking shows.
+/// Number of effects in the ranking.
 const RANKED: usize = 8;
 
 /// The columns of the ranking, in order.
@@ -27,8 +27,8 @@ pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
     if diagnosis.scores.is_empty() {
         return String::new();
     }
-    // As much as the width takes. The verdict refers to what would have been visible: sizes go before it. What an effect does
-    // to the error goes last.
+    // As many columns as the width allows. The minimum detectable sizes come first, because the verdict refers to them. The change of the
+    // error comes last.
     let variants: [&[Ranked]; 7] = [
         &[Place, Effect, Gain, Error, Size, Visible],
         &[Place, Effect, Gain, Error, SizeAlone, Visible],
@@ -50,7 +50,7 @@ pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
         .unwrap_or(&tables[6]);
 
     let title = match diagnosis.verdict {
-        Verdict::Adequate => "The catalogue, one effect at a time: none is called for",
+        Verdict::Adequate => "The catalogue, one effect at a time: none is needed",
         _ => "The catalogue, one effect at a time, refitted: simulation error on fitted data",
     };
     let mut text = format!("{}\n", look.heading(title));
@@ -120,7 +120,7 @@ fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<S
     table(&sides, &rows)
 }
 
-/// `rim 21.30 ± 0.12 cm`, or without the error, to the digits that it leaves.
+/// `rim 21.30 ± 0.12 cm`, or without the error, with the significant digits.
 fn size(parameter: &Parameter, with_error: bool) -> String {
     let name = parameter.name.rsplit('.').next().unwrap_or_default();
     let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
@@ -131,7 +131,7 @@ fn size(parameter: &Parameter, with_error: bool) -> String {
     format!("{name} {}", with_unit(&value, &parameter.unit))
 }
 
-/// The smallest size that the data would have shown.
+/// The minimum detectable size.
 fn visible_from(score: &Score) -> String {
     match (score.smallest_visible, &score.size) {
         (Some(smallest), Some(size)) => with_unit(&numbers::significant(smallest, 2), &size.unit),

@@ -1,4 +1,4 @@
-//! What is told of partial answers, of several outputs, and of what is not known.
+//! Output for partial explanations, several outputs, and unknown values.
 
 use super::*;
 use crate::report::sample;

@@ -1,4 +1,4 @@
-//! `ctid check` from the program's outside.
+//! `ctid check` through the program.
 
 use std::path::Path;
 

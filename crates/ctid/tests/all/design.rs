@@ -1,10 +1,10 @@
-//! `ctid design` from the program's outside: what it proposes, what it writes, and what it refuses.
+//! `ctid design` through the program: its proposals, files and errors.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use crate::common::{Place, Tanks};
 
-/// A tank whose reading lags: or its pump.
+/// A tank with a lag of the reading, or of the pump.
 fn lagging() -> Place {
     let tanks = Tanks {
         hidden: vec![("sensor_lag", 0, vec![8.0])],
@@ -45,7 +45,7 @@ fn an_undecided_verdict_points_to_the_experiment_that_is_then_written() {
     for alternative in found["between"].as_array().unwrap() {
         assert!(between.contains(alternative["effect"].as_str().unwrap()));
     }
-    // What is printed is what is written.
+    // The printed result equals the written one.
     let best = &found["candidates"][0];
     let power = best["power"]["power"].as_f64().unwrap();
     assert_eq!(best["refitted"], true);
@@ -63,7 +63,7 @@ fn an_undecided_verdict_points_to_the_experiment_that_is_then_written() {
     let series = found["experiment"]["values"].as_array().unwrap();
     assert_eq!(series.len(), applied.len());
 
-    // Nothing is overwritten, and the same question has the same answer.
+    // No file is overwritten, and the same request has the same result.
     let before = place.read("next.csv");
     place.succeeds(&words);
     assert_eq!(place.read("next.csv"), before);
@@ -139,7 +139,7 @@ fn of_two_tanks_the_places_can_be_named() {
     let found = place.json("d.json");
     assert_eq!(found["between"][0]["place"], "upper");
     assert_eq!(found["between"][1]["place"], "lower");
-    // The other level measured too shows where the water goes.
+    // With the other level measured too, the place of the loss is determined.
     let second = &found["second_sensor"];
     let power = |of: &str| second[of]["power"].as_f64().unwrap();
     assert_eq!(second["level"], "level_upper");

@@ -7,7 +7,7 @@ use crate::common::{Place, Random};
 
 const PLANT: &str = "plant = \"first-order\"\n";
 
-/// A block that is heated, and a heater that cuts out at 75: `tau dT/dt = K u - T`, `T` above the room, read with noise.
+/// A heated block, and a heater that cuts out at 75: `tau dT/dt = K u - T`, `T` above the room, read with noise.
 fn heated_block(unit: &str) -> String {
     const ROWS: usize = 400;
     let mut random = Random(7);
@@ -31,7 +31,7 @@ fn model(unit: &str) -> String {
     format!("{PLANT}[columns]\noutput = \"T [{unit}]\"\n")
 }
 
-/// Identifiers of the effects that a diagnosis names anywhere.
+/// Identifiers of all effects in a diagnosis.
 fn named(result: &Value) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
     let list = |value: &Value| -> Vec<String> {
@@ -49,7 +49,7 @@ fn named(result: &Value) -> Vec<String> {
     all
 }
 
-/// Words of tanks in a text, the identifiers of effects and parameters aside.
+/// Words about tanks in a text, without the identifiers of effects and parameters.
 fn words_of_tanks(text: &str) -> Vec<String> {
     let plain = text.to_lowercase().replace("level(0)", "");
     let plain = CATALOGUE
@@ -73,7 +73,7 @@ fn a_heated_block_is_offered_general_effects_only() {
         let offered = Domain::General.offers(effect);
         assert!(offered || named.iter().all(|id| id != effect.id), "{text}");
     }
-    // What there is to offer is scored.
+    // The available effects are scored.
     for id in ["sensor_saturation", "pump_saturation", "const_leak"] {
         assert!(named.iter().any(|known| known == id), "{named:?}");
     }

@@ -1,4 +1,4 @@
-//! How long a search may take, and how it is ended earlier.
+//! Time limits of a search, and its interruption.
 
 use crate::common::{Place, Tanks};
 
@@ -17,7 +17,7 @@ fn the_limit_is_chosen_and_written() {
     );
 }
 
-/// What the records cannot tell, and what their time stamps say, stands first.
+/// Warnings about the records and their time stamps come first.
 #[test]
 fn what_is_known_of_the_records_beforehand_is_said() {
     let place = Place::new();
@@ -50,7 +50,7 @@ fn what_is_known_of_the_records_beforehand_is_said() {
     assert!(said("step.csv").starts_with(warning));
 }
 
-/// The first interrupt asks for the best so far, the second ends the program at once.
+/// The first interrupt gives the best result so far, the second one ends the program at once.
 #[test]
 #[cfg(unix)]
 fn a_second_interrupt_ends_it_at_once() {
@@ -75,7 +75,7 @@ fn a_second_interrupt_ends_it_at_once() {
             .status();
         assert!(sent.unwrap().success());
     };
-    // It has read the record by then, and searches for far longer.
+    // The program has read the record by then, and its search takes far longer.
     std::thread::sleep(std::time::Duration::from_millis(1500));
     interrupt(child.id());
     let mut said = String::new();

@@ -1,4 +1,4 @@
-//! Identification from a record: what is found, how sure it is, and what is refused.
+//! Identification from a record: results, uncertainty, and errors.
 
 #![allow(clippy::unwrap_used)]
 
@@ -156,7 +156,7 @@ fn units_and_dynamics_are_those_of_the_record() {
     );
 }
 
-/// Standard errors against the scatter over noises, and 1.96 of them against the truth.
+/// Standard errors compared with the spread over noises, and 1.96 of them with the truth.
 #[test]
 fn the_output_error_says_how_sure_it_is() {
     const NOISES: u64 = 60;
@@ -218,7 +218,7 @@ fn steps_longer_than_the_time_constant_do_not_become_it() {
             .any(|w| w.contains("below the longest step"));
         (found.parameters[0].value, told)
     };
-    // What is left is the output's way between samples, which is not a line: said where it is the larger error.
+    // The remaining error comes from the output between samples, which is not linear: a warning is given if it is the larger error.
     let (short, told) = time_constant(|k| if k % 2 == 0 { 0.5 } else { 1.5 });
     assert!((short - 20.0).abs() < 0.2 && !told, "{short}");
     let (turns, told) = time_constant(|k| if k % 2 == 0 { 5.0 } else { 25.0 });
@@ -284,7 +284,7 @@ fn an_order_too_high_is_said() {
 
 #[test]
 fn drift_with_the_operating_point_leaves_the_band() {
-    // The gain doubles half way: the estimates before and after exclude each other.
+    // The gain doubles half way: the estimates before and after differ significantly.
     let plant = Plant {
         noise: 0.1,
         ..FIRST
@@ -302,7 +302,7 @@ fn drift_with_the_operating_point_leaves_the_band() {
     assert!(low + 3.0 * low_error < high - 3.0 * high_error);
 }
 
-/// A tank by Torricelli's law, `20 y' = 8 u - 2 sqrt(y)`, or what it is near `y = 16`; the input wanders, with steps on it.
+/// A tank with Torricelli's law, `20 y' = 8 u - 2 sqrt(y)`, or its linearisation near `y = 16`; the input drifts, with steps added.
 fn wandering(linear: bool, seed: u64) -> Record {
     let (rows, fine) = (12_000, 5);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -350,7 +350,7 @@ fn drift_with_the_level_is_told_of_a_tank_and_not_of_a_linear_process() {
     assert!(tank.gain.difference > 3.0, "{tank:?}");
     assert!(tank.gain.moves());
     assert!(tank.level.is_sorted());
-    // By the law the gain goes with the root of the level, here by 1.9; the recursion's memory flattens that.
+    // By Torricelli's law the gain is proportional to the root of the level, here a ratio of 1.9; the recursion's memory reduces the ratio.
     let [low, high] = [0, tank.level.len() - 1].map(|i| tank.gain.values[i]);
     assert!((1.3..2.2).contains(&(high / low)), "{tank:?}");
 

@@ -1,4 +1,4 @@
-//! Identification in a loop: what is found, and what is refused.
+//! Identification in a loop: results and errors.
 
 #![allow(clippy::unwrap_used)]
 
@@ -25,7 +25,7 @@ fn first_order() -> PlantModel {
     PlantModel::first_order(6.0, 110.0).unwrap()
 }
 
-/// A loop that rests for a minute, then moves; levels of a tank. Noise circulates, in dB, or there is none.
+/// A loop that rests for a minute and then changes; levels of a tank. Noise is fed back, in dB, or there is none.
 fn record(plant: &PlantModel, controller: &Controller, snr: Option<f64>, seed: u64) -> Record {
     with_bits(30, plant, controller, snr, seed)
 }
@@ -85,7 +85,7 @@ fn without_noise_the_plant_is_found_in_the_loop_and_without() {
             let record = record(&plant, &controller, None, 0);
             for method in METHODS {
                 let found = found(&record, method, order, LevelChoice::Auto);
-                // A regression on u that is no line between samples is a little off.
+                // A regression on an input that is not linear between samples has a small error.
                 let close = match method {
                     Method::Fcloe => 1e-6,
                     _ => 0.02,
@@ -176,7 +176,7 @@ fn cut(record: &Record, rows: usize) -> Record {
     cut
 }
 
-/// The drive stands still for the first rows of each of these, and the loop moves.
+/// The drive is constant for the first rows of each of these, and the loop moves.
 #[test]
 fn a_slow_transient_is_no_rest() {
     let order = Order { n: 1, m: 0 };
@@ -194,7 +194,7 @@ fn a_slow_transient_is_no_rest() {
                     found.warnings.iter().any(said),
                     in_loop.levels_from == LevelChoice::Mean
                 );
-                // Means still bias the regressions; levels that were taken for rest gave 74 s.
+                // Means still bias the regressions; levels that were mistaken for rest gave 74 s.
                 let near = match method {
                     Method::RecursiveFcloe => 0.02,
                     _ => 0.1,
@@ -203,7 +203,7 @@ fn a_slow_transient_is_no_rest() {
                 assert!((tau / 110.0 - 1.0).abs() < near, "{rows} {method:?}: {tau}");
             }
         }
-        // Without a controller too, where nothing says at which output the input is at rest.
+        // Also without a controller, where the output for a resting input is unknown.
         let whole = self::record(&first_order(), &Controller::none(), None, 1);
         for rows in [0, 75, 400, 1000] {
             let found = found(&cut(&whole, rows), Method::Iv, order, LevelChoice::Auto);
@@ -213,7 +213,7 @@ fn a_slow_transient_is_no_rest() {
     }
 }
 
-/// Means of the record are those of all of it, also for a recursion that is started from its beginning.
+/// Means are those of the whole record, also for a recursion that starts at its beginning.
 #[test]
 fn the_levels_are_the_same_for_both() {
     let order = Order { n: 1, m: 0 };
@@ -263,7 +263,7 @@ fn drifting(from: f64, to: f64, rows: usize) -> Record {
     }
 }
 
-/// A drift is followed with a delay of a memory, without asking for it; what is asked for is used.
+/// By default a drift is followed with a delay of one memory; a requested memory is used.
 #[test]
 fn a_recursion_follows_a_drift() {
     let (rows, from, to) = (12_000, 110.0, 143.0);
@@ -287,7 +287,7 @@ fn a_recursion_follows_a_drift() {
     }
 }
 
-/// Where one model of the whole record simulates it much better than the one of its end.
+/// If one model of the whole record simulates it much better than the final model.
 #[test]
 fn no_condition_is_told_of_estimates_that_are_not_the_record_s() {
     let request = Request {
@@ -296,7 +296,7 @@ fn no_condition_is_told_of_estimates_that_are_not_the_record_s() {
         ..Request::new(Method::RecursiveFcloe, Order { n: 1, m: 0 })
     };
     let found = identify(&drifting(60.0, 240.0, 6000), &request).unwrap();
-    let said = |w: &String| w.contains("the plant drifts, or the recursion went astray");
+    let said = |w: &String| w.contains("the plant drifts, or the recursion diverged");
     assert!(
         found.warnings.iter().any(said),
         "{:?} {} {:?}",
@@ -307,7 +307,7 @@ fn no_condition_is_told_of_estimates_that_are_not_the_record_s() {
     assert!(found.in_loop.unwrap().convergence.is_none());
 }
 
-/// No verdict on the estimates of a recursion that went astray: here it rests by order where nothing is at rest.
+/// No verdict on the estimates of a recursion that diverged: here the option declares rest although the loop is not at rest.
 #[test]
 fn no_condition_is_told_of_estimates_that_are_wrong() {
     let order = Order { n: 1, m: 0 };

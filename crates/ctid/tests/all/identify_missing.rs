@@ -1,5 +1,5 @@
-//! Records in which readings of the output are missing, or rows: what each method finds in them, and what is refused. `RECORDS=400` runs more
-//! records than a test needs.
+//! Records with missing readings or rows of the output: results of each method, and errors. `RECORDS=400` runs more records than a test
+//! needs.
 
 use crate::common::Place;
 use crate::identify::{Plant, SECOND};
@@ -21,7 +21,7 @@ const NOISY: Plant = Plant {
     ..SECOND
 };
 
-/// Records of each method.
+/// Number of records of each method.
 fn records() -> u64 {
     let asked = std::env::var("RECORDS").ok();
     asked.and_then(|n| n.parse().ok()).unwrap_or(24)
@@ -39,13 +39,13 @@ fn without_some(mut record: Record, seed: u64) -> Record {
     record
 }
 
-/// How sure the estimates of a_1, a_2 and b_0 are, over many records.
+/// Bias and spread of the estimates of a_1, a_2 and b_0 over many records.
 struct Sure {
-    /// Shares of the 95 % intervals that hold the truth.
+    /// Shares of the 95 % intervals that contain the true value.
     covered: Vec<f64>,
     /// Standard errors over the spread of the estimates.
     told: Vec<f64>,
-    /// Mean error in its own standard errors of one record.
+    /// Mean error relative to the standard error of one record.
     bias: Vec<f64>,
 }
 
@@ -60,7 +60,7 @@ fn sure(method: Method, missing: bool) -> Sure {
                 false => record,
             };
             let mut request = Request::new(method, Order { n: 2, m: 0 });
-            // Their standard errors take the levels for exact.
+            // Their standard errors assume exact levels.
             if matches!(method, Method::Iv | Method::RecursiveFcloe) {
                 request.levels = LevelChoice::Zero;
             }
@@ -97,7 +97,7 @@ fn sure(method: Method, missing: bool) -> Sure {
     sure
 }
 
-/// Standard errors are right with all readings and without some of them.
+/// Standard errors are correct with all readings and without some of them.
 fn holds(method: Method) {
     let n = records() as f64;
     for missing in [false, true] {
@@ -132,7 +132,7 @@ fn output_error_is_as_sure_as_it_says() {
     holds(Method::Iv);
 }
 
-/// Recursions are no worse for missing readings than with all of them: the share that their intervals hold the truth in is theirs.
+/// Recursions are not worse with missing readings: the coverage of their intervals is the same.
 #[test]
 fn recursions_are_no_worse_for_missing_readings() {
     let n = records() as f64;
@@ -196,11 +196,11 @@ fn all_methods_side_by_side() {
     assert!(done.count() >= 6);
 }
 
-/// A block of rows is not in the file: the record is cut there, and the parts share the offset.
+/// A block of rows is missing in the file: the record is cut there, and the parts share the offset.
 #[test]
 fn missing_rows() {
     let place = Place::new();
-    // Time constants of 20 and 30 s: through one row the input is held.
+    // Time constants of 20 and 30 s: the input is held over one row.
     let plant = Plant {
         rest: (5.0, 40.0),
         a: &[1.0, 50.0, 600.0],
@@ -234,7 +234,7 @@ fn missing_rows() {
     }
 }
 
-/// A single missing reading moves the estimates by less than their standard errors, and no method needs it.
+/// A single missing reading changes the estimates by less than their standard errors, and no method needs it.
 #[test]
 fn one_missing_reading() {
     let record = NOISY.record(600, 5);

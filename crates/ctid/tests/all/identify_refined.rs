@@ -1,4 +1,4 @@
-//! SRIVC and RIVC on files: delays, integrators, two inputs, several records, loops, and what is refused.
+//! SRIVC and RIVC on files: delays, integrators, two inputs, several records, loops, and errors.
 
 use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
 use ct_signals::{excitation, noise};
@@ -42,7 +42,7 @@ fn add(parts: &[&[f64]]) -> Vec<f64> {
         .collect()
 }
 
-/// A parameter of the result is within so many standard errors, and known to a tenth.
+/// A parameter of the result is within this number of standard errors of the truth, and its standard error is below a tenth.
 fn holds(found: &Value, name: &str, truth: f64) {
     let parameters = found["parameters"].as_array().unwrap();
     let parameter = parameters.iter().find(|p| p["name"] == name).unwrap();
@@ -70,7 +70,7 @@ fn a_delay_is_estimated_beside_coloured_noise() {
         holds(&found, "b0", 2.0);
         holds(&found, "delay", 4.0);
     }
-    // A delay that is forgotten, or given in another unit, shows.
+    // A missing delay, or a delay in another unit, is detected.
     for forgotten in ["", " --delay 0.07"] {
         let text = place.succeeds(&format!("identify late.csv --method rivc{forgotten}"));
         assert!(text.contains("shows in the"), "{text}");
@@ -78,13 +78,13 @@ fn a_delay_is_estimated_beside_coloured_noise() {
     let text = place.succeeds("identify late.csv --method srivc --delay 4");
     assert!(!text.contains("shows in the"), "{text}");
     assert!(text.contains("4.000 s, as given"), "{text}");
-    // Beside methods that know no delay it concerns those that do.
+    // With several methods, the option applies to those with delays.
     let text = place.succeeds("identify late.csv --method rivc,fcloe --delay auto --report a.html");
     assert!(text.contains("violated"), "{text}");
     assert!(place.read("a.html").contains("rivc"));
 }
 
-/// A sampled PI fills a vessel that leaks; its gains are told to nobody.
+/// A sampled PI controller fills a leaking vessel; its gains are unknown to the method.
 #[test]
 fn an_integrator_in_a_loop_of_an_unknown_controller() {
     let place = Place::new();
@@ -110,7 +110,7 @@ fn an_integrator_in_a_loop_of_an_unknown_controller() {
     holds(&found, "offset", -0.03);
     assert_eq!(found["parameters"][0]["unit"], "cm/(V s)");
     assert!(place.read("loop.html").contains("CLSRIVC"));
-    // Without the integrator the program says what to try.
+    // Without the integrator the program gives advice.
     let text = place.succeeds("identify loop.csv --method srivc");
     assert!(text.contains("--integrator"), "{text}");
 }
@@ -154,7 +154,7 @@ fn two_inputs_and_several_records() {
     holds(&found, "b0", 2.0);
     holds(&found, "b0_2", -0.5);
     assert_eq!(found["parameters"][2]["unit"], "cm/(l/min)");
-    // Two records know more than one.
+    // Two records give smaller standard errors than one.
     place.succeeds("identify a.csv --method srivc --columns t,u+q,y --json one.json");
     let error = |file: &str| {
         place.json(file)["parameters"][0]["std_error"]

@@ -1,5 +1,5 @@
-//! Files as they are written while the system refuses: each call that touches them fails once, and the program is killed at each of
-//! them. What stands in the folder afterwards is whole: the old file or the new one.
+//! Files are complete even if the system fails: each call for them fails once, and the program is killed at each of them. Afterwards the
+//! folder has the complete old file or the complete new one.
 //!
 //! The calls fail by `strace`; where it cannot be used the tests are ignored.
 #![cfg(target_os = "linux")]
@@ -18,7 +18,7 @@ use crate::common::Place;
 const CALLS: &str = "openat,write,pwrite64,fsync,fdatasync,ftruncate,fchmod,fchown,fsetxattr,flistxattr,flock,link,linkat,rename,renameat,renameat2,unlink,unlinkat,chmod,mkdir";
 const ERRORS: [&str; 2] = ["ENOSPC", "EIO"];
 
-/// A call that may fail: its name, and which of its name it is in its thread.
+/// A call that may fail: its name, and its number among the calls of this name in its thread.
 type Call = (String, usize);
 
 /// A command, its standard input, the files that it writes, and what stands in them before it: nothing, or what it wrote earlier.
@@ -26,9 +26,9 @@ struct Written {
     words: &'static str,
     input: &'static str,
     files: &'static [&'static str],
-    /// Words that are run before, without failures.
+    /// Arguments of a run before, without failures.
     before: &'static str,
-    /// Words that are run after, which write the same files.
+    /// Arguments of a run after, which writes the same files.
     after: &'static str,
 }
 
@@ -90,7 +90,7 @@ fn calls(log: &str, folder: &Path) -> Vec<Call> {
         }
         let count = counts.entry((thread, name)).or_default();
         *count += 1;
-        // Names beside the program's own folder are relative to none: only these calls have no handle.
+        // Paths outside the program's folder are relative to no handle: only these calls have none.
         let by_name = ["rename", "link", "unlink", "chmod", "mkdir"].contains(&name);
         let reads = name == "openat" && !arguments.contains("O_CREAT");
         if (by_name || arguments.contains(folder)) && !reads {
@@ -100,7 +100,7 @@ fn calls(log: &str, folder: &Path) -> Vec<Call> {
     found
 }
 
-/// A file is whole.
+/// Whether a file is complete.
 fn is_whole(name: &str, bytes: &[u8]) -> bool {
     let text = String::from_utf8_lossy(bytes);
     match name.rsplit('.').next() {
@@ -133,7 +133,7 @@ fn place(written: &Written) -> Place {
     place
 }
 
-/// Every call of a command fails once, and once it is the last one.
+/// Every call of a command fails once, and ends the command once.
 fn withstands(written: &Written) {
     let words = written.words;
     let whole = traced(&place(written), words, written.input, None);
@@ -199,7 +199,7 @@ fn withstands(written: &Written) {
             assert!(left.is_empty(), "{what}: {left:?} is left");
         }
     }
-    // Else no call that failed was one that matters.
+    // Otherwise none of the failed calls mattered.
     assert!(
         refused >= 4,
         "{words}: {refused} of {} failures were errors",

@@ -1,4 +1,4 @@
-//! The model file: what it says, and one message for each mistake.
+//! The model file: its content, and one message for each error.
 
 #![allow(clippy::unwrap_used)]
 
@@ -25,7 +25,7 @@ fn message(text: &str) -> String {
     message
 }
 
-/// The message begins so, and says this further on.
+/// The message has this start, and contains this text later.
 fn refuses(text: &str, start: &str, mend: &str) {
     let message = message(text);
     assert!(
@@ -99,7 +99,7 @@ fixed = ["rim"]
     );
 }
 
-/// The catalogue names it; the file format does not.
+/// The catalogue has this name; the file format does not.
 fn deadzone_parameter() -> &'static str {
     let model = parse("plant = \"cascaded-tanks\"\neffects = [\"pump_deadzone\"]");
     let scales = plants::Scales::from_ranges((0.0, 1.0), (0.0, 1.0), 1.0, 10.0);
@@ -283,7 +283,7 @@ fn files_that_cannot_be_read() {
     assert_eq!(model_file::read(&path).unwrap().plant, Plant::FirstOrder);
 }
 
-/// Two programs that edit one file at the same moment: neither loses what the other does.
+/// Two programs that edit one file at the same moment: no change is lost.
 #[test]
 fn no_change_of_two_programs_is_lost() {
     let place = Place::empty();

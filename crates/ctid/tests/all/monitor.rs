@@ -1,4 +1,4 @@
-//! `ctid monitor` from outside: rows go in through a pipe.
+//! `ctid monitor` as a process: rows go in through a pipe.
 
 mod bad_rows;
 mod dates;
@@ -66,7 +66,7 @@ fn fed(place: &Place, words: &str, bytes: impl AsRef<[u8]>) -> Outcome {
     let (child, mut input) = begun(place, words);
     let bytes = bytes.as_ref().to_vec();
     let writer = thread::spawn(move || {
-        // It may stop reading.
+        // The program may stop reading.
         let _ = input.write_all(&bytes);
     });
     let output = child.wait_with_output().unwrap();
@@ -78,7 +78,7 @@ fn fed(place: &Place, words: &str, bytes: impl AsRef<[u8]>) -> Outcome {
     }
 }
 
-/// What it says on standard error.
+/// Checks the output on standard error.
 #[track_caller]
 fn assert_says(outcome: &Outcome, said: &str) {
     assert!(outcome.err.contains(said), "{said}: {}", outcome.err);
@@ -116,7 +116,7 @@ fn an_alarm_is_a_json_line_and_a_sentence() {
     let first = outcome.err.lines().next().unwrap();
     assert!(first.contains("\"t [s]\" is the time"), "{first}");
     assert_says(&outcome, "learned from 10");
-    // Without a terminal nothing steers one.
+    // Without a terminal there are no escape codes.
     assert!(!outcome.err.contains('\u{1b}'));
 }
 
@@ -164,7 +164,7 @@ fn the_ways_to_write_rows_are_those_of_the_csv_reader() {
     assert_eq!(events(&lone.out).len(), events(&plain.out).len());
 }
 
-/// A logger that begins anew with its columns in another order swaps nothing.
+/// A logger that restarts with another order of its columns does not exchange signals.
 #[test]
 fn a_header_that_comes_again_in_another_order_is_followed() {
     let rows = rows(1400, 1100);
@@ -188,7 +188,7 @@ fn a_header_that_comes_again_in_another_order_is_followed() {
     assert_says(&outcome, said);
 }
 
-/// A cable comes loose, and is mended.
+/// A cable comes loose, and is repaired.
 #[test]
 fn a_scatter_that_grows_is_a_json_line_of_its_own() {
     let mut rows = rows(2600, 9999);
@@ -219,7 +219,7 @@ fn a_scatter_that_grows_is_a_json_line_of_its_own() {
     assert_eq!(events[0]["unit"], "cm");
 }
 
-/// Silence would say that all is well.
+/// Without a message, the user would assume that no alarm occurred.
 #[test]
 fn rows_that_end_before_anything_is_learned() {
     let place = place();

@@ -1,4 +1,4 @@
-//! Several measured levels, from outside: what is said of each, and what is refused.
+//! Several measured levels, through the program: output of each, and errors.
 
 use std::fmt::Write;
 
@@ -8,7 +8,7 @@ use crate::common::Place;
 fn record(header: &str, read: impl Fn(usize, [f64; 2]) -> [String; 2]) -> String {
     let mut text = format!("{header}\n");
     let mut levels = [8.0, 8.0];
-    // A sequence that is the same everywhere.
+    // A sequence that is the same on every machine.
     let mut state = 1_u64;
     let mut noise = || {
         state = state
@@ -27,7 +27,7 @@ fn record(header: &str, read: impl Fn(usize, [f64; 2]) -> [String; 2]) -> String
     text
 }
 
-/// Readings to so many digits.
+/// Readings with a given number of digits.
 fn digits(_: usize, readings: [f64; 2]) -> [String; 2] {
     readings.map(|reading| format!("{reading:.6}"))
 }

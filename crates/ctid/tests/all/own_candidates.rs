@@ -1,4 +1,4 @@
-//! Candidates of the user's own from the command line: named with their place, in the monitor's isolation as well.
+//! Candidates of the user's own on the command line: named with their place, also in the monitor's isolation.
 
 use std::fmt::Write;
 use std::io::Write as _;
@@ -22,7 +22,7 @@ end Block;
 
 const CANDIDATE: &str = "[candidates.vent]\nparameters = { q = { unit = \"W/K\", min = 0.0, start = 0.1 } }\nterms = { T = \"-q*max(T - 60, 0)\" }\n";
 
-/// k = 0.4 W/K, g = 0.6 W/%, every 5 s; from row `vent` on more is lost above 60 degC.
+/// k = 0.4 W/K, g = 0.6 W/%, every 5 s; from row `vent` on there is an additional loss above 60 degC.
 fn rows(count: usize, vent: usize) -> String {
     let mut text = String::from("t [s],u [%],y [degC]\n");
     let mut draw = Random(11);
@@ -68,7 +68,7 @@ fn a_candidate_is_found_with_its_place_added_and_removed() {
     ] {
         assert!(said.contains(part), "{said}");
     }
-    // One bound is no bound to sit at.
+    // A parameter with one bound is not reported at a bound.
     let last = place.json("found.json")["steps"][1].clone();
     let own = last["parameters"].as_array().unwrap().iter();
     let own = own.clone().find(|one| one["name"] == "vent_q").unwrap();
@@ -83,7 +83,7 @@ fn a_candidate_is_found_with_its_place_added_and_removed() {
     assert!(said.contains("effects = []"), "{said}");
 }
 
-/// Another member of a group is added with the size that it had alone.
+/// Another member of a group is added with the size of its single fit.
 #[test]
 fn what_stands_in_for_an_effect_is_added_with_its_size_too() {
     let other = "[candidates.draught]\nparameters = { w = { unit = \"W/K\", min = 0.0, start = 0.1 } }\nterms = { T = \"-w*max(T - 60.3, 0)\" }\n";
@@ -134,7 +134,7 @@ fn alarms(place: &Place, rows: &str) -> Vec<Value> {
     let events = text
         .lines()
         .map(|line| serde_json::from_str::<Value>(line).unwrap());
-    // An alarm, and what is said of it as evidence grows.
+    // Alarms, with growing evidence.
     events
         .filter(|event| event["verdict"].is_string())
         .collect()
@@ -151,11 +151,11 @@ fn the_monitor_names_a_candidate_that_begins() {
         (last["size"]["value"].as_f64().unwrap() - 0.3).abs() < 0.1,
         "{last}"
     );
-    // Without it another effect is named, or none.
+    // Without the candidate another effect is named, or none.
     let alarms_without = alarms(&place(""), &rows);
     let last = alarms_without.last().unwrap();
     assert_ne!(last["effects"][0], "vent", "{last}");
-    // One that is in the model already is no suspect, and the rows are then those of the model.
+    // A candidate in the model is not tested, and the rows agree with the model.
     let text = declared
         .read("m.toml")
         .replace("effects = []", "effects = [\"vent\"]");

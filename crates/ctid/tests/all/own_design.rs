@@ -1,4 +1,4 @@
-//! `ctid design` of a model of one's own: at one input or at several, written as a record that the model can be simulated on.
+//! `ctid design` of a user's own model: at one input or at several, written as a record that the model can be simulated on.
 
 use std::fmt::Write;
 
@@ -21,7 +21,7 @@ end Pair;
 "#;
 const FILE: &str = "model = \"pair.mo\"\n[columns]\ntime = \"t [min]\"\nu = \"heater [W]\"\nw = \"other [W]\"\ny1 = \"first [degC]\"\ny2 = \"second [degC]\"\n";
 
-/// Both temperatures every 10 s, the first heater late by 5 s.
+/// Both temperatures every 10 s, the first heater with a delay of 5 s.
 fn heated() -> String {
     let mut text = String::from("t [min],heater [W],other [W],first [degC],second [degC]\n");
     let mut draw = Random(1);
@@ -31,7 +31,7 @@ fn heated() -> String {
         let read = |level: f64, draw: &mut Random| 20.0 + level + 0.2 * draw.normal();
         let (y1, y2) = (read(first, &mut draw), read(second, &mut draw));
         writeln!(text, "{:.6},{u},{w},{y1:.4},{y2:.4}", row as f64 / 6.0).unwrap();
-        // Half of the interval still has the command before.
+        // In half of the interval the previous command is still active.
         for command in [before, u] {
             let decay = (-5.0 * 0.8 / 50.0_f64).exp();
             first = decay * first + (1.0 - decay) * command / 0.8;
@@ -77,7 +77,7 @@ fn an_experiment_at_one_input_or_at_both_is_written_as_a_record() {
     );
     assert!(rows.iter().any(|row| row[1] != rows[0][1]));
     place.succeeds("simulate m.toml next.csv --fit a.csv --out y.csv");
-    // Without a name both move, one by one and together.
+    // Without a name both inputs change, one by one and together.
     place.succeeds(
         "design a.csv --model m.toml --between delay(u) lag(u) --duration 2000 --json both.json --out both.csv",
     );

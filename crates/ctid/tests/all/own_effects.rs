@@ -1,4 +1,4 @@
-//! Effects at the ports of a model of its user's own: added, kept, seen in every command, removed; and what is refused.
+//! Effects at the ports of a user's own model: added, kept, seen in every command, removed; and what is refused.
 
 mod refused;
 
@@ -93,7 +93,7 @@ fn what_a_diagnosis_finds_is_added_and_the_error_falls() {
     assert_eq!(kept["record"]["duration"].as_float(), Some(1995.0));
     assert_eq!(kept["record"]["interval"].as_float(), Some(5.0));
 
-    // The error falls to the noise, and what is fitted is what was hidden.
+    // The error falls to the noise, and the fitted values are the hidden ones.
     let mended = place.result("compare a.csv --model m.toml");
     assert_eq!(mended["effects"][0], "lag(y)");
     let (before, after) = (&bare["steps"][0], &mended["steps"][0]);
@@ -115,7 +115,7 @@ fn what_a_diagnosis_finds_is_added_and_the_error_falls() {
     let rmse = again["steps"][0]["rmse"].as_f64().unwrap();
     assert!((rmse / after - 1.0).abs() < 0.01, "{rmse} {after}");
 
-    // Taken out, the table waits, and the model is what it was.
+    // After removal the table is kept, and the model is as before.
     let said = place.succeeds("remove lag(y) --model m.toml");
     assert!(
         said.contains("effects = []") && said.contains("stays for the day"),
@@ -142,7 +142,7 @@ fn without_a_result_the_effect_is_fitted_from_its_own_starts() {
     let said = place.succeeds("compare a.csv --model m.toml");
     let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(said.contains("note: lag(y) is written in numbers of these records (duration = 1995, interval = 5.000)"), "{said}");
-    // A comparison says what a diagnosis says of it.
+    // A comparison and a diagnosis give the same result.
     place.succeeds("compare a.csv --model m.toml --json fit.json");
     place.succeeds("add lag(y) --model m.toml --from fit.json");
     assert!(
@@ -154,7 +154,7 @@ fn without_a_result_the_effect_is_fitted_from_its_own_starts() {
     let tau = table["effect"]["lag(y)"]["tau"].as_float().unwrap();
     let (fitted, _) = parameter(&mended["steps"][0], "lag_y_tau");
     assert!((tau / fitted - 1.0).abs() < 1e-4, "{tau} {fitted}");
-    // Fixed, it is not fitted.
+    // A fixed parameter is not fitted.
     let fixed = place
         .read("m.toml")
         .replace("tau = ", "fixed = [\"tau\"]\ntau = ");
@@ -174,7 +174,7 @@ fn the_mended_model_is_written_and_read_and_runs() {
     place.succeeds("export m.toml a.csv --modelica mended.mo --csv fit.csv");
     let said = place.succeeds("check mended.mo");
     assert!(said.contains("lag_y_tau"), "{said}");
-    // Its text is a model of its own, with the fitted values.
+    // Its text is a complete model, with the fitted values.
     place.write(
         "mended.toml",
         "model = \"mended.mo\"\n[columns]\ntime = \"t [s]\"\n",
@@ -182,7 +182,7 @@ fn the_mended_model_is_written_and_read_and_runs() {
     let alone = place.result("compare a.csv --model mended.toml");
     let rmse = |result: &Value| result["steps"][0]["rmse"].as_f64().unwrap();
     assert!((rmse(&alone) / rmse(&mended) - 1.0).abs() < 1e-3);
-    // Unfitted, it gives the curves of the fit.
+    // Without a fit it gives the curves of the fit.
     place.succeeds("simulate mended.toml a.csv --out y.csv");
     let column = |name: &str, at: usize| -> Vec<f64> {
         let text = place.read(name);
@@ -225,7 +225,7 @@ fn an_effect_means_the_same_beside_another_record() {
     };
     let kept = "record = { high = 36.0, low = 0.0, width = 36.0 }\n";
     let whole = runs(kept, "a.csv");
-    // The same first rows alone visit less; the bend is that of the whole record.
+    // The first rows alone have a smaller range; the curvature is that of the whole record.
     let first: String = place
         .read("a.csv")
         .lines()
@@ -242,7 +242,7 @@ fn an_effect_means_the_same_beside_another_record() {
     );
     let same = runs(kept, "b.csv");
     assert!(other.iter().zip(&same).any(|(a, b)| (a - b).abs() > 0.5));
-    // Without them nothing says what the bend is.
+    // Without the kept values the curvature is not defined.
     place.write("m.toml", bent(""));
     place.refuses(
         "simulate m.toml b.csv --out z.csv",
@@ -380,7 +380,7 @@ fn identify_takes_a_model_with_effects_where_it_is_linear() {
     );
     let said = place.succeeds("check m.toml");
     assert!(said.contains("lag_y_tau"), "{said}");
-    // One that bends makes it nonlinear.
+    // A curved effect makes the model nonlinear.
     let bent = place
         .read("m.toml")
         .replace("lag(y)", "nonlinearity(u)")

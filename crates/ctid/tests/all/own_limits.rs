@@ -1,4 +1,5 @@
-//! Candidates of a model file whose absence is a limit: RC pairs of a cell. And texts that cannot be simulated or have units that are none.
+//! Candidates of a model file that are absent only in a limit: RC pairs of a cell. And texts that cannot be simulated or have unknown
+//! units.
 
 use std::fmt::Write;
 
@@ -6,7 +7,7 @@ use serde_json::Value;
 
 use crate::common::{Place, Random};
 
-// Without units the catalogue has no voltage, and so no pair of its own.
+// Without units the catalogue has no voltage, and therefore no RC pair for it.
 const CELL: &str = r#"model Cell "open-circuit voltage and series resistance"
   parameter Real E0(min=0) = 4.15 "open-circuit voltage";
   parameter Real R0(min=0) = 0.02 "series resistance";
@@ -93,7 +94,7 @@ fn an_rc_pair_is_found_and_written_without_a_factor() {
 fn a_second_pair_is_declared_beside_the_first_and_found_beside_it() {
     let both = pair("rc_pair", 1, 1000.0) + &pair("second_rc_pair", 2, 10_000.0);
     let place = place(&both);
-    // One pair has one name, though two are offered.
+    // One pair has one name, although two are offered.
     place.write("a.csv", pulses(&[FAST], 2));
     let found = place.result("diagnose a.csv --model m.toml");
     assert_eq!(found["groups"], serde_json::json!([["rc_pair"]]));
@@ -104,7 +105,7 @@ fn a_second_pair_is_declared_beside_the_first_and_found_beside_it() {
     for group in groups {
         assert_eq!(group.as_array().unwrap().len(), 1, "{groups:?}");
     }
-    // Which of the two is the quicker one is by chance.
+    // The order of the two time constants is random.
     let last = found["steps"].as_array().unwrap().last().unwrap();
     let parameters = last["parameters"].as_array().unwrap();
     let first = parameters.iter().find(|p| p["name"] == "rc_pair_C1");
@@ -137,7 +138,7 @@ fn a_division_by_a_state_that_starts_at_zero_is_refused_with_its_place() {
     ];
     place.refuses("check tank.mo", &says);
     place.refuses("compare a.csv --model m.toml", &says);
-    // What is not divided by at the start is none of this.
+    // Divisors that are not zero at the start are accepted.
     for divisor in ["max(x, 0.1)", "(if x > 0 then x else 1)", "(x + 1)"] {
         place.write("tank.mo", text.replace("a/x", &format!("a/{divisor}")));
         place.succeeds("check tank.mo");

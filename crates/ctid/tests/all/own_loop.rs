@@ -1,4 +1,4 @@
-//! `[controller.u]` of a model of one's own: `identify` works with it, and what runs on the measured input says so.
+//! `[controller.u]` of a user's own model: `identify` uses it, and other commands warn that they run on the measured input.
 
 use std::fmt::Write;
 
@@ -80,7 +80,7 @@ fn identify_works_with_the_controller_in_the_units_of_the_model() {
             "{said}"
         );
     }
-    // Another controller is noticed.
+    // Another controller is detected.
     place.write("other.toml", file(2.4));
     place.refuses(
         "identify loop.csv --model other.toml --method fcloe --order 1,0",
@@ -113,10 +113,10 @@ fn a_loop_that_is_not_simulated_is_refused_or_said() {
         let said = unfolded(place.succeeds(command));
         assert!(said.contains(note), "{said}");
     }
-    // Inputs that are applied are those that are applied.
+    // In a simulation, given inputs are used as they are.
     let said = unfolded(place.succeeds("simulate m.toml loop.csv --out z.csv"));
     assert!(!said.contains("note: [controller.u]"), "{said}");
-    // What is no controller is said with its line.
+    // An invalid controller is reported with its line.
     place.write("m.toml", file(0.8).replace("controller.u", "controller.w"));
     place.refuses(
         "compare loop.csv --model m.toml",

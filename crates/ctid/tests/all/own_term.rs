@@ -1,11 +1,11 @@
-//! What nothing explains, from the program's outside: written as CSV, kept as a term of one's own, taken out again.
+//! An unexplained error through the program: written as CSV, kept as a user's own term, removed again.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use crate::common::{Place, Tanks, lasting};
 use plants::{Fitted, Term, Variable};
 
-/// A tank with a wave in the level that no effect describes.
+/// A tank with an oscillation as a function of the level that no effect describes.
 fn wave(seed: u64) -> Tanks {
     let knots: Vec<f64> = (0..160).map(|i| 0.25 * f64::from(i)).collect();
     Tanks {
@@ -86,7 +86,7 @@ fn the_unknown_is_written_kept_and_taken_out() {
         assert!(after < part * before, "{key}: {before} -> {after}");
     }
     assert_eq!(after["known_effects"][0], "my_wave");
-    // Said where it is so, and only there.
+    // The message appears only in this case.
     let says = |result: &serde_json::Value, words: &str| {
         let said = result["sentences"].as_array().unwrap();
         said.iter().any(|one| one.as_str().unwrap().contains(words))
@@ -101,7 +101,7 @@ fn the_unknown_is_written_kept_and_taken_out() {
     let parameters = after["steps"][0]["parameters"].as_array().unwrap();
     assert!(parameters.iter().any(|p| p["name"] == "my_wave.scale"));
 
-    // Kept as it stands.
+    // Kept unchanged.
     let held = place.read("tank.toml") + "fixed = true\n";
     place.write("held.toml", held);
     let kept = place.result("compare a.csv --model held.toml");
@@ -109,7 +109,7 @@ fn the_unknown_is_written_kept_and_taken_out() {
 
     let said = place.succeeds("remove my_wave --model tank.toml");
     assert!(
-        said.contains("[term.my_wave] stays for the day it is added again"),
+        said.contains("[term.my_wave] is kept in the file for when it is added again"),
         "{said}"
     );
     assert!(place.read("tank.toml").starts_with(&model));
@@ -202,7 +202,7 @@ fn a_shape_that_cannot_be_is_refused() {
         "compare a.csv --model tank.toml",
         &["[term.mine] has at in m, but with a.csv it would be in cm"],
     );
-    // A table that a person has spoilt.
+    // A damaged table.
     let good = place.read("tank.toml");
     place.write(
         "tank.toml",

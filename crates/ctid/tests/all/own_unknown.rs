@@ -1,4 +1,4 @@
-//! The shape of what no candidate explains: where it acts, what it depends on, as a file, and kept in the model.
+//! The unexplained function: its place, its variable, its file, and its use in the model.
 
 use std::fmt::Write;
 
@@ -16,7 +16,7 @@ equation
 end Block;
 "#;
 
-/// What the heater gives: stairs without edges, which no effect of the catalogue has.
+/// Output of the heater: smoothed stairs, which no effect of the catalogue has.
 fn given(u: f64) -> f64 {
     u + 5.0 * (u / 2.6).sin()
 }

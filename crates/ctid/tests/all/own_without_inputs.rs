@@ -1,4 +1,4 @@
-//! Models of their user's own without inputs: a pendulum that swings freely, a ball that falls. Records have time and outputs alone.
+//! Models of their user's own without inputs: a pendulum that oscillates freely, a ball that falls. Records have time and outputs alone.
 
 use std::fmt::Write;
 use std::io::Write as _;
@@ -139,7 +139,7 @@ fn the_friction_that_a_pendulum_lacks_is_found_added_and_removed() {
     let found = place.json("found.json");
     let group = found["groups"][0].as_array().unwrap();
     assert!(group.iter().any(|id| id == "coulomb(w)"), "{group:?}");
-    // Nothing is shown against an input that there is not.
+    // There is no plot against a missing input.
     let page = place.read("found.html");
     assert!(!page.contains("Against the input") && !page.contains("past input"));
     place.succeeds("add coulomb(w) --model p.toml --from found.json");

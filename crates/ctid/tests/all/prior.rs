@@ -1,4 +1,4 @@
-//! What is known of parameters beside the records, from the program's outside.
+//! Priors of parameters, through the program.
 
 use serde_json::Value;
 
@@ -31,11 +31,11 @@ fn a_prior_counts_as_a_reading() {
         "with.toml",
         &format!("\n[prior]\nalpha = [{}, {error}]\n", value + error),
     );
-    // Two readings of the same error: their mean, and an error of one over the root of two.
+    // Two readings with the same error: their mean, and an error smaller by the root of two.
     assert!((number(&with, "value") - value - 0.5 * error).abs() < 0.1 * error);
     assert!((number(&with, "std_error") / error - 0.5_f64.sqrt()).abs() < 0.05);
     assert_eq!(number(&with["prior"], "std_error"), error);
-    // A prior three times as good as the record, ten of the record's errors away: 10/sqrt(1 + 1/9) = 9.5 of both together.
+    // A prior three times as accurate as the record, ten of the record's errors away: 10/sqrt(1 + 1/9) = 9.5 of both together.
     let far = format!(
         "\n[prior]\nalpha = [{}, {}]\n",
         value + 10.0 * error,

@@ -96,7 +96,7 @@ fn compare_shows_the_error_and_writes_both_files() {
             .unwrap()
             .starts_with(&ctid::report::head())
     );
-    // Its own files may be written again.
+    // Files of the program may be overwritten.
     place
         .ctid("compare @tour.csv --model @tour.toml --json @out.json --report @out.html")
         .unwrap();
@@ -124,7 +124,7 @@ fn every_error_is_a_simulation_error_on_data_that_are_named() {
                 "{command} @tour.csv --model @tour.toml --report @out.html{test}"
             ))
             .unwrap();
-        // A sentence may be broken over lines.
+        // A sentence may be split into lines.
         let flat = text.to_lowercase();
         let flat = flat.split_whitespace().collect::<Vec<_>>().join(" ");
         let errors = flat.matches("error").count();
@@ -140,7 +140,7 @@ fn every_error_is_a_simulation_error_on_data_that_are_named() {
         .sum();
         assert!(errors > 0 && errors == explained, "{command}: {text}");
         assert!(!flat.contains("prediction"), "{text}");
-        // The table of the steps has a column for each kind of data; that of the catalogue says it above.
+        // The table of the steps has a column for each kind of data; that of the catalogue has it in the heading.
         let table = text
             .split_once("Simulation error, root mean square\n")
             .unwrap()

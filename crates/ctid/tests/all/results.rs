@@ -1,5 +1,5 @@
-//! What the program gives for good input: the JSON of the contract, the same whatever the form of
-//! the file, the number of threads and the run, and files that are written where they were asked for.
+//! Results of the program for valid input: the documented JSON, independent of the format of the file, the number of threads and the run,
+//! and files in the requested places.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -37,7 +37,7 @@ fn parameters(step: &Value) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// The keys, types and rules that `docs/results.md` promises of the JSON of `diagnose`.
+/// The keys, types and rules that `docs/results.md` specifies for the JSON of `diagnose`.
 fn fulfils_the_contract(json: &Value, held_out: bool) {
     assert_eq!(json["schema"], 2);
     let verdict = json["verdict"].as_str().unwrap();
@@ -61,7 +61,7 @@ fn fulfils_the_contract(json: &Value, held_out: bool) {
     assert_eq!(effects.len(), in_doubt.len());
     let sentences = texts(&json["sentences"]);
     for (said, doubted) in sentences.iter().zip(in_doubt) {
-        assert_eq!(said.contains("In doubt:"), doubted.as_bool().unwrap());
+        assert_eq!(said.contains("Uncertain:"), doubted.as_bool().unwrap());
     }
     let unexplained = json["residual_unexplained"].as_bool().unwrap();
     let remains = sentences
@@ -155,7 +155,7 @@ fn the_bundled_records_give_the_json_of_the_contract() {
     fulfils_the_contract(&place.result(DIAGNOSE), false);
 }
 
-/// The exit code is 0 whatever is found: [`Place::result`] asks for it.
+/// The exit code is 0 for any verdict: [`Place::result`] checks it.
 fn diagnosed(record: &str, model: &str) -> Value {
     let place = Place::empty();
     place.write("data.csv", record);
@@ -228,8 +228,7 @@ fn the_ranking_keeps_the_error_at_eighty_columns() {
 
 #[test]
 fn something_that_nothing_explains_is_a_result() {
-    // A sensor that is off by a wave of its reading: no effect of the catalogue. Chance decides
-    // whether one of them imitates it on a record.
+    // A sensor error that oscillates with its reading: no effect of the catalogue. By chance one of them may resemble it on a record.
     let unexplained = (1..8).any(|seed| {
         let tanks = Tanks {
             seed,
@@ -295,7 +294,7 @@ fn add_compare_remove_is_a_round_trip() {
         assert!(said.contains("tour.toml: removed overflow"), "{said}");
         let after = place.read("tour.toml");
         if name == "no list" {
-            // The list that `add` made stays, and is empty.
+            // The list that `add` wrote stays, and is empty.
             assert!(after.contains("effects = []"), "{after}");
             assert_eq!(after.replace("effects = []\n", ""), text, "{name}");
         } else {

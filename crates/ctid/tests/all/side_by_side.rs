@@ -134,7 +134,7 @@ fn the_program_sets_them_side_by_side() {
     }
     let page = place.read("a.html");
     assert!(page.contains("id=\"plot-fit\"") && page.contains("id=\"orders\""));
-    // Named twice is once; what is of one alone is no error among others.
+    // A name given twice counts once; an option of a single method is no error with several methods.
     let text = place
         .succeeds("identify tour.csv --model tour.toml --method ls,fcloe,ls,ct-rls --memory 300");
     assert_eq!(
@@ -174,7 +174,7 @@ fn what_cannot_be_is_refused() {
         &identify("--method ct-rls,stabilized-oe --sensor-filter 0.5"),
         &["--sensor-filter"],
     );
-    // A test record is an input: a result of ours in its place would be replaced.
+    // A test record is an input and cannot be replaced by a result.
     place.succeeds(&identify("--method ls --json own.json"));
     place.refuses(
         &identify("--method all --test own.json --json own.json"),

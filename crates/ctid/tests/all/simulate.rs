@@ -1,4 +1,4 @@
-//! `ctid simulate`, `ctid export` and `ctid identify` with models of the user's own, from the program's outside.
+//! `ctid simulate`, `ctid export` and `ctid identify` with users' own models, from the program's outside.
 
 mod export;
 mod linear;
@@ -47,7 +47,7 @@ fn record(rows: usize, seed: u64, noise: f64, begin: f64) -> Vec<[f64; 5]> {
             u = 100.0 * draw();
         }
         let room = 20.0 + 2.0 * (row as f64 / 30.0).sin();
-        // Six uniform numbers are nearly normal.
+        // The sum of six uniform numbers is nearly normal.
         let mut v = || noise * ((0..6).map(|_| draw()).sum::<f64>() - 3.0) * 2.0_f64.sqrt();
         let loss = k * (t - room);
         all.push([10.0 * row as f64, u, room, t + v(), loss + 0.1 * v()]);
@@ -56,7 +56,7 @@ fn record(rows: usize, seed: u64, noise: f64, begin: f64) -> Vec<[f64; 5]> {
     all
 }
 
-/// As CSV, the first `readings` rows with readings of the outputs; without these columns where there are none.
+/// As CSV, the first `readings` rows with readings of the outputs; without these columns if there are none.
 fn csv(rows: &[[f64; 5]], readings: usize) -> String {
     let head = "t [s],heater [%],room [degC]";
     let mut text = match readings {
@@ -132,10 +132,10 @@ fn new_inputs_are_simulated_with_a_band() {
         );
         assert!(high[k] - low[k] < 0.06, "row {k}");
     }
-    // A reading scatters by its noise.
+    // A reading varies with its noise.
     let wide = column(&text, "block reading upper [degC]")[70] - mean[70];
     assert!((0.08..0.13).contains(&wide), "{wide}");
-    // Where the first row is known exactly nothing is uncertain.
+    // If the first state is known exactly, its band has zero width.
     assert_eq!(low[0], high[0]);
     // The same as JSON.
     place.succeeds("simulate m.toml in.csv --fit a.csv b.csv --out y2.csv --json y.json");
@@ -167,7 +167,7 @@ fn initial_states_follow_the_first_readings() {
         mean[0]
     );
     assert!((mean[149] - clean[149][3]).abs() < 0.05);
-    // The initial state is forgotten, and its error with it.
+    // The initial state is forgotten, and so is its error.
     assert!(high[149] - low[149] < 0.5 * (high[0] - low[0]));
     // More readings, a narrower band.
     place.write("begun.csv", csv(&record(150, 3, 0.05, 31.0), 40));
@@ -185,7 +185,7 @@ fn without_a_fit_the_values_of_the_text_are_used() {
     assert!(said.contains("no band without --fit"), "{said}");
     let (head, _) = table(&place.read("y.csv"));
     assert_eq!(head, ["t [s]", "block [degC]", "loss [W]"]);
-    // One step by the closed form: C from [known], k and g of the text.
+    // One step by the analytic solution: C from [known], k and g of the text.
     let first = record(2, 3, 0.0, 20.0)[0];
     let decay = (-0.1 * 10.0 / 52.0_f64).exp();
     let expected = decay * 20.0 + (1.0 - decay) * (first[2] + 0.02 * first[1] / 0.1);
@@ -265,7 +265,7 @@ fn what_cannot_be_simulated_is_refused_in_one_line() {
         "simulate m.toml in.csv --out y.csv --initial 0",
         &["whole number above zero"],
     );
-    // A model that runs away.
+    // A model that diverges.
     place.write(
         "block.mo",
         BLOCK.replace("= g*u - loss", "= g*u - loss + T*T"),
@@ -300,7 +300,7 @@ fn a_plant_is_simulated_too() {
             .zip(&mean)
             .all(|(low, mean)| mean - low < 0.2 && low <= mean)
     );
-    // Without readings it begins at rest.
+    // Without readings the simulation begins at rest.
     let inputs = measured
         .lines()
         .map(|line| line.rsplit_once(',').unwrap().0.to_string() + "\n");

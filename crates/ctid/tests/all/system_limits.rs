@@ -1,4 +1,4 @@
-//! Where the system refuses something the program ends with exit code 2 and one line, as on any other error.
+//! If the system refuses a call, the program ends with exit code 2 and one line, as for any other error.
 #![cfg(target_os = "linux")]
 
 use std::process::Command;
@@ -12,7 +12,7 @@ fn outcome(place: &Place, command: &mut Command) -> (Option<i32>, String) {
     (outcome.status.code(), err)
 }
 
-/// The second thread fails by `strace`: under a limit of memory the program may run out of it anywhere.
+/// The second thread fails by `strace`: with a memory limit the program might fail anywhere.
 #[test]
 #[cfg_attr(not(strace), ignore = "strace cannot make calls fail here")]
 fn threads_that_cannot_be_started_are_an_error() {
@@ -31,7 +31,7 @@ fn threads_that_cannot_be_started_are_an_error() {
     assert_eq!(said.lines().count(), 1, "{said}");
 }
 
-/// The page is far larger than the files that are allowed.
+/// The page is far larger than the allowed file size.
 #[test]
 fn a_file_larger_than_allowed_is_an_error() {
     let place = Place::new();

@@ -40,7 +40,7 @@ fn the_result_holds_every_cell_for_both_rules() {
         "consistent",
         "Assumed, as the paper does not print it",
         "Table 3 - 2",
-        "What the comparison would not notice",
+        "Changes that the comparison would not detect",
         "diag(0.8, 0.008), 0.8",
         "Table 1 with larger P(0)",
         "block-diagonal  exact",
@@ -68,7 +68,7 @@ fn the_result_holds_every_cell_for_both_rules() {
     }
     assert!(!page.contains("http://") && !page.contains("https://"));
 
-    // The seed decides, not the threads; and its own files may be written again.
+    // The result depends on the seed and not on the threads; and files of the program may be overwritten.
     let mut threads = place.command("tables --runs 25 --seed 3 --json b.json --report a.html");
     threads.env("RAYON_NUM_THREADS", "3");
     assert_eq!(common::outcome(threads).code, Some(0));
@@ -107,7 +107,7 @@ fn the_second_paper_is_reproduced_cell_by_cell() {
     ] {
         assert!(text.contains(words), "no {words} in {text}");
     }
-    // What it does not find is said too.
+    // Undetected changes are reported too.
     let sentences = text.split_whitespace().collect::<Vec<_>>().join(" ");
     for words in [
         "the output error finds them to 0.7 %, more than chance",
@@ -140,7 +140,7 @@ fn the_second_paper_is_reproduced_cell_by_cell() {
         banded += 1;
         if let (Some(paper), Some(high)) = (cell["paper"].as_f64(), band[1].as_f64()) {
             let off = (number(&band[0]) - paper).max(paper - high) / (high - number(&band[0]));
-            // It may be off by half of its last digit.
+            // The number may be off by half of its last digit.
             let said = number(&cell["paper_outside"]);
             assert!(
                 said >= 0.0 && off <= said + 0.5 && said <= off.max(0.0),
@@ -183,13 +183,13 @@ fn the_second_paper_is_reproduced_cell_by_cell() {
     }
     assert!(!page.contains("http://") && !page.contains("https://"));
 
-    // The seed decides, not the threads.
+    // The result depends on the seed and not on the threads.
     let mut threads = place.command("tables baysse --runs 20 --seed 5 --json b.json");
     threads.env("RAYON_NUM_THREADS", "3");
     assert_eq!(common::outcome(threads).code, Some(0));
     assert!(place.json("b.json") == json);
 
-    // A record that is there may be anybody's.
+    // An existing record may belong to another program.
     place.refuses(words, &["a.csv", "it is there already"]);
     place.refuses("tables baysse --runs 9", &["--runs is 9", "10 or more"]);
     place.refuses("tables --record b.csv", &["--record", "tables baysse"]);
@@ -198,7 +198,7 @@ fn the_second_paper_is_reproduced_cell_by_cell() {
 #[test]
 fn both_papers_at_once() {
     let place = Place::empty();
-    // Its own file may be written again.
+    // A file of the program may be overwritten.
     place.write("both.json", "{\"written_by\": \"ctid\", \"schema\": 1}");
     let text = place.succeeds("tables all --runs 20 --json both.json");
     assert!(text.contains("Table 4") && text.contains("Table II"));
@@ -231,9 +231,9 @@ fn the_emulated_rig_misses_its_dead_zone() {
     let (effects, before, after) = missing("secant.toml", "--max-effects 1");
     assert_eq!(effects, serde_json::json!([["pump_deadzone"]]));
     assert!(before > 0.5 && after < 0.1, "{before} {after}");
-    // One effect alone would be a backlash, which imitates the dead zone and the sensor's filter at once.
+    // The best single effect would be a backlash, which resembles the dead zone and the sensor's filter together.
     let (effects, before, after) = missing("tank.toml", "");
-    // A constant leak is the same as long as the command stays above the dead zone.
+    // A constant leak is equivalent while the command is above the dead zone.
     assert_eq!(
         effects,
         serde_json::json!([["pump_deadzone", "const_leak"], ["pump_lag", "sensor_lag"]])

@@ -1,4 +1,4 @@
-//! Two fitted effects, and what either would show in an experiment.
+//! Two fitted effects, and their responses in an experiment.
 
 use std::collections::BTreeMap;
 
@@ -12,20 +12,20 @@ use super::{Experiment, InputSequenceKind, Kind, Power, Reach, Refused, power};
 use crate::Error;
 use crate::node::{Context, FINE, Node};
 
-/// Both effects, and what the records say of each.
+/// Both effects, and their results on the records.
 pub(super) struct Comparison<'s, 'a> {
     context: &'s Context<'a>,
     nodes: &'s [Node; 2],
     noise: &'s Noise,
     /// Standard deviation of the innovations of each output.
     scales: Vec<f64>,
-    /// What each knows of its parameters.
+    /// R factor of the parameters of each model.
     known: [Triangle; 2],
-    /// The existing records as each has them, free of noise.
+    /// Simulations of the existing records by each model, without noise.
     simulated: [Vec<Record>; 2],
-    /// `before[i]`: misfit of the other to what `i` shows.
+    /// `before[i]`: misfit of the other model to the response of model `i`.
     before: [f64; 2],
-    /// What each output visited.
+    /// Range of each output.
     visited: Vec<(f64, f64)>,
 }
 
@@ -65,7 +65,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
             for output in simulated.iter_mut().flat_map(|record| &mut record.outputs) {
                 let model = series.next().unwrap_or_default();
                 for (value, model) in output.values.iter_mut().zip(model) {
-                    // What was not measured was not.
+                    // Missing readings stay missing.
                     if !value.is_nan() {
                         *value = model;
                     }
@@ -103,13 +103,13 @@ impl<'s, 'a> Comparison<'s, 'a> {
         &self.scales
     }
 
-    /// By how much the criterion of each is below that of the other.
+    /// Amount by which the criterion of each is below that of the other.
     pub fn ahead(&self) -> [f64; 2] {
         let ahead = self.nodes[0].gain_over(&self.nodes[1]);
         [ahead, -ahead]
     }
 
-    /// A model against other records, outputs by their noise, and what is known of its parameters beside the records as a truth has it.
+    /// A model with other records, outputs weighted by their noise, and priors of its parameters with the values of the true model.
     fn setup<'b>(
         &'b self,
         i: usize,
@@ -129,14 +129,14 @@ impl<'s, 'a> Comparison<'s, 'a> {
         Some(setup.with_scales(self.scales.clone()))
     }
 
-    /// A model's vector in an experiment: it begins where the first record did.
+    /// A model's vector in an experiment: the initial states are those of the first record.
     fn vector(&self, i: usize) -> Vec<f64> {
         let spec = self.nodes[i].spec();
         let length = spec.parameters.len() + spec.states.len();
         self.nodes[i].fit.x[..length].to_vec()
     }
 
-    /// What an experiment would show, were one of them true.
+    /// Simulated record of an experiment, if one of the two models is true.
     fn simulated_record(
         &self,
         truth: usize,
@@ -220,7 +220,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
         })
     }
 
-    /// Misfit of the other model to what one of them gives of the existing records, and of an experiment, refitted.
+    /// Misfit of the other model to one model's simulation of the existing records and of an experiment, after a refit.
     fn misfit(&self, truth: usize, experiment: Option<Record>) -> Option<f64> {
         let stand_in = 1 - truth;
         let mut records = self.simulated[truth].clone();
@@ -245,7 +245,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
         Some(power([apart(0)?, apart(1)?], self.ahead()))
     }
 
-    /// What the longest record had, once more.
+    /// Repetition of the longest record's experiment.
     pub fn again(&self, bounds: &Bounds) -> Option<Experiment> {
         let records = &self.context.problem.records;
         let longest = records

@@ -1,4 +1,4 @@
-//! What the user allows an experiment to do, checked against the records.
+//! Limits of an experiment from the user, checked against the records.
 
 use std::collections::BTreeMap;
 
@@ -8,21 +8,21 @@ use super::InputRange;
 use super::sequences::Room;
 use crate::Problem;
 
-/// Samples for every fitted number at least, ...
+/// Least number of samples per fitted parameter, ...
 const SAMPLES_PER_PARAMETER: usize = 3;
-/// ... and in all at most.
+/// ... and largest total number of samples.
 const MOST_SAMPLES: usize = 20_000;
 
-/// What an experiment may do; what is not given follows from the records.
+/// Limits of an experiment; missing values are derived from the records.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Limits {
-    /// Inputs that are applied; where none is named, all that moved in the records. The others are held at their median.
+    /// Inputs that are applied; if none is named, all inputs that change in the records. The others are held at their median.
     pub inputs: Vec<String>,
-    /// Smallest and largest value of an input \[its unit\]. Without it what the records visited.
+    /// Smallest and largest value of an input \[its unit\]. By default the range of the records.
     pub ranges: BTreeMap<String, (f64, f64)>,
-    /// Largest change of an input in a second.
+    /// Largest change of an input per second.
     pub slews: BTreeMap<String, f64>,
-    /// Length \[s\]. Without it that of the longest record.
+    /// Length \[s\]. By default that of the longest record.
     pub duration: Option<f64>,
     /// Seed of the sequences that are drawn.
     pub seed: u64,
@@ -32,7 +32,7 @@ pub struct Limits {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refused {
-    /// One effect twice.
+    /// The two effects are the same.
     #[error("--between {effect} {effect}: an effect cannot be told from itself; name two")]
     SameEffect {
         /// The effect.
@@ -57,15 +57,15 @@ pub enum Refused {
     /// A model without inputs.
     #[error("the model has no input that an experiment could move")]
     NoInput,
-    /// No such input.
+    /// The model has no input of this name.
     #[error("--input {name}: the model has no such input; it has {known}")]
     UnknownInput {
-        /// As given.
+        /// Name as given.
         name: String,
-        /// The inputs that there are.
+        /// Names of the inputs.
         known: String,
     },
-    /// The range's ends are exchanged, equal or no numbers.
+    /// The range's ends are in the wrong order, equal or not finite.
     #[error("--input {input}={}..{}: the smaller value comes first, and they have to differ", shown(*low), shown(*high))]
     Range {
         /// The input.
@@ -75,8 +75,8 @@ pub enum Refused {
         /// Second end.
         high: f64,
     },
-    /// What is applied never moved, and nobody says how far it may.
-    #[error("the records hold one value of {input}, {}, which says nothing of where it may go; give --input {input}=LOW..HIGH", shown(*value))]
+    /// The input is constant in the records, and no range is given.
+    #[error("the records hold one value of {input}, {}, so its permitted range is not known; give --input {input}=LOW..HIGH", shown(*value))]
     NoRange {
         /// The input.
         input: String,
@@ -95,7 +95,7 @@ pub enum Refused {
         /// The sampling interval \[s\].
         interval: f64,
     },
-    /// Too slow to get anywhere.
+    /// A slew limit that is too small.
     #[error("--slew {} a second moves {input} by less than its range within {} s", shown(*slew), shown(*duration))]
     Slew {
         /// The input.
@@ -105,18 +105,18 @@ pub enum Refused {
         /// The length \[s\].
         duration: f64,
     },
-    /// The limit on the time has passed before anything could be said.
+    /// The time limit has passed before there was a result.
     #[error(
         "the time did not suffice to fit both effects and to try experiments; allow more (--effort thorough), or give fewer rows or a shorter --duration"
     )]
     OutOfTime,
 }
 
-/// The limits as they hold.
+/// The checked limits.
 pub(super) struct Bounds {
-    /// Of each input that is applied, by its position in the model.
+    /// For each applied input, by its position in the model.
     pub applied: Vec<(usize, InputRange, Room)>,
-    /// What the others are held at.
+    /// Constant values of the other inputs.
     pub held: Vec<f64>,
     pub duration: f64,
     pub interval: f64,

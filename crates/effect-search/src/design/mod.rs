@@ -1,7 +1,7 @@
-//! The next experiment: the one that tells two effects apart which the records leave undecided.
+//! Design of the next experiment, which distinguishes two effects that the records do not distinguish.
 //!
-//! Each of the two is fitted to the records. Either is then simulated with sequences within the user's limits, at one input or at several at
-//! once, and it is computed how far the other stays behind what they show ([`least`]). The most promising are confirmed by refits: the
+//! Each of the two is fitted to the records. Either is then simulated with sequences within the user's limits, at one input or at several
+//! at once, and it is computed how far the other stays behind what they show ([`least`]). The most promising are confirmed by refits: the
 //! other one is fitted to what the first gives on the existing records and in the experiment, both free of noise, and its misfit to the
 //! existing records alone is taken off.
 //!
@@ -34,15 +34,15 @@ use crate::node::{Context, FINE, Node};
 use crate::problem::{Limit, Options, Phase, Problem};
 use limits::Bounds;
 
-/// The slowest time constant that sequences are made for, over the length of an experiment: what such a process is like nobody knows ahead.
+/// The slowest time constant for the sequences, as a share of an experiment's length: the process is not known before.
 const SLOWEST: f64 = 0.1;
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 4;
 const MOST_REFITS: usize = 16;
-/// Nobody repeats an experiment more often.
+/// Largest useful number of repetitions of an experiment.
 const MOST_TIMES: f64 = 20.0;
 
-/// What the inputs do that move, and a value of every input for each sample of an experiment.
+/// Courses of the inputs that change, and a value of every input for each sample of an experiment.
 type Sequenced = (Vec<InputSequenceKind>, Vec<Vec<f64>>);
 /// An experiment, and a value of every input for each of its samples.
 type Tried = (Experiment, Vec<Vec<f64>>);
@@ -70,7 +70,7 @@ pub fn design(
         let effect = (*id).to_string();
         return Err(Refused::InModel { effect }.into());
     }
-    // What is wrong with the limits is said before anything is computed, as far as it can be.
+    // Errors in the limits are reported before the computation as far as possible.
     Bounds::new(problem, limits, 0)?;
     tell("fitting the model");
     let limit = Limit::new(options);
@@ -118,7 +118,7 @@ pub fn design(
         });
         sort(&mut tried);
     }
-    // After so many rounds the best of those that were refitted.
+    // After this number of rounds, the best refitted experiment is used.
     tried.sort_by_key(|(experiment, _)| !experiment.refitted);
     let Some((best, inputs)) = tried.first().cloned() else {
         return Err(Refused::OutOfTime.into());
@@ -133,7 +133,7 @@ pub fn design(
         model: problem.spec.name.clone(),
         bic_ahead: ahead[0],
         prospect: match prospect(&best.power) {
-            // A power that no refit has confirmed is a promise.
+            // A power without confirmation by a refit is only a prediction.
             Prospect::Decides if !best.refitted => Prospect::May,
             prospect => prospect,
         },
@@ -173,7 +173,7 @@ pub fn design(
 }
 
 impl Context<'_> {
-    /// The believed model and both effects beside it, in the metric of the noise that the better of them leaves.
+    /// The believed model with each of the two effects, weighted by the noise model of the better one.
     fn alternatives(
         &self,
         base: &Node,
@@ -248,7 +248,7 @@ fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Seque
     };
     let mut of_each = Vec::new();
     for (n, (_, _, room)) in bounds.applied.iter().enumerate() {
-        // Inputs that move at once move independently.
+        // Inputs that change simultaneously use independent sequences.
         let seed = seed.wrapping_add(n as u64);
         of_each.push(sequences(room, SLOWEST * bounds.duration, seed)?);
     }

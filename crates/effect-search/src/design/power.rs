@@ -1,4 +1,4 @@
-//! From a separation to what may be hoped for.
+//! Expected result of an experiment, from the separation of two models.
 
 use std::cmp::Ordering;
 
@@ -8,42 +8,42 @@ use serde::Serialize;
 
 use crate::thresholds::Thresholds;
 
-/// How far an experiment takes two effects apart.
+/// How well an experiment distinguishes two effects.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Power {
     /// The smaller of the two below.
     pub power: f64,
-    /// By how much the deviance of the other is above that of the true one on average, were the first true, were the second true.
+    /// Expected excess of the deviance of the wrong model over the true one, if the first is true and if the second is true.
     pub if_true: [f64; 2],
     /// Probability that all records together then decide for the true one, by more than 6 in the criterion; the smaller of the two.
     pub decides: f64,
 }
 
-/// What can be hoped for.
+/// Expected result of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Prospect {
-    /// The best experiment will very probably decide.
+    /// The experiment will very probably decide.
     Decides,
-    /// It may.
+    /// The experiment may decide.
     May,
-    /// It will hardly, within these limits.
+    /// The experiment will probably not decide, within these limits.
     Hardly,
-    /// The two show the same in every experiment that was tried.
+    /// The two give the same response in every experiment that was tried.
     Twins,
 }
 
-/// More power than this is of no use: it decides even where the effect is half as large as the records make it.
+/// A higher power has no further use: the decision is certain even if the effect is half as large as estimated.
 pub const PLENTY: f64 = 200.0;
-/// The criterion decides where it differs by more than this.
+/// The criterion decides if the difference exceeds this.
 const BIC_MARGIN: f64 = Thresholds::DEFAULT.bic_margin;
-/// Excursions that differ by less than this are one.
+/// Excursions with a smaller difference are equal.
 const SAME_EXCURSION: f64 = 0.1;
-/// A decision as good as certain, as likely, and what the criterion does not notice.
+/// Nearly certain decision, likely decision, and difference below the resolution of the criterion.
 const SURE: f64 = 0.9;
 const LIKELY: f64 = 0.5;
 const NOTHING: f64 = 1.0;
-/// Quantile of the probability that a longer experiment is to reach.
+/// Quantile of the required probability for a longer experiment.
 const WANTED: f64 = 1.645;
 
 /// The probability that the criterion of the false one ends above that of the true one by more than 6: their
@@ -56,7 +56,7 @@ fn decides(lambda: f64, ahead: f64) -> f64 {
     Normal::standard().cdf(margin / (2.0 * lambda.sqrt()))
 }
 
-/// From the noncentralities, were the first true and were the second, and by how much each is ahead before.
+/// Power from the noncentralities, if the first and if the second is true, and from the present advantage of each.
 #[must_use]
 pub fn power(if_true: [f64; 2], ahead: [f64; 2]) -> Power {
     let [a, b] = if_true;
@@ -67,7 +67,7 @@ pub fn power(if_true: [f64; 2], ahead: [f64; 2]) -> Power {
     }
 }
 
-/// What a power lets hope for.
+/// Expected result for a power.
 #[must_use]
 pub fn prospect(power: &Power) -> Prospect {
     if power.power < NOTHING {
@@ -81,7 +81,7 @@ pub fn prospect(power: &Power) -> Prospect {
     }
 }
 
-/// So many times as long should decide with a probability of 0.95, where a noncentrality grows as the length.
+/// Number of repetitions after which the experiment decides with a probability of 0.95, if the noncentrality is proportional to the length.
 ///
 /// `lambda + ahead - 6 = 1.645 x 2 sqrt(lambda)`, solved for the root of `lambda`.
 #[must_use]
@@ -97,8 +97,8 @@ pub fn times_as_long(power: &Power, ahead: [f64; 2]) -> Option<f64> {
     Some(times(0).max(times(1))).filter(|times| times.is_finite() && *times > 1.0)
 }
 
-/// The order of two experiments, the better one first: by power as far as it is of use, then by excursion, then by power. Each with how far an
-/// output or a level leaves what it visited in the records, as a part of that.
+/// Order of two experiments, the better one first: by power up to a sufficient value, then by excursion, then by power. The numbers are the
+/// excursions outside the range of the records, as a share of that range.
 #[must_use]
 pub fn by_use((a, out_a): (&Power, f64), (b, out_b): (&Power, f64)) -> Ordering {
     let useful = |power: &Power| power.power.min(PLENTY);

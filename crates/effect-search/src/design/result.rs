@@ -6,23 +6,23 @@ use serde::Serialize;
 
 use super::{Kind, Power, Prospect};
 
-/// One of the two effects that are to be told apart.
+/// One of the two effects to be distinguished.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alternative {
     /// The effect, with its port.
     pub effect: String,
-    /// Its parameters on the records that there are, by the names that they have in the effect.
+    /// Parameters on the existing records, by their names in the effect.
     pub sizes: BTreeMap<String, f64>,
-    /// By how much it lowers the criterion of the believed model.
+    /// Fall of the criterion from the believed model.
     pub bic_gain: f64,
-    /// Simulation error of each output on the records that there are \[its unit\].
+    /// Simulation error of each output on the existing records \[its unit\].
     pub rmse_per_output: BTreeMap<String, f64>,
 }
 
-/// What an input may do.
+/// Permitted changes of an input.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InputRange {
-    /// Its name in the model.
+    /// Name of the input in the model.
     pub input: String,
     /// Its unit.
     pub unit: String,
@@ -30,30 +30,30 @@ pub struct InputRange {
     pub low: f64,
     /// Largest value.
     pub high: f64,
-    /// The range is what the records visited, as none was given.
+    /// The range is that of the records, because none was given.
     pub visited: bool,
-    /// Largest change in a second, where there is a limit.
+    /// Largest change per second, if there is a limit.
     pub slew: Option<f64>,
 }
 
-/// What an input does in an experiment.
+/// Course of an input in an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InputSequenceKind {
-    /// Its name in the model.
+    /// Name of the input in the model.
     pub input: String,
     /// Kind of the sequence.
     pub kind: Kind,
-    /// Its smallest value.
+    /// Smallest value.
     pub low: f64,
-    /// Its largest value.
+    /// Largest value.
     pub high: f64,
-    /// How long a level is held \[s\].
+    /// Duration of each level \[s\].
     pub clock: f64,
     /// Levels of a staircase.
     pub levels: Option<usize>,
 }
 
-/// From where to where an output moves in an experiment, by either model.
+/// Range of an output in an experiment, for either model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reach {
     /// Its name.
@@ -67,19 +67,20 @@ pub struct Reach {
 /// An experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiment {
-    /// What each input does that moves; the others are held at their median.
+    /// Course of each input that changes; the other inputs are held at their median.
     pub inputs: Vec<InputSequenceKind>,
-    /// What it gives.
+    /// Power of the experiment.
     pub power: Power,
     /// The power is that of a refit; otherwise that of the models linearised at their fits.
     pub refitted: bool,
-    /// Where the outputs go.
+    /// Ranges of the outputs.
     pub reaches: Vec<Reach>,
-    /// How far an output leaves what it visited in the records, as a part of that: beyond it neither model is known.
+    /// Largest excursion of an output outside its range in the records, as a share of that range: outside the range neither model is
+    /// validated.
     pub excursion: f64,
 }
 
-/// What a person applies to the plant.
+/// The sequences to apply to the plant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sequences {
     /// Instants \[s\].
@@ -91,11 +92,11 @@ pub struct Sequences {
 /// An input of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InputSequence {
-    /// Its name in the model.
+    /// Name of the input in the model.
     pub input: String,
     /// Its unit.
     pub unit: String,
-    /// Its values, each until the next instant as the model file has it.
+    /// Values of the input; each is held until the next instant according to the model file.
     pub values: Vec<f64>,
 }
 
@@ -108,32 +109,32 @@ pub struct Design {
     pub model: String,
     /// The two effects.
     pub between: [Alternative; 2],
-    /// By how much the criterion of the second is above that of the first on the records that there are.
+    /// Criterion of the second model minus that of the first on the existing records.
     pub bic_ahead: f64,
-    /// What the best experiment can be expected to do.
+    /// Expected result of the best experiment.
     pub prospect: Prospect,
-    /// What is applied, and within which limits.
+    /// Applied inputs and their limits.
     pub ranges: Vec<InputRange>,
     /// Length \[s\].
     pub duration: f64,
-    /// Experiments, the best first: of those that have power in plenty the one that stays nearest to what the records visited.
+    /// Experiments, the best first: among those with ample power, the one closest to the range of the records.
     pub experiments: Vec<Experiment>,
-    /// What the longest record had, once more.
+    /// Repetition of the experiment of the longest record.
     pub again: Option<Experiment>,
-    /// Applied so many times over, the best experiment would decide; `None` where it does already, or would not.
+    /// Number of repetitions after which the best experiment decides; `None` if one is enough, or none would decide.
     pub times_as_long: Option<usize>,
     /// The best experiment.
     pub experiment: Sequences,
     /// Standard deviation of each output's innovations, the noise that its past does not predict \[its unit\].
     pub noise: BTreeMap<String, f64>,
-    /// What was left out for want of time.
+    /// Steps that were left out because of the time limit.
     pub left_out: Vec<String>,
-    /// How long it took \[s\].
+    /// Computing time \[s\].
     pub seconds: f64,
 }
 
 impl Design {
-    /// No experiment tells the two apart: none is worth making.
+    /// Whether no experiment distinguishes the two.
     #[must_use]
     pub fn twins(&self) -> bool {
         self.prospect == Prospect::Twins

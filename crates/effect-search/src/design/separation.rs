@@ -1,7 +1,7 @@
-//! How far an experiment takes two models apart: the least misfit of the one to what the other would show.
+//! Separation of two models by an experiment: the least misfit of one model to the response of the other.
 //!
-//! Let A be true. The experiment shows `y_A + v`. Model B answers with the parameters that imitate `y_A` best, but it still has
-//! to fit the existing record, and its initial states are free. In the metric of the noise, linearised at B's fit:
+//! Let A be true. The experiment shows `y_A + v`. Model B answers with the parameters that imitate `y_A` best, but it still has to fit the
+//! existing record, and its initial states are free. In the weighting by the noise model, linearised at B's fit:
 //! ```text
 //! lambda_A = min over d, l of  ( |y_A - y_B - J d - L l|^2 + |R d|^2 ) / sigma^2
 //! ```
@@ -29,7 +29,7 @@ pub fn information(rows: &Triangle, free: &[usize], parameters: usize) -> Triang
     own
 }
 
-/// The least of `|rows|^2` over the first columns, what is known of the leading ones added; the last column is the residual.
+/// The least of `|rows|^2` over the first columns, with the information on the leading ones added; the last column is the residual.
 #[must_use]
 pub fn least(rows: &Triangle, known: &Triangle) -> f64 {
     let columns = rows.columns();

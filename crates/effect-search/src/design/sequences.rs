@@ -1,19 +1,19 @@
-//! The sequences among which the experiment is sought: steps, staircases, binary and multi-level sequences, within a range
-//! and a slew, with clock periods relative to the plant's slowest time constant.
+//! Candidate sequences of the experiment: steps, staircases, binary and multi-level sequences, within a range and a slew limit, with clock
+//! periods relative to the plant's slowest time constant.
 
 use ct_signals::{Error, excitation};
 use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use serde::Serialize;
 
-/// What sequences may do.
+/// Limits for sequences.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Room {
     /// Smallest value \[unit of the input\].
     pub low: f64,
     /// Largest value.
     pub high: f64,
-    /// From where to where the records went.
+    /// Range in the records.
     pub visited: (f64, f64),
     /// Largest change in a second.
     pub slew: Option<f64>,
@@ -29,7 +29,7 @@ pub struct Room {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// What the longest record had, once more.
+    /// Repetition of the longest record's experiment.
     Again,
     /// Two levels, changed after every clock period.
     Step,
@@ -42,7 +42,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// In words.
+    /// Name of the kind in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -55,18 +55,18 @@ impl Kind {
     }
 }
 
-/// A sequence and how it came about.
+/// A sequence and its parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
-    /// Its kind.
+    /// Kind of the sequence.
     pub kind: Kind,
-    /// How long a level is held \[s\].
+    /// Duration of each level \[s\].
     pub clock: f64,
     /// Levels of a staircase.
     pub levels: Option<usize>,
-    /// Which of several draws.
+    /// Number of the random draw.
     pub draw: Option<u64>,
-    /// It changes by at most so much in a second, where it was made slower than the limits ask for.
+    /// Largest change per second, if it is smaller than the limits require.
     pub slew: Option<f64>,
     /// Smallest value.
     pub low: f64,
@@ -76,20 +76,20 @@ pub struct Sequence {
     pub values: Vec<f64>,
 }
 
-/// Clock periods over the slowest time constant: from what shows lags to what shows static curves.
+/// Clock periods over the slowest time constant: short ones excite lags, long ones show static curves.
 const CLOCKS: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 2.0, 4.0];
-/// Half periods of a square wave over the slowest time constant; the whole length is one more.
+/// Half periods of a square wave over the slowest time constant; the complete length is used too.
 const STEPS: [f64; 2] = [2.0, 5.0];
 const STAIRCASES: [usize; 3] = [3, 5, 9];
 /// Draws of a multi-level sequence for each clock period.
 const DRAWS: u64 = 2;
-/// A level is held for this part of the experiment at most: one that is held throughout shows nothing.
+/// Longest duration of a level as a share of the experiment: a constant level contains no information.
 const LONGEST: f64 = 0.25;
 /// Length of the shift register: its sequence is longer than any experiment.
 const REGISTER: u32 = 18;
 
-/// The whole range; its halves, in one of which a threshold or a bend lies; and what the records visited, once and twice as
-/// wide: there the models are known.
+/// Ranges to try: the whole range; its halves, one of which contains a threshold or a bend; and the range of the records, once and twice as
+/// wide, where the models are validated.
 fn parts(room: &Room) -> Vec<(f64, f64)> {
     let (low, high) = (room.low, room.high);
     let middle = 0.5 * (low + high);
@@ -97,7 +97,7 @@ fn parts(room: &Room) -> Vec<(f64, f64)> {
     let (from, to) = room.visited;
     for more in [0.0, 0.5 * (to - from)] {
         let part = ((from - more).max(low), (to + more).min(high));
-        // What hardly moves shows nothing, and what is hardly narrower is the whole.
+        // A sequence over a very narrow range shows nothing, and a range slightly narrower than the whole is the whole.
         let share = (part.1 - part.0) / (high - low);
         if (0.01..0.9).contains(&share) {
             parts.push(part);
@@ -106,7 +106,7 @@ fn parts(room: &Room) -> Vec<(f64, f64)> {
     parts
 }
 
-/// So many bits from anywhere in the register's sequence, not all alike.
+/// Consecutive bits from a random position of the shift register's sequence, not all equal.
 fn bits(n: usize, low: f64, high: f64, rng: &mut ChaCha8Rng) -> Result<Vec<f64>, Error> {
     loop {
         let from = rng.random_range(0..1 << (REGISTER - 1));
@@ -118,13 +118,13 @@ fn bits(n: usize, low: f64, high: f64, rng: &mut ChaCha8Rng) -> Result<Vec<f64>,
     }
 }
 
-/// All sequences within a room, of a plant with this slowest time constant \[s\].
+/// All sequences within the limits, for a plant with this slowest time constant \[s\].
 ///
 /// # Errors
 /// Where the room holds no sequence: no sample, a range without width.
 pub fn sequences(room: &Room, time_constant: f64, seed: u64) -> Result<Vec<Sequence>, Error> {
     let n = room.samples;
-    // A plant that forgets nothing within the experiment has no time constant that could be a measure.
+    // A plant that does not settle within the experiment has no time constant that can be a scale.
     let slowest = time_constant.min(0.2 * room.duration);
     let samples = |clock: f64| -> usize {
         let most = (LONGEST * n as f64).max(1.0);
@@ -195,7 +195,7 @@ pub fn sequences(room: &Room, time_constant: f64, seed: u64) -> Result<Vec<Seque
 }
 
 impl Sequence {
-    /// The same, changing by at most so much in a second.
+    /// The sequence with its change per second limited to `slew`.
     ///
     /// # Errors
     /// Where the slew is not positive.
@@ -206,7 +206,7 @@ impl Sequence {
         Ok(slower)
     }
 
-    /// The same over and over, within the slew of the limits.
+    /// The sequence repeated, within the slew limit.
     ///
     /// # Errors
     /// Where the slew is not positive.
@@ -251,7 +251,7 @@ mod tests {
                     let most = slew.unwrap_or(f64::INFINITY) * 2.0 * (1.0 + 1e-12);
                     let steps = sequence.values.windows(2).map(|w| (w[1] - w[0]).abs());
                     assert!(steps.fold(0.0, f64::max) <= most, "{:?}", sequence.kind);
-                    // It moves: an experiment that stands still shows nothing.
+                    // The sequence has to change the input.
                     let (low, high) = sequence
                         .values
                         .iter()

@@ -1,4 +1,4 @@
-//! Experiments that tell two effects apart.
+//! Experiments that distinguish two effects.
 
 use ct_model::{Model, ModelSpec, Simulation};
 use ct_signals::{Record, noise};
@@ -21,7 +21,7 @@ fn proposed(problem: &Problem, between: [&str; 2], limits: &Limits) -> Result<De
     design(problem, between, limits, &Options::default(), &|_| {})
 }
 
-/// An experiment as the block whose heater lags answers to it.
+/// Response of the block with a lagging heater to an experiment.
 fn answer(design: &Design, of: &Record, seed: u64) -> Record {
     let model = Model::new(ModelSpec::parse(&lagging()).unwrap());
     let parameters = model.parameters();
@@ -68,7 +68,7 @@ fn the_experiment_decides_for_the_truth() {
         let best = &design.experiments[0];
         assert!(best.refitted && best.power.power > 6.0, "{best:?}");
         assert_eq!(design.prospect, Prospect::Decides);
-        // The room is held; the heater stays within what it did.
+        // The room temperature is held; the heater stays within its previous range.
         assert!(
             design.experiment.inputs[1]
                 .values
@@ -83,7 +83,7 @@ fn the_experiment_decides_for_the_truth() {
         let (low, high) = range(&own.inputs[0].values);
         let applied = range(&design.experiment.inputs[0].values);
         assert!(applied.0 >= low && applied.1 <= high);
-        // What was applied once more is worth less than the best.
+        // The repetition of the previous experiment has less power than the best one.
         let again = design.again.as_ref().unwrap();
         assert_eq!(again.inputs[0].kind, Kind::Again);
         assert!(again.power.power < best.power.power);

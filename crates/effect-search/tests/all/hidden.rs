@@ -1,4 +1,4 @@
-//! Records of models in which something is hidden, and what is said of them.
+//! Records of models with a hidden effect, and their diagnoses.
 
 use std::collections::BTreeMap;
 
@@ -44,7 +44,7 @@ end Pair;"#;
 const ROWS: usize = 500;
 const STEP: f64 = 5.0;
 
-/// Levels that look random and are the same for all.
+/// Pseudo-random levels, the same in all tests.
 fn level(k: usize, of: usize) -> f64 {
     ((k / (17 + 6 * of) + of) * 7919 % 13) as f64 * 3.0
 }
@@ -137,7 +137,7 @@ fn block(equation: &str) -> String {
         .replace("g*u - k*(T - Ta)", equation)
 }
 
-/// The block behind a sensor with a time constant of 25 s.
+/// The block after a sensor with a time constant of 25 s.
 fn lagging() -> String {
     block("g*u - k*(T - Ta)")
         .replace(
@@ -232,7 +232,7 @@ fn a_candidate_of_the_users_own_is_judged_beside_the_others() {
         .insert("draught".to_string(), candidate.clone());
     let diagnosis = found(&problem);
     assert!(names(&diagnosis, "draught"), "{:?}", diagnosis.groups);
-    // One that equals another is refused.
+    // A candidate that equals another one is rejected.
     problem.candidates.insert("wind".to_string(), candidate);
     let refused = diagnose(&problem, &Options::default(), &|_| {});
     assert!(matches!(refused, Err(Error::Own(_))));
@@ -240,7 +240,7 @@ fn a_candidate_of_the_users_own_is_judged_beside_the_others() {
 
 #[test]
 fn what_no_candidate_holds_is_not_called_noise() {
-    // A heat that comes and goes as it likes.
+    // A heat flow with an irregular course.
     let text = block(
         "g*u - k*(T - Ta) + (if time > 700 and time < 1000 then 12 else if time > 1500 and time < 1650 then -15 else 0)",
     );
@@ -254,8 +254,8 @@ fn what_no_candidate_holds_is_not_called_noise() {
     assert!(diagnosis.left.is_some());
 }
 
-/// The gain at one block rises and falls with the temperature of the other: effects of the catalogue imitate a part of it, and a noise model
-/// takes the rest.
+/// The gain at one block rises and falls with the temperature of the other: effects of the catalogue imitate a part of it, and a noise
+/// model takes the rest.
 #[test]
 fn a_function_that_no_candidate_has_is_found_in_what_the_noise_model_takes_for_noise() {
     for correlation in [0.0, 0.8] {
@@ -299,7 +299,7 @@ fn effects_of_the_model_file_are_fitted_with_it_and_keep_their_record() {
     let numbers = &found.record_numbers["lag(y)"];
     assert_eq!(numbers["duration"], STEP * (ROWS - 1) as f64);
     assert_eq!(numbers["interval"], STEP);
-    // It belongs to the believed model: nothing is missing beside it.
+    // The effect belongs to the believed model: nothing else is missing.
     let diagnosis = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
     assert_eq!(
         diagnosis.verdict,

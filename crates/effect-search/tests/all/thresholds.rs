@@ -59,6 +59,6 @@ fn thresholds_are_read_back_as_they_were_written() {
     }
     let value = serde_json::to_value(Thresholds::DEFAULT).unwrap();
     let numbers = value.as_object().unwrap().values();
-    // One number a field, and none at zero: each can be halved and doubled.
+    // One number per field, and none is zero: each can be halved and doubled.
     assert!(numbers.clone().all(|number| number.as_f64() > Some(0.0)));
 }

@@ -5,7 +5,7 @@ use ct_signals::ArModel;
 use super::{Fit, fit_from};
 use crate::{Error, Noise, Residuals, Stopping, marginal, residuals, rows};
 
-/// Estimates the noise's colour from a fit's residual and refits in that metric, until the two agree.
+/// Estimates the noise model from a fit's residual and refits with this weighting, until the two agree.
 ///
 /// # Errors
 /// As [`fit_from`].
@@ -17,13 +17,12 @@ pub fn coloured(
 ) -> Result<Fit, Error> {
     let (starts, agree) = (fit.starts, fit.agree);
     let mut fit = prewhitened(model, fit, order, None, stopping)?;
-    // The likelihood, by which models are compared, is at its best now; the errors follow from the colour that
-    // the fit has not bent.
+    // The fit maximises the likelihood, by which models are compared; the standard errors use the noise model of an unbiased residual.
     if fit.noise.order() > 0 {
         let (deviance, parameters, price) = (fit.deviance, fit.parameters, fit.price);
         let noise = noise_of(model, &fit, order)?;
         fit = fit_from(model, vec![fit.x.into()], &noise, stopping)?;
-        // A likelihood is paid for with the coefficients that it had.
+        // The likelihood is compared with the penalty for its number of coefficients.
         (fit.deviance, fit.parameters, fit.price) = (deviance, parameters, price);
         if let Some(rows) = rows(model, &fit.x) {
             let own: Vec<usize> = (0..fit.interior.len()).collect();
@@ -77,7 +76,7 @@ pub fn prewhitened(
         }
     }
     if fit.noise.order() == 0 {
-        // A white metric's scale plays no part in a fit, and may stand for any: here it becomes the noise's own.
+        // The scale of a white-noise weighting has no influence on a fit: here it is set to the noise's scale.
         let sigma = fit.variance().sqrt();
         let white = |weight: &f64| ArModel::white(sigma / weight);
         fit.noise = Noise::of(fit.weights.iter().map(white).collect());
@@ -85,7 +84,7 @@ pub fn prewhitened(
     Ok(fit)
 }
 
-/// The noise of a fit's residual, of order zero to `order` at each output, without the bias that fitting leaves in it.
+/// The noise model of a fit's residual, of order zero to `order` at each output, corrected for the bias that fitting causes.
 ///
 /// # Errors
 /// Where the model is not finite.

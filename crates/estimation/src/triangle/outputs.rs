@@ -1,4 +1,4 @@
-//! Several outputs: the R factor of each, and the weights that their residuals ask for.
+//! R factor of each output, and weights from the outputs' residuals.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,18 +11,18 @@ pub(super) struct Outputs {
     triangles: Vec<Triangle>,
     /// The rows of priors, in standard errors.
     priors: Triangle,
-    /// What outputs count by; its sums are those of the residuals.
+    /// Weights of the outputs, from the sums of squared residuals.
     pub(super) squares: Squares,
 }
 
-/// Weights are found again so often in a step, and until they change by less than this part.
+/// The weights are updated at most this number of times in a step, or until they change by less than this share.
 pub(super) const ROUNDS: usize = 20;
 
 pub(super) const SAME_WEIGHTS: f64 = 1e-3;
 
 impl Triangle {
-    /// The triangle of the rows of all outputs and of the priors, each times its weight by `squares`, those of the residuals: of an only
-    /// output without priors its own.
+    /// The R factor of the rows of all outputs and of the priors, each times its weight by `squares`: for a single output without priors,
+    /// its own R factor.
     #[must_use]
     pub(crate) fn of_outputs(
         mut triangles: Vec<Self>,
@@ -48,7 +48,7 @@ impl Triangle {
         all
     }
 
-    /// The same rows, those of priors with another weight.
+    /// The same rows with another weight of the priors' rows.
     #[must_use]
     pub(crate) fn with_prior_weight(self, weight: f64) -> Self {
         match self.outputs {
@@ -86,7 +86,7 @@ impl Triangle {
 }
 
 impl Outputs {
-    /// What a step leaves of each output, and of the priors.
+    /// Predicted sums of squares of each output and of the priors after a step.
     pub(super) fn left(&self, x: &[f64]) -> Squares {
         let mut squares = self.squares.clone().with_prior(self.priors.left(x));
         for (sum, triangle) in squares.sums.iter_mut().zip(&self.triangles) {
@@ -95,7 +95,7 @@ impl Outputs {
         squares
     }
 
-    /// The triangle of all rows, those of each output and those of the priors times their weight.
+    /// The R factor of all rows, with those of each output and those of the priors times their weight.
     pub(super) fn weighted(&self, weights: &[f64], of_priors: f64) -> Triangle {
         let columns = self.priors.columns();
         let mut all = Triangle::new(columns);

@@ -64,7 +64,7 @@ fn agrees_with_a_dense_solution() {
 
 #[test]
 fn a_step_of_two_outputs_is_that_of_the_likelihood() {
-    // One output is explained by the columns but for a little, the other is noise.
+    // The columns explain most of one output, the other output is noise.
     let (n, p) = (120, 3);
     let rows = rows(2 * n, p);
     let mut triangles = vec![Triangle::new(p + 1), Triangle::new(p + 1)];

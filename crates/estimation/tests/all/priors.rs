@@ -73,8 +73,8 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// Outputs with noise of standard deviations 0.3, 0.06 .. and this correlation from sample to sample; priors of two entries, one of which is
-/// as good as the record, read with their own errors.
+/// Outputs with noise of standard deviations 0.3, 0.06 .. and this correlation from sample to sample; priors of two entries, one of which
+/// is as good as the record, read with their own errors.
 fn drawn(seed: u64, outputs: usize, correlation: f64, third: f64) -> Curves {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut curves = Curves {
@@ -159,7 +159,7 @@ fn an_entry_that_no_sample_shows_is_as_its_prior_says() {
             prior.std_error,
             max_relative = 1e-9
         );
-        // Without a prior it has no error.
+        // Without a prior it has no standard error.
         let without = Curves {
             priors: Vec::new(),
             ..drawn(5, outputs, 0.0, 0.0)
@@ -186,7 +186,7 @@ fn a_start_far_from_a_prior_ends_where_a_near_one_does() {
     assert!((near.x[2] - curves.priors[1].value).abs() < 1e-3);
 }
 
-/// Intervals of 95 % hold the truth in 95 % of the draws of noise and priors, in both metrics, and priors make them shorter.
+/// Intervals of 95 % contain the true value in 95 % of the draws of noise and priors, with both weightings, and priors make them shorter.
 #[test]
 fn intervals_hold_the_truth() {
     const RUNS: u64 = 400;
@@ -228,7 +228,7 @@ fn intervals_hold_the_truth() {
     }
 }
 
-/// A model that lacks something may end far from a prior: what is fitted on from there begins there, and not near the prior.
+/// An incomplete model may end far from a prior: a continued fit starts at this end, and not near the prior.
 #[test]
 fn a_fit_goes_on_where_another_ended_far_from_a_prior() {
     let mut curves = drawn(5, 1, 0.0, 1.0);
@@ -252,7 +252,7 @@ fn a_fit_goes_on_where_another_ended_far_from_a_prior() {
         stopping,
     );
     assert_eq!(again.unwrap().x, ended.x);
-    // A start that is worse than one near the prior begins near it.
+    // A start with a higher cost than a point near the prior begins near the prior.
     let mut far = ended.x.clone();
     far[1] = -40.0;
     let near = fit_from(&curves, vec![Start::from(far)], &white, stopping).unwrap();

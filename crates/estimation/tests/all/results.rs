@@ -73,7 +73,8 @@ fn a_fit_is_read_again() {
 
 #[test]
 fn white_noise_of_a_prewhitened_fit_has_the_size_of_the_residual() {
-    // Residuals without memory, in two units: the noise model's size goes with the unit, and is not that of the metric of the fit.
+    // Residuals without memory, in two units: the scale of the noise model changes with the unit, and differs from that of the fit's
+    // weighting.
     for unit in [1.0, 0.01] {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let noise = StandardNormal.sample_iter(&mut rng);

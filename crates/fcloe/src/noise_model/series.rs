@@ -1,18 +1,18 @@
-//! Residuals as a series with the other columns that are fitted beside it: its autoregression, and what whitening leaves.
+//! Residuals as a series together with the regressors: the autoregression, and the whitened result.
 
 use ct_signals::{ArModel, StationaryNoise};
 use estimation::Triangle;
 
 use crate::Error;
 
-/// A series, and the signals in it that are no noise.
+/// A series, and the deterministic signals in it.
 pub(super) struct Series {
     pub(super) values: Vec<f64>,
     pub(super) beside: Vec<Vec<f64>>,
 }
 
-/// The autoregression of what is left of all series, and minus twice the logarithm of its marginal likelihood, with
-/// the penalty of Bayes' information criterion for its coefficients.
+/// The autoregression of the residuals of all series, and minus twice the logarithm of its marginal likelihood, with the penalty of Bayes'
+/// information criterion for its coefficients.
 pub(super) fn autoregression(
     mut all: Vec<Series>,
     max_order: usize,
@@ -41,7 +41,7 @@ pub(super) fn autoregression(
 }
 
 impl Series {
-    /// The values less what they hold of the signals beside the noise.
+    /// The values after subtraction of the estimated deterministic signals.
     pub(super) fn without_others(mut self) -> Self {
         let (triangle, x) = match self.values.iter().any(|v| v.is_nan()) {
             true => self.there().regression(),
@@ -57,7 +57,7 @@ impl Series {
         self
     }
 
-    /// The rows whose value is there.
+    /// The present rows.
     fn there(&self) -> Self {
         let only = |signal: &Vec<f64>| {
             let rows = signal.iter().zip(&self.values);
@@ -70,7 +70,7 @@ impl Series {
         }
     }
 
-    /// The rows whose value is there, whitened as those of a process, and `log|R|` of them.
+    /// Whitens the present rows with the process, and returns their `log|R|`.
     pub(super) fn whitened(&self, process: &StationaryNoise) -> (Self, f64) {
         let mut whitener = process.whitener(1 + self.beside.len());
         let mut whitened = self.there();
@@ -95,7 +95,7 @@ impl Series {
         (whitened, log_det)
     }
 
-    /// Least squares of the values on what is beside the noise; 0 where that is not determined.
+    /// Least squares of the values on the deterministic signals; 0 if not determined.
     pub(super) fn regression(&self) -> (Triangle, Vec<f64>) {
         let q = self.beside.len();
         let mut columns: Vec<&[f64]> = self.beside.iter().map(Vec::as_slice).collect();

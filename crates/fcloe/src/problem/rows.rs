@@ -8,7 +8,7 @@ use crate::simulation::BLOCK;
 use crate::{ClosedLoop, Error, LoopSimulator, PlantModel};
 
 impl Problem {
-    /// J and its derivatives at x, or the residual's column alone, unless J is above a limit: that is known before the last sample as a rule.
+    /// J and its derivatives at x, or the residual's column alone, unless J exceeds a limit, which is usually known before the last sample.
     pub(crate) fn evaluate(
         &self,
         x: &[f64],
@@ -20,7 +20,7 @@ impl Problem {
         if !closed.is_stable() {
             return Err(Refused::Unstable);
         }
-        // Each record's rows have few columns other than zero: they are folded by themselves.
+        // Each record's rows have few nonzero columns: each record is reduced separately.
         let of_record = |index| {
             let places = self.places(index, sensitivities);
             (index, Triangle::new(places.len()), places)
@@ -47,7 +47,7 @@ impl Problem {
             } else {
                 own.1.push_columns(columns);
             }
-            // A cost that is no number is found out below.
+            // A NaN cost is detected below.
             let cost = all.cost() + own.1.cost();
             !(cost > limit && cost.is_finite())
         });
@@ -65,7 +65,7 @@ impl Problem {
         }
     }
 
-    /// Where the columns that a record shows have their places: those of theta, its levels, the residual; or the residual alone.
+    /// Column positions of a record's quantities: those of theta, its levels, the residual; or the residual alone.
     fn places(&self, index: usize, sensitivities: bool) -> Vec<usize> {
         if !sensitivities {
             return vec![0];
@@ -78,8 +78,9 @@ impl Problem {
         places
     }
 
-    /// Simulates all records at x and shows the index of the record, its readings (NaN where they are missing) and, if asked for, the columns of its sensitivities (theta, then its
-    /// levels), the residual's last, up to [`BLOCK`] samples at a time, until `see` has seen enough; whether it has seen all.
+    /// Simulates all records at x and shows the index of the record, its readings (NaN where they are missing) and, if asked for, the
+    /// columns of its sensitivities (theta, then its levels), the residual's last, up to [`BLOCK`] samples at a time, until `see` has seen
+    /// enough; whether it has seen all.
     fn visit(
         &self,
         closed: &ClosedLoop,
@@ -151,7 +152,7 @@ impl Problem {
         Ok(true)
     }
 
-    /// Shows the rows of all samples, or those of the residual alone.
+    /// Passes each row of all samples, or the rows of the residual alone, to a function.
     fn each(
         &self,
         x: &[f64],
@@ -192,8 +193,8 @@ impl Problem {
     }
 }
 
-/// The residual `y - y^` of all records as one output, NaN where the reading is missing; its entries are theta, and each estimated level's distance from where it started (drive, then y,
-/// record by record). It is not finite where the loop is not stable.
+/// The residual `y - y^` of all records as one output, NaN if the reading is missing; its parameters are theta, and each estimated level's
+/// distance from its start (drive, then y, record by record). It is not finite if the loop is not stable.
 impl Residuals for Problem {
     fn free(&self) -> &[usize] {
         &self.free

@@ -1,4 +1,4 @@
-//! How the recursive estimator fares, condition (14) included.
+//! State of the recursive estimator, including condition (14).
 
 use ct_rls::RecursiveEstimator;
 use nalgebra::DMatrix;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::RecursiveFcloe;
 use crate::{ClosedLoop, Condition, Error, PlantModel};
 
-/// What an operator wants to see now and then.
+/// State of the estimator for an operator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LoopHealth {
     /// The least squares inside, in the relative parameters `delta = theta/scale - 1`: the smallest eigenvalue of the
@@ -15,19 +15,19 @@ pub struct LoopHealth {
     pub least_squares: ct_rls::Health,
     /// Root mean square of the output error over the memory, unit of y.
     pub residual_rms: f64,
-    /// Steps that were halved because P^ would have left the stable ones, or a parameter its range.
+    /// Steps that were halved because P^ would not have been stable, or a parameter would have left its range.
     pub shortened: u64,
-    /// Steps that were refused for that altogether.
+    /// Steps that were rejected for these reasons.
     pub refused: u64,
     /// Steps that were cut to the step limit.
     pub limited: u64,
-    /// Condition (14) between the filter and the plants that the data leave plausible, the worst of them: the present
-    /// estimates, and those two standard deviations away along each column of a square root of the covariance.
+    /// Condition (14) between the filter and the plausible plants, the worst of them: the present estimates, and those two standard
+    /// deviations away along each column of a square root of the covariance.
     pub plausible: Condition,
 }
 
 impl RecursiveFcloe {
-    /// The health, with condition (14). Costs a few polynomials' roots: call it now and then.
+    /// The state of the estimator, with condition (14). The call computes roots of some polynomials: use it only now and then.
     ///
     /// # Errors
     /// [`Error::Rls`] where the least squares inside have stopped; [`Error::Lti`] for numbers out of range.
@@ -52,7 +52,7 @@ impl RecursiveFcloe {
         })
     }
 
-    /// Condition (14) between the filter in use and a plant that is taken for the true one.
+    /// Condition (14) between the present filter and a plant that is assumed to be the true one.
     ///
     /// # Errors
     /// As [`Condition::new`].
@@ -61,7 +61,7 @@ impl RecursiveFcloe {
         Condition::new(&self.filter_polynomial()?, truth.characteristic())
     }
 
-    /// `theta +- 2 sd` along the columns of a Cholesky factor of the covariance; those that are no plant are left out.
+    /// `theta +- 2 sd` along the columns of a Cholesky factor of the covariance; invalid plants are left out.
     fn plausible_plants(&self) -> Vec<PlantModel> {
         let covariance: DMatrix<f64> =
             self.least_squares().covariance() * self.residual_rms().powi(2);

@@ -37,16 +37,16 @@ pub use settings::{Filter, RecursiveSettings};
 use crate::{ClosedLoop, Controller, Error, Orders, PlantModel};
 use model::MovingLoop;
 
-/// Halvings of a step before it is refused.
+/// Number of halvings of a step before it is rejected.
 const HALVINGS: usize = 20;
 
-/// The rate at which the model's loop has to decay, of the start's slowest.
+/// Least decay rate of the model's loop, relative to the slowest one at the start.
 const DECAY: f64 = 0.01;
 
 /// A parameter smaller than this share of its scale may change by the step limit times this share.
 const SMALL: f64 = 0.1;
 
-/// Sizes of a scale with which P, in the parameters' units, stays in the floating-point range.
+/// Range of a scale for which P, in the parameters' units, does not overflow.
 const SCALES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 
 /// One sample of the loop.
@@ -72,7 +72,7 @@ pub struct RecursiveFcloe {
     rate: f64,
     time: f64,
     last_drive: f64,
-    /// Of the output error, and how much of it has been seen.
+    /// Variance of the output error, and the sum of weights it is based on.
     variance: (f64, f64),
     shortened: u64,
     refused: u64,
@@ -209,7 +209,7 @@ impl RecursiveFcloe {
         }
     }
 
-    /// F back to its start, and the forgetting too: after a jump of the parameters.
+    /// Resets F and the forgetting to their start values: for use after a step change of the parameters.
     ///
     /// # Errors
     /// [`Error::Rls`].
@@ -246,10 +246,10 @@ impl RecursiveEstimator for RecursiveFcloe {
     type Covariance = DMatrix<f64>;
     type Error = Error;
 
-    /// Learns from y at this sample, then moves the model over dt with the drive held. Where y is missing (NaN) or of
-    /// no sense the model moves on all the same; where the drive is not finite, the last one is held. Where the model's states
-    /// leave the range of numbers it begins again from rest; the outcome says what was done with the sample. Steps are 1e-40 to
-    /// 1e30 of the time's unit, and no longer than 10 000 time constants of the fastest root.
+    /// Updates the estimates with y at this sample, then simulates the model over dt with the drive held. If y is missing (NaN) or
+    /// implausible, the model is simulated without an update; if the drive is not finite, the last value is held. If the model's states
+    /// overflow, the model restarts from rest; the outcome shows how the sample was used. Steps are 1e-40 to 1e30 of the time's unit, and
+    /// no longer than 10 000 time constants of the fastest root.
     fn update(&mut self, sample: &LoopSample, dt: f64) -> Innovation {
         let point = self.settings.operating_point;
         let level = if self.controller.is_open_loop() {
@@ -281,7 +281,7 @@ impl RecursiveEstimator for RecursiveFcloe {
                 outcome: Outcome::NotFinite,
             }
         };
-        // what was learnt stays learnt where the model's states leave the range of numbers and it begins again from rest
+        // the update is kept even if the model's states overflow and the model restarts from rest
         self.model.advance(self.last_drive, dt);
         self.time += dt;
         innovation
@@ -292,7 +292,7 @@ impl RecursiveEstimator for RecursiveFcloe {
         &self.theta
     }
 
-    /// P in theta: times the noise's variance, the covariance of the estimates, where little is forgotten.
+    /// P in theta: times the noise's variance, it is the covariance of the estimates, if forgetting is slow.
     fn covariance(&self) -> DMatrix<f64> {
         let f = self.rls.covariance();
         DMatrix::from_fn(f.nrows(), f.ncols(), |i, j| {
@@ -300,7 +300,7 @@ impl RecursiveEstimator for RecursiveFcloe {
         })
     }
 
-    /// Of the least squares inside, in the relative parameters; [`RecursiveFcloe::loop_health`] says more.
+    /// State of the least squares inside, in the relative parameters; [`RecursiveFcloe::loop_health`] has more information.
     fn health(&self) -> Result<Health, Error> {
         Ok(self.rls.health()?)
     }
@@ -310,14 +310,14 @@ impl RecursiveEstimator for RecursiveFcloe {
 mod tests {
     use super::*;
 
-    /// The factors give what the equations of the head say of F itself, step by step.
+    /// The factored form agrees with the equations for F in the module's head, step by step.
     #[test]
     fn the_textbook_recursion() {
         let plant = PlantModel::new(&[210.0, 9000.0], &[5.0, 40.0]).unwrap();
         let controller = Controller::pi(0.3, 0.004).unwrap();
         let (f0, eta, fading, dt) = (0.3, 0.01, 200.0, 2.0);
         let mut settings = RecursiveSettings::new(f0, eta, fading, 1e9);
-        // The start is so near that neither limit nor border acts.
+        // The start is so near that neither the step limit nor the stability bound is active.
         settings.range = 1e6;
         let mut estimator = RecursiveFcloe::new(&plant, &controller, settings).unwrap();
         let mut f = DMatrix::identity(4, 4) * f0;

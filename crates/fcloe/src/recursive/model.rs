@@ -1,4 +1,4 @@
-//! The model's loop and the sensitivities' chains while the parameters move.
+//! The model's loop and the filters of the sensitivities for time-varying parameters.
 //!
 //! Equations, for monic `A`, `S` (coefficients over the leading one: alpha, beta, s, r), observer forms, so that the
 //! states stay continuous in meaning when theta moves: they are kept as they are.
@@ -20,7 +20,7 @@
 
 use crate::{Controller, Orders};
 
-/// More substeps than this are refused: a root that is 10 000 times faster than the sampling.
+/// Limit of substeps: a root that is 10 000 times faster than the sampling needs more.
 const MAX_SUBSTEPS: f64 = 1e4;
 
 /// A loop whose parameters may change between samples. Allocates when it is made.
@@ -67,7 +67,7 @@ impl MovingLoop {
         }
     }
 
-    /// Takes other parameters; the states stay.
+    /// Sets other parameters; the states do not change.
     pub(super) fn set(&mut self, theta: &[f64], renew_filter: bool) {
         let n = self.orders.n;
         let leading = theta[n - 1];
@@ -148,8 +148,8 @@ impl MovingLoop {
         (substeps <= MAX_SUBSTEPS).then_some(substeps)
     }
 
-    /// Moves all states over dt, the drive held. False where there would be too many substeps, or where the states
-    /// leave the range of numbers: then they are at rest again.
+    /// Advances all states over dt with a constant drive. Returns false if there are too many substeps, or if the states overflow: then
+    /// they are set to rest.
     pub(super) fn advance(&mut self, drive: f64, dt: f64) -> bool {
         let Some(substeps) = self.substeps(dt) else {
             return false;
@@ -159,7 +159,7 @@ impl MovingLoop {
         for _ in 0..substeps as usize {
             self.term.copy_from_slice(&self.state);
             let (mut input, mut size) = (drive, 1.0);
-            // Blocks of equal roots make the terms grow with k^2 beside the power.
+            // Blocks of equal roots make the terms grow with k^2 in addition to the power.
             let mut k = 1.0;
             while size * k * k > 1e-18 {
                 self.slope(input);
@@ -226,7 +226,7 @@ fn characteristic(p: &mut [f64], theta: &[f64], n: usize, r: &[f64], s: &[f64]) 
     }
 }
 
-/// No root of the polynomial has a larger modulus.
+/// An upper bound of the modulus of all roots.
 fn root_bound(p: &[f64]) -> f64 {
     let (Some(leading), n) = (p.last(), p.len() - 1) else {
         return 0.0;
@@ -251,7 +251,7 @@ mod tests {
     use super::*;
     use crate::{LoopSimulator, PlantModel};
 
-    /// With parameters that rest it is the batch fit's simulation, to rounding: y^ and all sensitivities, for any step.
+    /// With constant parameters the recursion equals the simulation of the batch fit, to rounding: y^ and all sensitivities, for any step.
     #[test]
     fn as_the_exact_simulation() {
         let pid = Controller::pid(0.3, 0.004, 4.0, 10.0).unwrap();

@@ -1,22 +1,22 @@
-//! How the recursive estimator learns, forgets and is held back.
+//! Settings of the recursive estimator: gain, forgetting and limits.
 
 use serde::{Deserialize, Serialize};
 
 use crate::controller::positive;
 use crate::{Error, OperatingPoint};
 
-/// The polynomial in the filter `S/P^` behind the sensitivities.
+/// The polynomial in the filter `S/P^` after the sensitivities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Filter {
-    /// P^ of the start, for good: what condition (14) is about.
+    /// P^ of the start, constant: the filter of condition (14).
     Fixed,
-    /// P^ of the present estimates. From bad starts it converges far more often.
+    /// P^ of the present estimates. From bad starts this filter converges far more often.
     Adaptive,
 }
 
-/// Settings of the recursive estimator. Values that were tried, for a reference of amplitude 1 and closed-loop poles
-/// about 0.01 rad/s, sampled every second, at 20 to 30 dB:
+/// Settings of the recursive estimator. These values were tested for a reference of amplitude 1 and closed-loop poles about 0.01 rad/s,
+/// sampled every second, at 20 to 30 dB:
 ///
 /// | plant | gain | forgetting factor a second | fading | step limit |
 /// |---|---|---|---|---|
@@ -28,20 +28,20 @@ pub enum Filter {
 /// forgotten either. To follow a drift: a gain of 1, the forgetting rate 1 over the memory, and no fading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RecursiveSettings {
-    /// Which polynomial filters.
+    /// Polynomial of the filter.
     pub filter: Filter,
     /// F(0), the same for each scaled parameter: its relative variance over the noise's \[1/unit of y^2\], above 0.
     pub gain: f64,
     /// Forgetting rate eta at the beginning \[1/time\], at least 0.
     pub forgetting: f64,
-    /// The forgetting fades out with this time constant \[time\]; infinite to go on forgetting, which is needed to
-    /// follow parameters that drift.
+    /// Time constant with which the forgetting fades out \[time\]; infinite for constant forgetting, which is needed to follow drifting
+    /// parameters.
     pub fading: f64,
     /// Largest relative change of a parameter in one step, above 0.
     pub step_limit: f64,
-    /// No parameter grows beyond this many times its scale, nor `a_n` falls below its scale over this; above 1.
+    /// No parameter grows above its scale times this factor, and `a_n` does not fall below its scale divided by this factor; above 1.
     pub range: f64,
-    /// The levels about which the model holds, subtracted from the signals.
+    /// The levels around which the model is valid; they are subtracted from the signals.
     pub operating_point: OperatingPoint,
 }
 
@@ -59,7 +59,7 @@ impl RecursiveSettings {
         }
     }
 
-    /// The same with another filter.
+    /// The same settings with another filter.
     #[must_use]
     pub fn with_filter(mut self, filter: Filter) -> Self {
         self.filter = filter;

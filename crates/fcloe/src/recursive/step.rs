@@ -1,4 +1,4 @@
-//! One step of the recursion: what is learned from it, and how far it may go.
+//! One step of the recursion: the update and its limits.
 
 use ct_rls::RecursiveEstimator;
 use ct_rls::{Innovation, Outcome, Weights};
@@ -6,7 +6,7 @@ use ct_rls::{Innovation, Outcome, Weights};
 use super::{Filter, HALVINGS, RecursiveFcloe, SMALL};
 
 impl RecursiveFcloe {
-    /// One step of Gauss-Newton from the output error.
+    /// One Gauss-Newton step from the output error.
     pub(super) fn learn(&mut self, drive: f64, epsilon: f64, dt: f64) -> Innovation {
         let unused = |outcome| Innovation {
             epsilon,
@@ -16,7 +16,7 @@ impl RecursiveFcloe {
         self.model.sensitivities(drive, &self.scale, &mut self.s);
         let l = self.forgetting_factor(dt);
         let eta = -l.ln() / dt;
-        // eta/(1 - l), which is 1/dt where nothing is forgotten.
+        // eta/(1 - l), or 1/dt without forgetting.
         let c = if 1.0 - l > 1e-12 {
             eta / (1.0 - l)
         } else {
@@ -40,7 +40,7 @@ impl RecursiveFcloe {
         innovation
     }
 
-    /// From `delta` towards what the least squares say, as far as is allowed.
+    /// Step from `delta` towards the least-squares estimate, within the limits.
     fn take_step(&mut self) {
         let mut share = 1.0_f64;
         for ((step, new), old) in self
@@ -78,12 +78,12 @@ impl RecursiveFcloe {
         } else {
             self.refused += 1;
         }
-        // What was not taken is forgotten; the lengths agree, and the numbers are finite.
+        // The part of the update beyond the limits is dropped; the lengths agree, and the numbers are finite.
         let kept = self.rls.set_theta(&self.delta);
         debug_assert!(kept.is_ok());
     }
 
-    /// Whether `tried` may be the estimates. Moves `p`.
+    /// Whether `tried` is an acceptable estimate. Updates `p`.
     fn allowed(&mut self) -> bool {
         let range = self.settings.range;
         let inside = self

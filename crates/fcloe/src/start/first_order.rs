@@ -1,5 +1,4 @@
-//! The start of the paper, for plants of first order: least squares and instruments on signals through one state
-//! variable filter.
+//! The paper's start for plants of first order: least squares and instruments with one state variable filter.
 //!
 //! Model: `y' = -1/tau y + K/tau u`, and so for the filtered signals (Baysse, Carrillo, Habbadi, (21) to (23)):
 //! ```text
@@ -18,7 +17,7 @@ use super::signals::solve;
 use crate::controller::positive;
 use crate::{Error, LoopRecord, PlantModel};
 
-/// How `lambda/(p + lambda)` is sampled.
+/// Discretisation of `lambda/(p + lambda)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Discretisation {
@@ -26,7 +25,7 @@ pub enum Discretisation {
     Euler,
     /// Exact for held signals, `Y_f = (1 - e^{-lambda Ts})/Ts (y - y_f)`.
     ZeroOrderHold,
-    /// Exact for held signals, but `Y_f = lambda (y - y_f)` as it is printed: inconsistent, to reproduce results.
+    /// Exact for held signals, but `Y_f = lambda (y - y_f)` as printed: inconsistent, for reproduction of results.
     ZeroOrderHoldAsPrinted,
 }
 
@@ -42,13 +41,13 @@ impl Discretisation {
     }
 }
 
-/// What the instruments are used in.
+/// Form of the equation for the instruments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
     /// `[sum phi^ phi']^-1 sum phi^ Y`.
     Standard,
-    /// `[sum phi^ phi^']^-1 sum phi^ Y`, (26) as it is printed: biased even in open loop, to reproduce results.
+    /// `[sum phi^ phi^']^-1 sum phi^ Y`, (26) as printed: biased even in open loop, for reproduction of results.
     AsPrinted,
 }
 

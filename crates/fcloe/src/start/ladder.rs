@@ -1,4 +1,4 @@
-//! From orders alone to a few plants to start the batch fit from.
+//! Start values of the batch fit, from orders alone.
 //!
 //! For each bandwidth of a ladder: least squares, instruments up to three times, refinement. What comes out at each stage
 //! is kept if its loop is stable, and ranked by how well its loop, simulated from r, gives the record. Which stage wins
@@ -16,7 +16,7 @@ use crate::{ClosedLoop, Controller, Error, LoopRecord, Orders, PlantModel};
 /// Bandwidths over the loop's poles.
 const RUNGS: [f64; 4] = [2.0, 3.5, 6.0, 10.0];
 
-/// Where a candidate comes from.
+/// Source of a candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stage {
@@ -24,26 +24,26 @@ pub enum Stage {
     LeastSquares,
     /// Instruments from the loop.
     Instruments,
-    /// SRIVC: filter and instruments renewed with the estimates.
+    /// SRIVC: filter and instruments updated with the estimates.
     Srivc,
-    /// All poles at one place, and the gain that y and u have in step with r: nothing better had a stable loop.
+    /// All poles at one place, and the gain from the correlation of y and u with r: no other candidate had a stable loop.
     Guess,
 }
 
-/// A plant whose loop is stable.
+/// A plant with a stable loop.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
     /// The plant.
     pub plant: PlantModel,
-    /// Where it comes from.
+    /// Source of the candidate.
     pub stage: Stage,
-    /// Bandwidth of the filter it began with \[1/time\].
+    /// Bandwidth of the first filter \[1/time\].
     pub lambda: f64,
     /// Root mean square of `y - y^` with its loop simulated from r, unit of y.
     pub residual_rms: f64,
 }
 
-/// What the pipeline tries.
+/// Settings of the pipeline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PipelineSettings {
     /// Bandwidths \[1/time\]; empty for those of [`lambda_ladder`] without a guess.
@@ -68,7 +68,8 @@ impl Default for PipelineSettings {
 /// 10 over the longest record's duration to half the sampling rate, three to a decade.
 ///
 /// # Errors
-/// [`Error::NoRecord`]; [`Error::Setting`] for a sampling interval, or where the records are longer than the largest number; [`Error::Lti`].
+/// [`Error::NoRecord`]; [`Error::Setting`] for a sampling interval, or where the records are longer than the largest number;
+/// [`Error::Lti`].
 pub fn lambda_ladder(
     records: &[LoopRecord],
     controller: &Controller,
@@ -95,11 +96,11 @@ pub fn lambda_ladder(
     Ok((0..=rungs as usize).map(at).collect())
 }
 
-/// Candidates for the batch fit, the best first, none twice; the recursive estimator takes the first.
+/// Candidates for the batch fit, the best first, without duplicates; the recursive estimator uses the first.
 ///
 /// # Errors
-/// Those of [`LoopRecord::validate`]; [`Error::NoRecord`]; [`Error::RegressionWithoutInput`], [`Error::MissingReference`]; [`Error::Setting`];
-/// [`Error::NoStart`] where no plant that was tried has a stable loop.
+/// Those of [`LoopRecord::validate`]; [`Error::NoRecord`]; [`Error::RegressionWithoutInput`], [`Error::MissingReference`];
+/// [`Error::Setting`]; [`Error::NoStart`] where no plant that was tried has a stable loop.
 pub fn pipeline(
     records: &[LoopRecord],
     controller: &Controller,
@@ -149,7 +150,7 @@ pub fn pipeline(
         }
     }
     if found.is_empty() {
-        // Poles at the lower end of where a filter of that bandwidth would look for them.
+        // Poles at the lower end of the range for which a filter of this bandwidth is suitable.
         for lambda in lambda_ladder(records, controller, None)? {
             for plant in guesses(records, controller, orders, lambda / RUNGS[2]) {
                 if let Some(residual_rms) = residual(records, controller, &plant) {
@@ -188,7 +189,7 @@ fn alike(a: &PlantModel, b: &PlantModel) -> bool {
     pairs.all(|(a, b)| (a - b).abs() <= 0.01 * a.abs())
 }
 
-/// Of the loop simulated from r; none where it is not stable.
+/// Error of the loop simulated from r; none if the loop is not stable.
 fn residual(records: &[LoopRecord], controller: &Controller, plant: &PlantModel) -> Option<f64> {
     let closed = ClosedLoop::new(plant, controller).ok()?;
     if !closed.is_stable() {
@@ -209,7 +210,7 @@ fn residual(records: &[LoopRecord], controller: &Controller, plant: &PlantModel)
     rms.is_finite().then_some(rms)
 }
 
-/// `K/(1 + p/pole)^n` with the gain that y and u have in step with r, and parts of it; in open loop, in step with u.
+/// `K/(1 + p/pole)^n` with the gain from the correlation of y and u with r, and fractions of it; in open loop, with u.
 fn guesses(
     records: &[LoopRecord],
     controller: &Controller,

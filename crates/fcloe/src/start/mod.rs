@@ -1,4 +1,4 @@
-//! Where a fit may start: regressions on filtered signals, which need no start themselves.
+//! Start values of a fit: regressions on filtered signals, which need no start themselves.
 //!
 //! | question | answer |
 //! |---|---|

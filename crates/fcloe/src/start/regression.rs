@@ -4,20 +4,21 @@
 //! ```text
 //! p^n y_f = -sum_{i<n} alpha_i p^i y_f + sum_i beta_i p^i u_f
 //! ```
-//! whose terms a [`StateVariableFilter`](ct_lti::StateVariableFilter) gives without differentiating anything. y is taken for lines between samples, u for
-//! what its hold says: a held u taken for lines, or y for steps, shifts it by half a step and tau by 15 %.
+//! whose terms a [`StateVariableFilter`](ct_lti::StateVariableFilter) gives without differentiating anything. y is taken for lines between
+//! samples, u for what its hold says: a held u taken for lines, or y for steps, shifts it by half a step and tau by 15 %.
 //!
 //! Instruments: `[sum z phi']^-1 sum z p^n y_f`, with z the regressor of a model of the loop, driven by r, so that it
 //! owes nothing to the noise, circulating or not. In open loop it is driven by u.
 //!
-//! SRIVC, in a loop CLSRIVC: the filter is renewed, `E = A^`, and the instruments with it, until the estimates rest. For white noise on
-//! the record that is the least possible variance (P. C. Young, A. Jakeman, International Journal of Control 31 (1980)
-//! 741-764, for open loop; M. Gilson, H. Garnier, P. C. Young, P. Van den Hof, in Identification of Continuous-time Models from Sampled Data, Springer
-//! 2008, ch. 5, for the loop). In a loop of a continuous controller there remains the error of what u does between samples.
+//! SRIVC, in a loop CLSRIVC: the filter is renewed, `E = A^`, and the instruments with it, until the estimates rest. For white noise on the
+//! record that is the least possible variance (P. C. Young, A. Jakeman, International Journal of Control 31 (1980) 741-764, for open loop;
+//! M. Gilson, H. Garnier, P. C. Young, P. Van den Hof, in Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 5,
+//! for the loop). In a loop of a continuous controller there remains the error of what u does between samples.
 //!
-//! Readings of y may be missing; their rows do not count. In least squares y runs on lines between its readings, and rows behind long gaps are left out
-//! ([`ct_lti::ReadingFilter`]). With instruments what the model of the loop says stands for a missing reading in the filters of y: the instruments owe nothing to what the others
-//! hold beside it, so that the estimates are consistent, and for the filter `E = A^` the residual of a row has no part of what stands in other rows at all.
+//! Readings of y may be missing; their rows do not count. In least squares y runs on lines between its readings, and rows after long gaps
+//! are left out ([`ct_lti::ReadingFilter`]). With instruments what the model of the loop says stands for a missing reading in the filters
+//! of y: the instruments owe nothing to what the others hold beside it, so that the estimates are consistent, and for the filter `E = A^`
+//! the residual of a row has no part of what stands in other rows at all.
 //!
 //! Several records are taken together.
 
@@ -26,10 +27,10 @@ use ct_lti::Polynomial;
 use super::signals::{Signals, Sums};
 use crate::{ClosedLoop, Controller, Error, LoopRecord, Orders, PlantModel};
 
-/// The share of the readings that have to be left for least squares where readings are missing.
+/// The share of the readings that must be usable for least squares with missing readings.
 const LEAST_LEFT: f64 = 0.3;
 
-/// A refinement ends where no parameter changes by more than this share of itself.
+/// A refinement ends if every parameter changes by at most this share of its value.
 const RESTS: f64 = 1e-4;
 
 /// Least squares. `filter` is E, Hurwitz, of degree n, its scale being of no importance: `(p + lambda)^n`, say, lambda 2
@@ -123,19 +124,19 @@ pub(super) fn rows(
         })
 }
 
-/// The last of a refinement.
+/// Result of a refinement.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Refinement {
-    /// The last plant whose loop is stable.
+    /// The last plant with a stable loop.
     pub plant: PlantModel,
     /// Regressions that gave such a plant.
     pub iterations: usize,
-    /// Whether the estimates came to rest.
+    /// Whether the estimates have converged.
     pub rests: bool,
 }
 
-/// SRIVC, in a loop CLSRIVC: instruments and filter renewed with the estimates, at most `most` times. It ends early, with the last plant whose
-/// loop is stable, where the next one's is not, or where A^ is not Hurwitz and so is no filter.
+/// SRIVC, in a loop CLSRIVC: instruments and filter updated with the estimates, at most `most` times. It ends early, with the last plant
+/// that has a stable loop, if the next loop is unstable, or if A^ is not Hurwitz and cannot be a filter.
 ///
 /// # Errors
 /// [`Error::UnstableLoop`] for the start; those of [`LoopRecord::validate`], [`Error::RegressionWithoutInput`],

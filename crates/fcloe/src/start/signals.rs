@@ -1,4 +1,4 @@
-//! What all regressions share: signals with their derivatives, filtered alike, and the equations' solution.
+//! Shared parts of all regressions: signals with their derivatives, all with the same filter, and the solution of the equations.
 
 use ct_lti::{Hold, Polynomial, ReadingFilter, StateVariableFilter};
 use nalgebra::{DMatrix, DVector};
@@ -18,7 +18,7 @@ pub(super) fn input(record: &LoopRecord) -> Result<&[f64], Error> {
         })
 }
 
-/// u as the plant of the loop sees it, through a sensor's filter where there is one, and y, NaN where its reading is missing: deviations.
+/// u as the plant's input, through a sensor's filter if there is one, and y, NaN if its reading is missing: deviations.
 #[derive(Debug, Clone)]
 pub(super) struct Signals {
     pub(super) u: Vec<f64>,
@@ -36,7 +36,7 @@ impl Signals {
         Self::new(u, y, record, controller)
     }
 
-    /// Of a model of the loop driven by r, or by u in open loop: free of the record's noise.
+    /// Signals of a model of the loop driven by r, or by u in open loop: without the record's noise.
     pub(super) fn simulated(
         model: &PlantModel,
         record: &LoopRecord,
@@ -67,7 +67,7 @@ impl Signals {
             for u in &mut u {
                 *u = filter.update(*u, record.step)?[0];
             }
-            // It has no jumps any more.
+            // The filtered signal has no steps any more.
             u_hold = Hold::First;
         }
         Ok(Self {
@@ -83,7 +83,7 @@ impl Signals {
         self.y[k].is_nan()
     }
 
-    /// With other readings where some are missing.
+    /// Replaces missing readings by those of another record.
     pub(super) fn filled(mut self, from: &Self) -> Self {
         for (y, from) in self.y.iter_mut().zip(&from.y) {
             if y.is_nan() {
@@ -93,8 +93,8 @@ impl Signals {
         self
     }
 
-    /// Shows the number of the sample, and y_f and u_f with their derivatives, 0 to n, at each sample; not where a reading is missing, nor where the filter has not forgotten
-    /// a long gap ([`ReadingFilter`]).
+    /// Passes the number of the sample, and y_f and u_f with their derivatives, 0 to n, to a function; not for a missing reading, nor
+    /// before the filter has forgotten a long gap ([`ReadingFilter`]).
     pub(super) fn filtered(
         &self,
         filter: &Polynomial,
@@ -157,7 +157,7 @@ impl Sums {
         Ok(x.column(0).iter().copied().collect())
     }
 
-    /// `[sum z phi']^-1 X`, after a scaling of rows and columns that takes the units out.
+    /// `[sum z phi']^-1 X`, after a scaling of rows and columns that makes the result independent of units.
     pub(super) fn solve_for(&self, x: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let p = self.v.len();
         let undetermined = Error::NotDetermined {
@@ -187,7 +187,7 @@ impl Sums {
     }
 }
 
-/// [`Sums`] of all rows, solved.
+/// Solution of [`Sums`] of all rows.
 pub(super) fn solve<'a>(
     p: usize,
     rows: impl Iterator<Item = (&'a [f64], &'a [f64], f64)>,

@@ -5,8 +5,8 @@
 //! x^ - x = G^-1 sum z e,   G = sum z phi',   e = A/E w,   cov(x^) = G^-1 [sum_{k,l} R(k-l) z_k z_l'] G^-T
 //! ```
 //! whether w, the noise of y, circulates in the loop or stands on the record alone. w follows from e by the inverse of `A^/E` from sample
-//! to sample, an autoregression is fitted to it, and R is the autocovariance of that behind `A^/E`: no autoregression of modest order
-//! stands for the slow zeros of A. theta follows from x by its derivatives.
+//! to sample, an autoregression is fitted to it, and R is the autocovariance of that after `A^/E`: no autoregression of modest order stands
+//! for the slow zeros of A. theta follows from x by its derivatives.
 //!
 //! Where readings are missing their rows are 0 in both sums, and w is known only where the filter is A^, where it is e itself.
 //!
@@ -15,8 +15,9 @@
 //! `A^/E` grows without bound the autoregression is that of e itself.
 //!
 //! Figures, 400 runs for each of seven settings at 20 dB: the variance is 0.90 to 1.20 times that of the estimates where the filter is
-//! renewed, 0.94 to 1.8 times with one that stays. Intervals of 95 % hold the truth in 94 to 97 % for n = 1, in 86 % and more for n = 2,
-//! where lines between samples bias the estimates, and say nothing of that bias where the plant has a direct term: y jumps then (`cargo test -p fcloe --test all coverage::instruments -- --nocapture`).
+//! renewed, 0.94 to 1.8 times with one that stays. Intervals of 95 % contain the true value in 94 to 97 % for n = 1, in 86 % and more for n
+//! = 2, where lines between samples bias the estimates, and contain no information about that bias where the plant has a direct term: y
+//! jumps then (`cargo test -p fcloe --test all coverage::instruments -- --nocapture`).
 //!
 //! **Reference**: T. Söderström, P. Stoica, Instrumental Variable Methods for System Identification, Springer 1983, ch. 6.
 
@@ -31,11 +32,11 @@ use crate::{ClosedLoop, Controller, Error, LoopRecord, PlantModel};
 
 /// Orders of autoregressive noise that are tried: 0 to this.
 const MAX_ORDER: usize = 8;
-/// An inverse whose output has more than so many times the squares of its input grows without bound.
+/// An inverse whose output has more than this multiple of the squares of its input is unstable.
 const UNBOUNDED: f64 = 1e8;
 
-/// Standard errors of `theta` of a plant that [`instruments`](super::instruments) gave, with the filter it was given last, or
-/// [`srivc`](super::srivc) (the filter is then A^).
+/// Standard errors of `theta` of a plant from [`instruments`](super::instruments), with its last filter, or from [`srivc`](super::srivc)
+/// (the filter is then A^).
 ///
 /// # Errors
 /// As [`instruments`](super::instruments); [`Error::NotDetermined`] too where a variance is not finite; those of [`ArModel::fit`].
@@ -70,7 +71,7 @@ pub fn standard_errors(
     for (record, e) in records.iter().zip(&errors) {
         let sampled = system.sampled(Hold::Zero, record.step)?;
         let w = unfiltered(&system, &sampled, e);
-        // Not finite, as with missing readings, compares as not bounded.
+        // A value that is not finite, as with missing readings, counts as not bounded.
         if size(&w) * system.d().powi(2) <= UNBOUNDED * size(e) {
             noise.push(w);
         }
@@ -96,7 +97,7 @@ pub fn standard_errors(
     }
     let there = segments.iter().copied().flatten().filter(|w| !w.is_nan());
     let samples = there.count() as f64;
-    // The variance of the innovations is over the samples less their order.
+    // The variance of the innovations is divided by the number of samples minus the order.
     let order = ar.order() as f64;
     let variance = ar.sigma().powi(2) * (samples - order) / (samples - order - p as f64).max(1.0);
     let half = sums.solve_for(&middle)?;

@@ -1,4 +1,4 @@
-//! Whatever numbers come in, the recursive estimator stays finite, and what is refused changes nothing.
+//! For any numbers, the recursive estimator stays finite, and a rejected sample changes nothing.
 
 use ct_rls::RecursiveEstimator;
 use fcloe::start::{PipelineSettings, lambda_ladder, pipeline};

@@ -1,4 +1,4 @@
-//! What cannot be fitted is refused, with the numbers that disagree.
+//! Inputs that cannot be fitted are rejected, with the numbers that disagree.
 
 use crate::support::drive;
 use ct_lti::Hold;
@@ -42,8 +42,8 @@ fn an_unstable_loop_at_the_start() {
     assert!(error.to_string().contains("1.2"), "{error}");
 }
 
-/// An output that goes the wrong way asks for a negative gain, which this controller does not stabilise: the fit stays
-/// inside, and says why it ended.
+/// An output with the opposite sign needs a negative gain, which this controller does not stabilise: the fit stays in the stable region,
+/// and reports why it ended.
 #[test]
 fn a_fit_never_leaves_the_stable_loops() {
     let mut record = record();
@@ -66,7 +66,7 @@ fn a_fit_never_leaves_the_stable_loops() {
     }
 }
 
-/// Levels are no moves: they make a wrong controller no better.
+/// Constant levels do not count as changes: they do not hide a wrong controller.
 #[test]
 fn a_controller_that_does_not_match_raw_levels() {
     let mut raw = record();
@@ -108,7 +108,8 @@ fn a_controller_that_does_not_match() {
     assert!(refusal(exchanged, &pi()).contains("not R/S"));
 }
 
-/// Noise that the controller never saw follows r by chance, and by about as much as is told: in a quarter of the records it does so by more.
+/// Noise that the controller never saw follows r by chance, and by about as much as is told: in a quarter of the records it does so by
+/// more.
 #[test]
 fn what_follows_r_by_chance_is_taken_off() {
     let r: Vec<f64> = drive(40).iter().flat_map(|r| [*r; 10]).collect();
@@ -128,7 +129,7 @@ fn what_follows_r_by_chance_is_taken_off() {
     assert!((12..=40).contains(&above), "{above}");
 }
 
-/// Neither noise, wherever it enters, nor offsets, nor a sampled controller, nor the printed digits are a mismatch.
+/// Noise at any point, offsets, a sampled controller and printed digits do not count as a mismatch.
 #[test]
 fn a_controller_that_matches_is_believed() {
     let clean = record();
@@ -148,7 +149,7 @@ fn a_controller_that_matches_is_believed() {
     Problem::new(&[record], &pi(), ORDERS).unwrap();
     let printed = Controller::pi(0.2292, 1.0 / 480.0).unwrap();
     let mismatch = controller_mismatch(&clean, &printed).unwrap().unwrap();
-    // Digits lost in print show, without noise, but are no reason to refuse.
+    // Rounding of the coefficients is visible without noise, but is no reason for rejection.
     assert!(mismatch.systematic > 50.0 * own.systematic);
     assert!(mismatch.systematic < 0.01 * mismatch.size);
 }
@@ -242,7 +243,7 @@ fn models_and_settings_that_are_none() {
         coordinates: Coordinates::Delta,
         ..Settings::default()
     };
-    // K = 0 leaves the integrator without a loop: refused before anything else.
+    // K = 0 leaves the integrator without a loop: rejected before other checks.
     assert!(problem.fit(&zero.unwrap(), &delta).is_err());
     let tolerance = Settings {
         tolerance: 0.0,
@@ -262,7 +263,7 @@ fn models_and_settings_that_are_none() {
     ));
 }
 
-/// Two parameters that only their product shows: nothing is made up.
+/// Two parameters of which only the product is determined: no standard errors are reported.
 #[test]
 fn what_the_data_leave_open_has_no_standard_error() {
     // A plant of second order fitted to one of first order without noise: pole and zero may cancel anywhere.
@@ -291,7 +292,7 @@ fn what_the_data_leave_open_has_no_standard_error() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Whatever the numbers, an answer or an error.
+    /// For any numbers there is a result or an error.
     #[test]
     fn nothing_panics(
         y in proptest::collection::vec(prop_oneof![-1e3..1e3f64, Just(0.0), Just(1e300), Just(-1e-300)], 0..60),

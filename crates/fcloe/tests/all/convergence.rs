@@ -60,7 +60,7 @@ fn against_a_fine_grid() {
         let found = Condition::new(&filter, &truth).unwrap();
         let ratio = TransferFunction::new(filter, truth).unwrap();
         let least = least_on_grids(&ratio);
-        // What is found is the lowest of all, and no lower than what is there.
+        // The reported minimum is the lowest value, and no lower than the true one.
         assert!(
             found.least <= least + 1e-12 * least.abs(),
             "{found:?} {least}"
@@ -141,7 +141,7 @@ fn known_starts() {
     assert!((between.least - 0.22).abs() < 0.005, "{between:?}");
 }
 
-/// At the border itself it does not hold; a loop that is not stable is no loop; the picture shows the same.
+/// At the boundary itself the condition fails; an unstable loop has no result; the plot shows the same.
 #[test]
 fn borders() {
     let p = Polynomial::new([1.0, 3.0, 2.0]).unwrap();

@@ -1,6 +1,5 @@
-//! Intervals of 95 % hold the truth in 95 % of simulated runs, whether the noise circulates in the loop or not, which
-//! the fit is not told. The whole of it, 4000 runs each, is the example
-//! `coverage`.
+//! Intervals of 95 % contain the true value in 95 % of simulated runs, with fed-back noise and with output noise; the fit does not know
+//! which. The complete study, 4000 runs each, is the example `coverage`.
 
 #[path = "support/rig.rs"]
 mod rig;
@@ -12,7 +11,7 @@ use rig::{Coverage, Rig};
 
 const RUNS: u64 = 400;
 
-/// Outside of these, on either side, in one of 200 draws of 400 with p = 0.95.
+/// By chance outside of these limits, on either side, in one of 200 draws of 400 with p = 0.95.
 fn plausible(hits: usize) -> bool {
     (368..=391).contains(&hits)
 }
@@ -31,7 +30,7 @@ fn check(rig: &Rig) -> Coverage {
         found.variance_ratios.iter().all(|ratio| honest(*ratio)),
         "{found:?}"
     );
-    // Where levels are estimated, less is known of the low frequencies that tell the two paths apart.
+    // With estimated levels, less information is available at the low frequencies that distinguish the two paths.
     assert!(
         *placed >= if rig.unknown_levels { 300 } else { 360 },
         "{placed}"
@@ -44,7 +43,7 @@ fn noise_in_the_loop() {
     check(&Rig::first_order(true));
     check(&Rig::second_order(true));
     check(&Rig::direct_term(true));
-    // Here a white residual's intervals are too narrow.
+    // Here the intervals for a white residual are too narrow.
     let white = check(&Rig::filtered_pid(true)).white;
     assert!(white.iter().any(|hits| *hits < 368), "{white:?}");
 }
@@ -65,8 +64,8 @@ fn estimated_levels_and_open_loop() {
     check(&Rig::open_loop());
 }
 
-/// 30 % of the readings are missing, and a block of 10 rows: the noise behind the loop is found from those that are there. Fewer runs than above: each takes
-/// some 50 filters of the residual. `RUNS=400` takes as many.
+/// 30 % of the readings are missing, and a block of 10 rows: the noise model of the loop is estimated from the present ones. Fewer runs
+/// than above, because each needs some 50 filters of the residual; `RUNS=400` runs more.
 #[test]
 fn missing_readings() {
     let asked = std::env::var("RUNS")
@@ -150,11 +149,12 @@ fn instruments_know_their_errors() {
     ] {
         let found = instruments(&rig, lambda);
         println!("{} in loop {}: {found:.2?}", rig.name, rig.in_loop);
-        // Renewed, the filter is right for the noise; one that stays leaves a little too much.
+        // With updates the filter suits the noise; a constant filter leaves slightly too much.
         for (of, most) in found.iter().zip([2.0, 1.25]) {
             for (hits, variance_ratio) in of {
                 assert!((0.85..most).contains(variance_ratio), "{found:.2?}");
-                // Lines between samples bias plants of second order by half a standard error, and are wrong for an output that jumps.
+                // Linear interpolation between samples biases plants of second order by half a standard error, and is wrong for an output
+                // with steps.
                 let orders = rig.plant.orders();
                 let least = match orders.n {
                     n if n == orders.m => 0,

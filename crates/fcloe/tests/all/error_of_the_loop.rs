@@ -5,8 +5,8 @@ use fcloe::{ClosedLoop, Controller, LoopSimulator, PlantModel};
 
 use crate::support::drive;
 
-/// Largest difference of both sides over the largest error of the loop, where `(theta - theta^)' sigma` is taken for straight between
-/// samples; each held value of the drive spans `parts` of them.
+/// Largest difference of both sides over the largest error of the loop, with `(theta - theta^)' sigma` linear between samples; each held
+/// value of the drive spans `parts` of them.
 fn difference(
     plant: &PlantModel,
     model: &PlantModel,
@@ -75,7 +75,7 @@ fn is_the_filtered_product_of_parameter_error_and_sensitivities() {
         for controller in [&pi, &pid, &gain, &Controller::none()] {
             let [coarse, fine] =
                 [16, 32].map(|parts| difference(&plant, &model, controller, parts));
-            // What is left is the straight line between samples: a quarter at half the step.
+            // The remaining error is that of linear interpolation between samples: a quarter at half the step.
             assert!(fine < 1e-3, "{fine:.1e}");
             assert!(
                 (3.0..5.0).contains(&(coarse / fine)),

@@ -1,4 +1,4 @@
-//! Closed-loop data: noise that circulates, sampled controllers, converters.
+//! Closed-loop data: fed-back noise, sampled controllers, converters.
 
 use crate::support::drive;
 use ct_lti::Hold;
@@ -19,7 +19,7 @@ fn largest(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// In the loop a disturbance of the reading acts as one of the reference with the other sign, but for itself.
+/// In the loop a disturbance of the reading acts like the negative reference, except on the reading itself.
 #[test]
 fn noise_in_the_loop_circulates() {
     let controller = Controller::pid(0.3, 0.004, 4.0, 10.0).unwrap();
@@ -33,7 +33,7 @@ fn noise_in_the_loop_circulates() {
     let y: Vec<f64> = moved.y.iter().zip(&w).map(|(y, w)| y + w).collect();
     assert!(largest(&noisy.y, &y) < 1e-12);
     assert!(largest(&noisy.u, &moved.u) < 1e-12);
-    // On the record alone u knows nothing of it.
+    // With output noise alone, u does not depend on the noise.
     assert_eq!(run(&r, Noise::OnRecord(&w)).u, run(&r, Noise::None).u);
     assert!(
         continuous_loop(

@@ -9,7 +9,7 @@ use fcloe::{
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-/// A short record in open loop with white noise on it, fitted; the noise is taken for what enters at the record.
+/// A short record in open loop with white output noise, fitted; the path of the noise is given.
 fn short(seed: u64, samples: usize) -> (Fit, Uncertainty) {
     let plant = PlantModel::first_order(2.0, 5.0).unwrap();
     let none = Controller::none();
@@ -35,7 +35,7 @@ fn what_is_fitted_is_not_free() {
         assert_eq!(found.freedom, (samples - 2 - order) as f64);
         if order == 0 {
             white += 1;
-            // the same then as of a white residual: its square over the same degrees of freedom
+            // then equal to that of a white residual: its square over the same degrees of freedom
             let pairs = found.std_errors.iter().zip(&found.white_std_errors);
             for (of_colour, of_white) in pairs {
                 assert!((of_colour / of_white - 1.0).abs() < 1e-9, "{found:?}");

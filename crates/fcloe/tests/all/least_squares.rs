@@ -52,7 +52,7 @@ fn another_optimiser_ends_in_the_same_minimum() {
     for (a, b) in of_rows.iter().flatten().zip(alone.iter().flatten()) {
         assert!((a - b).abs() < 1e-12);
     }
-    // The first record says nothing of the levels of the second.
+    // The first record contains no information about the levels of the second.
     assert!(
         rows.values[..700 * 7]
             .chunks(7)

@@ -1,4 +1,4 @@
-//! Levels of r, u and y: known, read off the first rows, estimated; and what wrong ones cost. Several records.
+//! Levels of r, u and y: known, from the first rows, estimated; and the effect of wrong ones. Several records.
 
 use crate::support::drive;
 use ct_lti::Hold;
@@ -67,7 +67,7 @@ fn levels_known_read_or_estimated_give_the_plant() {
     }
 }
 
-/// Estimated though the record begins in the middle of a step, where the first row is no operating point.
+/// The levels are estimated although the record begins during a transient, where the first row is no operating point.
 #[test]
 fn levels_are_estimated_from_a_wrong_first_row() {
     let point = OperatingPoint {
@@ -95,8 +95,7 @@ fn levels_are_estimated_from_a_wrong_first_row() {
     assert_eq!(problem.uncertainty(&fit, None).unwrap().covariance.len(), 6);
 }
 
-/// Raw levels that are called deviations are not noticed in silence: the loop seems to start with a jump, and the
-/// residual says so.
+/// Raw levels that are declared as deviations are reported: the loop seems to start with a step, and the residual shows this.
 #[test]
 fn raw_levels_called_deviations_leave_a_residual() {
     let raw = record(&pi(), 1200, POINT, Offsets::Deviations);
@@ -105,7 +104,7 @@ fn raw_levels_called_deviations_leave_a_residual() {
     assert!(error(&fit) > 0.05);
 }
 
-/// Each record keeps its own levels and begins at rest: fitted together they are better than one after the other glued.
+/// Each record keeps its own levels and begins at rest: a joint fit is better than a fit of the concatenated records.
 #[test]
 fn several_records_with_levels_of_their_own() {
     let other = OperatingPoint {

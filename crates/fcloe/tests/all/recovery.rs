@@ -1,4 +1,4 @@
-//! Noise-free data give the plant back; every method ends in the same place; theta and delta are the same iteration.
+//! Noise-free data give the true plant; every method ends in the same minimum; theta and delta give the same iteration.
 
 use crate::support::drive;
 use ct_lti::Hold;
@@ -20,7 +20,7 @@ fn record(plant: &PlantModel, controller: &Controller, step: f64, n: usize) -> L
     }
 }
 
-/// The same plant with parameters that are off by up to 30 %.
+/// The plant with parameters that are off by up to 30 %.
 fn start(plant: &PlantModel) -> PlantModel {
     let factors = [1.3, 0.8, 1.2, 0.75, 1.25, 0.7, 1.1];
     let theta: Vec<f64> = plant
@@ -85,7 +85,7 @@ fn noise_free_recovery() {
 
 fn disturbed(plant: &PlantModel, controller: &Controller, step: f64) -> Problem {
     let mut record = record(plant, controller, step, 1500);
-    // Something that the model cannot explain, so that the minimum is not exact.
+    // A disturbance that the model cannot explain, so that the minimum is not exact.
     for (k, y) in record.y.iter_mut().enumerate() {
         *y += 0.02 * (0.9 * (k * k % 83) as f64).sin();
     }
@@ -129,7 +129,7 @@ fn all_methods_end_in_the_same_minimum() {
     }
 }
 
-/// With mu diag(J'') the iterations in theta and delta are the same to rounding; with mu I they are not.
+/// With mu diag(J'') the iterations in theta and delta agree to rounding; with mu I they do not.
 #[test]
 fn a_diagonal_damping_knows_no_units() {
     let (plant, controller, step) = &cases()[3];
@@ -160,8 +160,8 @@ fn a_diagonal_damping_knows_no_units() {
     assert!((theta[1].theta[1] / delta[1].theta[1] - 1.0).abs() > 1e-3);
 }
 
-/// From random starts within a factor of 5 of each parameter, whose loop is stable, nearly all fits end in the best
-/// minimum; the others say that they did not converge, or end in one that is worse.
+/// From random starts within a factor of 5 of each parameter, with a stable loop, nearly all fits end in the best minimum; the others
+/// report no convergence, or end in a worse minimum.
 #[test]
 fn far_starts() {
     let (plant, controller, step) = &cases()[3];
@@ -199,8 +199,8 @@ fn far_starts() {
     assert!(reached.iter().all(|reached| *reached >= 54), "{reached:?}");
 }
 
-/// What is not told of the loop goes into the plant: a sensor's filter that is ignored, and digits of the controller
-/// that were lost in print (110/480 and 1/480 as 0.2292 and 0.0021).
+/// Unmodelled parts of the loop bias the plant: an ignored sensor filter, and truncated digits of the controller (110/480 and 1/480 as
+/// 0.2292 and 0.0021).
 #[test]
 fn what_the_controller_is_not_told() {
     let plant = PlantModel::first_order(6.0, 110.0).unwrap();
@@ -232,7 +232,7 @@ fn what_the_controller_is_not_told() {
     );
 }
 
-/// J and one step's parts, for the start that the iteration begins with.
+/// J and the parts of the first step, from the start of the iteration.
 fn first_step(
     problem: &Problem,
     start: &PlantModel,
@@ -266,7 +266,7 @@ fn slope(problem: &Problem, at: &PlantModel) -> Vec<f64> {
         .collect()
 }
 
-/// With a large mu a damped step is `-J'/mu`, in theta; in delta it is `-theta0^2 J'/mu`; the gradient's has the same direction.
+/// With a large mu a damped step is `-J'/mu` in theta, and `-theta0^2 J'/mu` in delta; the direction is that of the gradient.
 #[test]
 fn steps_in_delta_have_the_scale_of_the_start_squared() {
     let (plant, controller, step) = &cases()[0];

@@ -14,7 +14,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-/// The first seed of records on which nothing was chosen.
+/// The first seed of records that were not used for tuning.
 const FRESH: u64 = 10_000;
 
 /// 60 starts within a factor of 5, each with noise of its own: at least 58 end within 3 %. With the filter of the start
@@ -29,8 +29,8 @@ fn far_starts() {
     assert!((20..50).contains(&fixed));
 }
 
-/// n = 2, m = 1 from regressions: at least 36 of 40 end within 10 % in all four parameters, also where not all of the
-/// starts are, and the mean error falls to less than two thirds.
+/// n = 2, m = 1 from regressions: at least 36 of 40 end within 10 % in all four parameters, also from worse starts, and the mean error
+/// falls to less than two thirds.
 #[test]
 fn second_order_from_regressions() {
     for (snr, beginning) in [(30.0, 2540), (20.0, 1270)] {
@@ -45,8 +45,8 @@ fn second_order_from_regressions() {
     }
 }
 
-/// tau grows by 30 % along the record and is followed within 5 %, at each sample: over 25 400 samples on every record,
-/// over 12 700 on nearly every one. A memory that is too long is left behind.
+/// tau grows by 30 % along the record and is followed within 5 %, at each sample: over 25 400 samples on every record, over 12 700 on
+/// nearly every one. A memory that is too long causes too much delay.
 #[test]
 fn a_drift_is_followed() {
     let drift = |samples, memory, seed| {
@@ -96,7 +96,7 @@ fn bad_starts() {
     }
 }
 
-/// Where condition (14) holds, the fixed filter converges from all starts of a grid; where Re < 0, from a few.
+/// If condition (14) is satisfied, the fixed filter converges from all starts of a grid; if Re < 0, from a few.
 #[test]
 fn the_condition_is_sufficient() {
     let plant = PlantModel::first_order(6.0, 110.0).unwrap();
@@ -136,7 +136,7 @@ fn open_loop() {
     assert!(worst(estimator.theta(), &plant) < 0.1);
 }
 
-/// Levels that are subtracted leave everything as it is.
+/// Subtracted levels do not change the result.
 #[test]
 fn operating_point() {
     let (plant, controller) = first_order();
@@ -155,7 +155,7 @@ fn operating_point() {
     }
 }
 
-/// Whatever comes in, the estimates stay finite, the loop stable and F within its cap.
+/// For any input, the estimates stay finite, the loop stable and F within its cap.
 #[test]
 fn any_input() {
     let (_, controller) = first_order();

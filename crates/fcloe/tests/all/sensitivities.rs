@@ -1,5 +1,5 @@
-//! The loop's output and its sensitivities against an adaptive integration of the plant and the controller, each by
-//! itself, which shares nothing with the simulation but the coefficients.
+//! The loop's output and its sensitivities compared with an adaptive integration of the plant and the controller, which shares only the
+//! coefficients with the simulation.
 
 use crate::support::{drive, integrate};
 use ct_lti::{Hold, Polynomial};

@@ -1,5 +1,5 @@
-//! The starts: against the noise-free truth, against the statistics of the paper's first table, and for plants of
-//! higher order with noise in the loop.
+//! Start values: compared with the noise-free truth, with the statistics of the paper's first table, and for plants of higher order with
+//! noise in the loop.
 
 use ct_lti::{Hold, Polynomial};
 use ct_signals::excitation;
@@ -14,7 +14,7 @@ use rand_chacha::rand_core::SeedableRng;
 
 const LAMBDA: f64 = 40.0 / 110.0;
 
-/// The first table's loop, with a set of its unstated conditions that fits it; noise in the loop at 20 dB.
+/// The first table's loop, with assumptions that reproduce it; noise in the loop at 20 dB.
 fn first_table(seed: Option<u64>) -> (LoopRecord, Controller) {
     let pattern = [0.82, 0.82, -0.82, -0.82, 0.82, -0.82, 0.82];
     let r = excitation::levels(2800, 400, &pattern).unwrap();
@@ -59,7 +59,7 @@ fn near((gain, tau): (f64, f64), expected: (f64, f64), within: (f64, f64)) {
     );
 }
 
-/// The factor in Y_f has to be the filter's own: with lambda in place of it, tau is 92.8 without any noise.
+/// The factor in Y_f has to be that of the filter: with lambda instead, tau is 92.8 without any noise.
 #[test]
 fn noise_free_each_discretisation_in_its_own_way() {
     let (record, controller) = first_table(None);
@@ -104,8 +104,8 @@ fn the_first_tables_statistics() {
     near(printed, (5.962, 79.40), (0.024, 1.57));
 }
 
-/// In open loop, noise on the record: least squares is biased, the standard instruments are not, those of the printed
-/// form are; the general forms with instruments are not either, and their least squares hardly.
+/// In open loop with output noise: least squares is biased, the standard instruments are not, those of the printed form are; the general
+/// forms with instruments are not biased either, and their least squares only slightly.
 #[test]
 fn each_start_in_open_loop() {
     const RUNS: u64 = 20;
@@ -135,13 +135,13 @@ fn each_start_in_open_loop() {
     near(ls, (5.52, 100.9), (0.03, 1.0));
     near(printed, (5.80, 106.2), (0.03, 1.0));
     near(standard, (6.0, 110.4), (0.03, 1.0));
-    // Of lines between samples the noise leaves less after the filter.
+    // For linear interpolation between samples, the noise is smaller after the filter.
     near(general, (6.0, 110.0), (0.1, 2.0));
     near(iv, (6.0, 110.0), (0.03, 1.0));
     near(refined, (6.0, 110.0), (0.03, 1.0));
 }
 
-/// Instruments from r are not biased by noise that circulates, where those from the measured u are.
+/// Instruments from r are not biased by fed-back noise, while those from the measured u are.
 #[test]
 fn instruments_from_the_reference() {
     const RUNS: u64 = 20;
@@ -174,8 +174,8 @@ fn worst(plant: &PlantModel, truth: &PlantModel) -> f64 {
     pairs.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
 }
 
-/// From orders alone the batch fit reaches the minimum that it reaches from the truth, in the loop and in open loop,
-/// with a sensor's filter and without.
+/// From orders alone the batch fit reaches the same minimum as from the true plant, in the loop and in open loop, with and without a
+/// sensor's filter.
 #[test]
 fn the_pipeline_leads_to_the_minimum() {
     let (plant, pi, r) = second_order();
@@ -209,7 +209,7 @@ fn the_pipeline_leads_to_the_minimum() {
     }
 }
 
-/// The refinement's own means, noise in the loop: within four standard errors of the truth, but for the lines between samples.
+/// Means of the refinement, noise in the loop: within four standard errors of the truth, apart from interpolation between samples.
 #[test]
 fn refinement_without_bias() {
     let (plant, controller, r) = second_order();
@@ -239,7 +239,7 @@ fn refinement_without_bias() {
     }
 }
 
-/// A ladder from a guess lies at 2 to 10 times the loop's poles; one without spans the record.
+/// With a guess, the bandwidths are 2 to 10 times the loop's poles; without one they span the record.
 #[test]
 fn ladders() {
     let (record, controller) = first_table(None);
@@ -254,7 +254,7 @@ fn ladders() {
     assert!((ladder.last().unwrap() - 0.5).abs() < 1e-12);
 }
 
-/// Bandwidths far too high make regressions of noise; the guess steps in, and the fit goes on from it.
+/// Bandwidths that are far too high give useless regressions; the guess is used instead, and the fit continues from it.
 #[test]
 fn a_guess_where_regressions_fail() {
     let (plant, controller, r) = second_order();
@@ -329,8 +329,8 @@ fn bad_input() {
     ));
 }
 
-/// What it rests at is its own: the instruments of the last plant, through the last plant's own filter, give that plant; and the start is
-/// forgotten.
+/// Fixed point of the refinement: the instruments of the last plant, with the last plant's filter, give that plant; and the start has no
+/// influence.
 #[test]
 fn a_refinement_rests_where_its_own_filter_and_instruments_lead() {
     let (record, controller) = first_table(Some(3));
@@ -347,7 +347,7 @@ fn a_refinement_rests_where_its_own_filter_and_instruments_lead() {
     assert!(worst(&fast, &slow) < 3e-4, "{fast:?} {slow:?}");
 }
 
-/// Filters count in the unit of time of the record, whatever its step is.
+/// Filter bandwidths use the record's unit of time, whatever its step is.
 #[test]
 fn another_unit_of_time_is_another_tau_and_nothing_else() {
     let (record, _) = first_table(None);

@@ -1,4 +1,4 @@
-//! A setup from a model and its records: what is free, within which bounds, from where.
+//! Builds a setup from a model and its records: free parameters, bounds, and start values.
 
 use ct_model::{About, Given, Model, Variable};
 use ct_signals::Record;
@@ -9,13 +9,13 @@ use super::{ModelSetup, STATE_REACH};
 use crate::Error;
 use crate::clock::Clock;
 
-/// Where the text sets no bound a parameter stays within this factor of its value there, ...
+/// If the text sets no bound, a parameter stays within this factor of its value in the text, ...
 const REACH: f64 = 30.0;
 
-/// Scales of the noise have settled when none changes by more than this share.
+/// The scales of the noise have converged if none changes by more than this share.
 pub(super) const SETTLED: f64 = 0.02;
 
-/// Bounds of the text, and where it has none a factor of the value there: a fit that runs away says nothing. Nothing bounds a value of zero.
+/// Bounds of the text, and where it has none a factor of the value there: a fit that diverges says nothing. Nothing bounds a value of zero.
 fn bounds_of(about: &About, value: f64, factor: f64) -> (f64, f64) {
     let reach = if value == 0.0 {
         f64::INFINITY
@@ -112,7 +112,7 @@ impl<'a> ModelSetup<'a> {
                 } else {
                     format!("{}(0)", about.name)
                 });
-                // Where an output reads the state, the record knows better.
+                // If an output measures the state, the initial value comes from the record.
                 let read = spec
                     .outputs
                     .iter()

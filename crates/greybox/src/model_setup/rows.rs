@@ -14,7 +14,7 @@ impl<'a> ModelSetup<'a> {
         let residuals = estimation::residuals(self, x)?;
         let measured = self.records.iter().flat_map(|record| &record.outputs);
         let simulated = measured.zip(residuals);
-        // Where nothing was measured the residual says nothing: those are simulated on their own.
+        // Rows without any reading have no residual: they are simulated separately.
         if simulated
             .clone()
             .all(|(measured, _)| measured.missing() == 0)
@@ -33,8 +33,8 @@ impl<'a> ModelSetup<'a> {
         Some(all)
     }
 
-    /// Simulates all records with derivatives by some entries and shows the outputs row by row, in so many simulations that each of their
-    /// numbers carries at most [`ct_model::Scalar::LANES`] derivatives.
+    /// Simulates all records with derivatives with respect to some entries, and passes the outputs row by row to a function: the outputs of as
+    /// many simulations as the derivatives need.
     fn each_instant<T: SimulationNumber>(
         &self,
         x: &[f64],
@@ -94,8 +94,7 @@ impl<'a> ModelSetup<'a> {
         Some(())
     }
 
-    /// [`Residuals::each_row`]; no generic function, so that simulations with derivatives are compiled here and not again in every crate that
-    /// fits.
+    /// [`Residuals::each_row`]; not a generic function, so that simulations with derivatives are compiled only in this crate.
     #[inline(never)]
     fn show_rows(&self, x: &[f64], each: &mut dyn FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
         // A record has the parameters and its own states.

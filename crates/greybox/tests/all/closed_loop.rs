@@ -1,4 +1,4 @@
-//! The simulated loop: derivatives, a fine reference, replay, and what coloured noise does with and without it.
+//! The simulated loop: derivatives, a fine reference, replay, and the effect of coloured noise with and without the loop.
 
 mod disturbance;
 
@@ -138,7 +138,7 @@ fn derivatives_in_the_loop_agree_with_central_differences() {
     }
 }
 
-/// The loop against one that is integrated in a thousand parts of an interval, with a PI written out, through a limit.
+/// The loop compared with an integration in a thousand parts of an interval, with an explicit PI controller, through a limit.
 #[test]
 fn the_loop_agrees_with_a_fine_reference() {
     let rig = Rig {
@@ -181,7 +181,7 @@ fn a_replay_finds_the_controller_states_and_what_is_not_the_controller() {
         let (mut record, _) = record(&rig, &controller, 0.1, 0.8, 3);
         let exact = replay(&controller, &record).unwrap();
         assert!(exact.rms < 1e-10 && exact.moves > 0.1, "{exact:?}");
-        // A converter of 10 bits does not matter, an operator's hand does and is found.
+        // A converter of 10 bits has no effect; a manual action of an operator is detected and estimated.
         for u in &mut record.inputs[0].values {
             *u = (*u * 102.3).round() / 102.3;
         }

@@ -1,5 +1,5 @@
-//! Intervals of 95 % hold the truth in 95 % of simulated records, for every parameter and initial level, whatever the
-//! noise's colour, which the fit is not told.
+//! Intervals of 95 % contain the true value in 95 % of simulated records, for every parameter and initial level, and for every spectrum of
+//! the noise, which is unknown to the fit.
 
 use crate::support::Rig;
 use ct_signals::{ArModel, Record};
@@ -13,7 +13,7 @@ fn records() -> u64 {
     std::env::var("RECORDS").map_or(RECORDS, |records| records.parse().unwrap())
 }
 
-/// So many standard deviations of a share of so many records around 95 %.
+/// Tolerance in standard deviations for the share of this number of records around 95 %.
 fn band(deviations: f64, records: u64) -> std::ops::RangeInclusive<f64> {
     let width = deviations * (0.95 * 0.05 / records as f64).sqrt();
     0.95 - width..=0.95 + width
@@ -26,7 +26,7 @@ fn check(rig: &Rig, intervals: impl Fn(&Setup) -> Intervals + Sync) {
     check_of(rig, |_| {}, intervals);
 }
 
-/// The same of records that are changed before.
+/// Coverage for records that are modified first.
 fn check_of(
     rig: &Rig,
     change: impl Fn(&mut Record) + Sync,
@@ -143,7 +143,7 @@ fn simulation_error_under_coloured_noise() {
     }
 }
 
-/// Readings that are missing are left out of the likelihood, whatever the noise's colour: 30 % of them at random, and in blocks.
+/// Readings that are missing are left out of the likelihood, whatever the noise's spectrum: 30 % of them at random, and in blocks.
 #[test]
 fn missing_readings() {
     let at_random = |k: usize| (k * 7919 + 13) % 101 < 30;
@@ -167,7 +167,7 @@ fn missing_readings() {
     }
 }
 
-/// The correlation that is estimated from a fit's residual is the noise's: a model of the bare residual is too fast.
+/// The correlation estimated from a fit's residual is that of the noise: a model of the uncorrected residual is too fast.
 #[test]
 fn the_colour_of_the_noise_is_not_biased_by_the_fit() {
     let rig = Rig {

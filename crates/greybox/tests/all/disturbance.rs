@@ -32,7 +32,7 @@ impl Disturbed {
         all.chain(self.rig.levels.iter().copied()).collect()
     }
 
-    /// Under random steps of the command, and a disturbance in l/min that steps, or wanders with a straight course between samples.
+    /// Under random steps of the command, and a disturbance in l/min that steps, or drifts with a straight course between samples.
     fn record(&self, seed: u64) -> Record {
         let rig = &self.rig;
         let (n, h) = (rig.samples, rig.interval);
@@ -96,7 +96,7 @@ impl Disturbed {
             }
             let gain = half[own].unwrap();
             assert!(gain < 0.2 * self.gain.abs(), "the gain is known: {gain}");
-            // The throughput has both inflows.
+            // The throughput consists of both inflows.
             let scales = setup.scales_at(&fit.x).unwrap();
             let mean = |input: usize| {
                 let values = &records[0].inputs[input].values;
@@ -111,7 +111,7 @@ impl Disturbed {
 
 #[test]
 fn a_single_tank_with_a_disturbance_is_found() {
-    // It flows in, or is drawn.
+    // The disturbance flows in, or out.
     for (gain, hold) in [(8.0, Hold::Zero), (-6.0, Hold::First)] {
         let rig = Rig::single_tank();
         Disturbed {

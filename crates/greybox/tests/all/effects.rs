@@ -1,5 +1,5 @@
-//! What each effect's own starts are worth: on simulated records whose missing effect shows about as much as the noise does,
-//! a fit that begins there finds its parameters again, within their standard errors.
+//! Quality of each effect's starts: on simulated records with a missing effect about as large as the noise, a fit from these starts finds
+//! the true parameters within their standard errors.
 
 use std::collections::BTreeMap;
 
@@ -28,8 +28,8 @@ struct Case {
     parameters: Vec<f64>,
 }
 
-/// Every effect that has a threshold, a time, a period or steps, and those that are smooth, on both kinds of outlet, for one
-/// and two tanks, in either.
+/// Every effect with a threshold, a time, a period or steps, and the smooth ones, for both kinds of outlet, for one and two tanks, in
+/// either tank.
 fn cases() -> Vec<Case> {
     let t = SAMPLES as f64 * INTERVAL;
     let mut cases = Vec::new();
@@ -69,7 +69,7 @@ fn cases() -> Vec<Case> {
             // A good third of what comes in.
             add(plant, "const_leak", 0, vec![0.35 * flow]);
         }
-        // A little above the lowest fifth of the commands' range.
+        // Slightly above the lowest fifth of the commands' range.
         add(plant, "pump_saturation", 0, vec![4.4]);
         add(plant, "pump_gain_drift", 0, vec![0.04, 0.25 * t]);
         add(plant, "stiction_backlash", 0, vec![0.4, 0.0, 0.0]);
@@ -111,7 +111,7 @@ impl Case {
         parameters
     }
 
-    /// Steps under a slow wander, so that the command turns at many heights.
+    /// Steps under a slow drift, so that the command turns at many heights.
     fn command(rng: &mut ChaCha8Rng) -> Vec<f64> {
         let steps = excitation::steps(SAMPLES, 10..=40, 3.5, 6.5, rng).unwrap();
         let drive = excitation::steps(SAMPLES, 5..=20, 3.5, 6.5, rng).unwrap();
@@ -153,8 +153,8 @@ impl Case {
     }
 }
 
-/// The believed model from the plant's own numbers: two tanks in series fit almost as well with their time constants
-/// swapped, and which of the two basins is the right one is not for the effect's starts to find.
+/// The believed model from the plant's true parameters: two tanks in series fit almost as well with exchanged time constants, and the
+/// choice between the two minima is not the task of the effect's starts.
 fn base_fit<'a>(case: &Case, records: &'a [Record]) -> (Setup<'a>, Vec<f64>, f64) {
     let fixed = BTreeMap::new;
     let setup = Setup::from_records(case.plant, known(case.plant), &[], records, fixed()).unwrap();
@@ -167,9 +167,9 @@ fn base_fit<'a>(case: &Case, records: &'a [Record]) -> (Setup<'a>, Vec<f64>, f64
     (setup, fit.x, fit.rmse[0])
 }
 
-/// What came of one record.
+/// Result of one record.
 struct Outcome {
-    /// Error of every parameter in standard errors; none for one that ends at a bound.
+    /// Error of every parameter in standard errors; none if it ends at a bound.
     z: Vec<Option<f64>>,
     estimate: Vec<f64>,
     /// Error of the fit over the noise.
@@ -184,7 +184,7 @@ fn one(case: &Case, seed: u64) -> Outcome {
     let duration = INTERVAL * (SAMPLES - 1) as f64;
     let rough = Scales::from_ranges((3.5, 6.5), (8.0, 24.0), INTERVAL, duration);
     let still = vec![0.0; SAMPLES];
-    // How much it shows without noise, over the scales that a fit will see.
+    // Size of the effect without noise, relative to the scales of the fit.
     let seen = [case.record(&u, &still, &rough)];
     let (setup, _, structural) = base_fit(case, &seen);
     let scales = setup.structure.scales.clone();
@@ -203,7 +203,7 @@ fn one(case: &Case, seed: u64) -> Outcome {
     setup
         .choose_substeps(&start(&setup, &x, &base, &[]))
         .unwrap();
-    // As the search does: every combination of the effect's own starts is ranked by one step, hardly damped, and two are followed.
+    // As in the search: every combination of the effect's own starts is ranked by one nearly undamped step, and the best two are fitted.
     let parameters = setup.structure.effect_parameters(case.placed());
     let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
     for parameter in &parameters {
@@ -283,7 +283,7 @@ fn found(case: &Case, outcome: &Outcome) -> bool {
     };
     match case.id {
         "stiction_backlash" => {
-            // Where it began in a narrow band shows in a few readings only.
+            // The initial state in a narrow band affects a few readings only.
             let [width, jump, begin] = [0, 1, 2].map(|i| {
                 let error = outcome.estimate[i] - case.parameters[i];
                 error.abs()
@@ -296,7 +296,7 @@ fn found(case: &Case, outcome: &Outcome) -> bool {
     }
 }
 
-/// How many of so many records are found, for every case whose name contains `wanted`.
+/// Number of successes among the records, for every case whose name contains `wanted`.
 fn table(wanted: &str, records: u64) -> Vec<(String, usize)> {
     let name = |case: &Case| format!("{}@{} {}", case.id, case.vessel, case.plant.id());
     cases()
@@ -334,7 +334,7 @@ fn a_valve_with_a_wide_band_that_begins_within_it_is_found_again() {
                     plant: Plant::SingleTankLinear,
                     id: "stiction_backlash",
                     vessel: 0,
-                    // The band in which it stays takes nine tenths of the command's range.
+                    // The stiction band is nine tenths of the command's range.
                     parameters: vec![0.9 * (high - low) / (1.0 + jump), jump, begin],
                 };
                 let o = one(&case, seed);

@@ -52,8 +52,8 @@ fn with_lag(rig: &Rig, record: &Record, lag: &str, free: bool) -> Fit {
     fit_from(&setup, &starts, &Noise::white(1), PRECISE).unwrap()
 }
 
-/// How often the lag that is there fits better than the other, and how often it fits so much worse that the other is
-/// named alone (a criterion higher by 6).
+/// How often the true lag fits better than the other one, and how often it fits so much worse that the other one is named alone (criterion
+/// higher by 6).
 fn right_and_wrong(rig: &Rig, lag: usize, time_constant: f64, free: bool) -> (usize, usize) {
     let mut rig = rig.clone();
     rig.effects = vec![(LAGS[lag], 0, vec![time_constant])];
@@ -85,18 +85,18 @@ fn the_lag_that_is_there_fits_better_than_the_other() {
                     "{} {id} {time_constant} s: right and decidedly wrong of {SEEDS}: {rest:?} at rest, {free:?} free",
                     rig.plant.id()
                 );
-                // One tank bends the input too little for the order of the two lags to show in most records; what must
-                // not be is a decided error. Chance alone is right 25 times once in five thousand.
+                // With one tank, the nonlinearity is too small to distinguish the order of the two lags in most records; a decided error
+                // must not occur. By chance 25 successes occur once in five thousand.
                 assert!(free.1 <= 1, "{id} {time_constant}: {free:?}");
                 assert!(!two || free.0 >= 25, "{id} {time_constant}: {free:?}");
-                // Taken for at rest, one of the two is the better imitation of what came before.
+                // With the lag at rest, one of the two fits the unknown past better.
                 assert!(lag == 0 || rest.1 > 5, "{id} {time_constant}: {rest:?}");
             }
         }
     }
 }
 
-/// The state behind the lag is then that of a pump at rest, which no command of the record is.
+/// The state after the lag is then that of a pump at rest, which no command of the record is.
 #[test]
 fn a_pump_that_starts_with_the_record_is_a_lag() {
     for rig in [Rig::single_tank(), Rig::cascaded_tanks()] {

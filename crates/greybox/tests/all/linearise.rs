@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use plants::Plant;
 use std::collections::BTreeMap;
 
-/// Effects whose readings are a staircase of some parameter carry the slope of a chord, which a central difference does not show.
+/// Effects with a reading that is a staircase in some parameter have the slope of a chord, which a central difference does not show.
 const STEPPED: [&str; 2] = ["stiction_backlash", "coarse_quantisation"];
 
 /// The derivatives of all readings, column by column over the free entries, by central differences.
@@ -95,7 +95,7 @@ fn every_plant_in_two_records_under_both_holds() {
             let x = near_truth(&rig, 2);
             let what = format!("{} {hold:?}", rig.plant.id());
             check_rows(&what, &setup, &x);
-            // A record's initial levels move that record alone.
+            // A record's initial levels affect that record alone.
             let rows = rows(&setup, &x);
             let n = rig.plant.vessels();
             let own = rig.theta.len();
@@ -136,7 +136,8 @@ fn with_effects(rig: &Rig, setup: &Setup, records: usize) -> Vec<f64> {
     let mut x = near_truth(rig, 0);
     for &placed in setup.structure.effects() {
         for info in setup.structure.effect_parameters(placed) {
-            // At the first start of a rim the level just touches it, within the steps of the differences: across a corner they are no slope.
+            // At the first start of a rim the level just touches it, within the steps of the differences: differences across a corner are
+            // no slopes.
             let index = usize::from(info.name == "rim");
             x.push(info.starts[index]);
         }
@@ -149,7 +150,7 @@ fn with_effects(rig: &Rig, setup: &Setup, records: usize) -> Vec<f64> {
     x
 }
 
-/// More columns than lanes of one simulator: several run side by side.
+/// More columns than one simulator has derivatives: several simulators are used.
 #[test]
 fn more_columns_than_lanes() {
     let rig = Rig::cascaded_tanks();
@@ -161,7 +162,7 @@ fn more_columns_than_lanes() {
             .effects()
             .iter()
             .all(|on| on.effect.id != placed.effect.id);
-        // A sensor that sticks has no derivative where it lets go.
+        // The reading of a sensor with hysteresis has no derivative where it starts to move.
         let sticks = placed.effect.id == "sensor_hysteresis" || STEPPED.contains(&placed.effect.id);
         if once && !sticks {
             let structure = setup.structure.with(placed).unwrap();
@@ -229,7 +230,7 @@ fn whitening_is_that_of_dense_algebra() {
     }
 }
 
-/// Columns of fixed parameters are absent, the others are as they were.
+/// Columns of fixed parameters are absent, the others do not change.
 #[test]
 fn fixed_parameters_have_no_column() {
     let rig = Rig::cascaded_tanks();

@@ -1,5 +1,5 @@
-//! Two tanks in series fit almost as well with their time constants swapped: the starts must reach both ends, and the
-//! better one must be named.
+//! Two tanks in series fit almost as well with exchanged time constants: the starts must reach both minima, and the better one must be
+//! selected.
 
 use crate::support::{PRECISE, Rig};
 use greybox::{FitOptions, Noise, fit_from, random_starts};
@@ -40,7 +40,7 @@ fn starts_reach_both_basins_and_the_best_is_named() {
                 lower_first += 1;
             }
         }
-        // The truth has the fast tank above; some starts end with the slow one there, at a higher cost.
+        // The true model has the fast tank above; some starts end with the slow one above, at a higher cost.
         let swapped: Vec<f64> = ends
             .iter()
             .filter(|end| {
@@ -86,8 +86,8 @@ fn starts_reach_both_basins_and_the_best_is_named() {
     );
 }
 
-/// The base model is exactly right, time constants nearly equal: a descent from one start often ends elsewhere, the
-/// best end is found twice all the same.
+/// The base model is exactly right, with nearly equal time constants: one start often ends in another minimum, but the best minimum is
+/// found twice.
 #[test]
 fn a_right_model_is_found_at_least_twice() {
     let rig = Rig {

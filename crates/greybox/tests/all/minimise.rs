@@ -118,7 +118,7 @@ fn a_parameter_that_ends_at_its_bound_has_no_error() {
     for i in [0, 1, 3] {
         assert!(slope[i].abs() < 1e-5, "{slope:?}");
     }
-    // The others end where they end with the threshold fixed there.
+    // The other parameters end where they end with the threshold fixed there.
     let fixed = BTreeMap::from([("pump_deadzone.threshold".to_string(), 0.0)]);
     let setup = Setup::from_records(
         Plant::SingleTank,
@@ -151,7 +151,7 @@ fn fixed_parameters_stay_put() {
     assert_eq!(fit.x[1], 17.3);
     assert!(fit.std_errors()[1].is_none());
     assert!(fit.std_errors()[0].is_some());
-    // A start that says otherwise is overruled.
+    // A start with another value is overruled.
     let other = fit_from(
         &setup,
         &[vec![10.0, 99.0, 12.0, 7.0, 14.0]],
@@ -189,8 +189,7 @@ fn a_start_far_away_stays_physical() {
     }
 }
 
-/// Where the iteration says that it has converged, going on gains nothing that the record could tell; and it says so
-/// when it was cut short.
+/// If the iteration reports convergence, further iterations gain nothing significant; if it was cut short, it reports this.
 #[test]
 fn what_it_says_of_its_end_is_true() {
     let options = FitOptions::default();
@@ -251,7 +250,7 @@ fn a_fit_that_goes_on_is_the_fit_from_there() {
             let begun = fit_from(&setup, std::slice::from_ref(&start), first, rough).unwrap();
             let end = Start::at_end(&begun, then);
             assert_eq!(end.triangle.is_some(), first == then);
-            // What is known of a start that does not lie within the bounds is known of another one.
+            // Known results of a start outside the bounds belong to another start.
             let mut outside = end.clone();
             outside.x[1] = setup.bounds()[1].1 + 1.0;
             for start in [end, outside] {
@@ -278,7 +277,7 @@ fn a_simulation_that_is_not_finite_is_no_fit() {
     let starts = vec![vec![f64::NAN, 12.5, 14.0], rig.truth(1)];
     let found = fit_from(&setup, &starts, &Noise::white(1), PRECISE).unwrap();
     assert_eq!((found.starts, found.agree), (2, 1));
-    // Numbers that no arithmetic holds.
+    // Numbers beyond the floating-point range.
     let mut record = rig.record(1);
     for y in &mut record.outputs[0].values {
         *y *= 1e200;

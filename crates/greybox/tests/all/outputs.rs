@@ -140,7 +140,7 @@ fn the_likelihood_is_the_sum_of_those_of_the_outputs() {
         deviance += count * (1.0 + (std::f64::consts::TAU * variance).ln()) + log_det;
     }
     assert_relative_eq!(fit.deviance, deviance, max_relative = 1e-9);
-    // It is the least: no parameter's move lowers it.
+    // The minimum: no change of a parameter lowers it.
     let best = squares(&setup, &fit.x, &metric).unwrap().cost();
     for &i in setup.free() {
         for factor in [0.999, 1.001] {
@@ -186,7 +186,7 @@ fn each_output_has_its_own_noise() {
     assert_relative_eq!(fit.deviance, other.deviance, max_relative = 1e-6);
 }
 
-/// Intervals of 95 % hold the truth so often, whatever the metric of the fit; `RECORDS=800` takes so many records.
+/// Intervals of 95 % contain the true value so often, whatever the metric of the fit; `RECORDS=800` takes so many records.
 #[test]
 fn intervals_hold_the_truth() {
     let count = std::env::var("RECORDS");

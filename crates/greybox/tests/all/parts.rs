@@ -1,4 +1,4 @@
-//! Parts of one experiment share a clock: what follows time runs through them as through the whole record.
+//! Parts of one experiment share a clock: functions of time continue through them as in the whole record.
 
 use std::collections::BTreeMap;
 
@@ -34,7 +34,7 @@ fn with(id: &str) -> Structure {
     structure().with(Placed { effect, vessel: 0 }).unwrap()
 }
 
-/// Structures with something that follows time, and its parameters.
+/// Structures with a function of time, and their parameters.
 fn cases() -> Vec<(Structure, Vec<f64>)> {
     let end = INTERVAL * (SAMPLES - 1) as f64;
     let mut cases: Vec<(Structure, Vec<f64>)> = [
@@ -121,7 +121,7 @@ fn what_follows_time_runs_through_the_parts() {
             apart(&together.concat(), &whole.outputs[0].values) < 1e-9,
             "{name}"
         );
-        // From its own zero the second part is another experiment.
+        // With a separate time zero, the second part is another experiment.
         let [first, mut second] = parts.clone();
         second.time.iter_mut().for_each(|t| *t -= whole.time[CUT]);
         let unrelated = simulated(&[first, second]);
@@ -142,7 +142,7 @@ fn a_held_out_record_continues_the_clock_where_it_lies_after() {
     let held_out = |record: &Record| {
         let records = std::slice::from_ref(record);
         let own = setup.with_records(records).unwrap();
-        // Another structure does not forget it.
+        // A change of the structure does not reset it.
         let own = own.with_structure(own.structure.clone()).unwrap();
         own.simulate(&x).unwrap().output.concat()
     };

@@ -1,5 +1,5 @@
-//! The band of a simulation on other inputs: its exact slopes against differences of whole predictions, initial states fitted anew, and how
-//! often it covers the output without noise.
+//! The band of a simulation on other inputs: its exact slopes compared with differences of whole predictions, initial states fitted again,
+//! and the coverage of the output without noise.
 
 mod bands;
 
@@ -21,7 +21,7 @@ const TIGHT: Stopping = Stopping {
     cost: 1e-14,
 };
 
-/// A heated block whose sensor lags: the block is in no reading. The sensor begins where a parameter says.
+/// A heated block with a lagging sensor: no output measures the block directly. The sensor's initial value is a parameter.
 const BLOCK: &str = "model Block
   parameter Real C(min=0) = 55;
   parameter Real k(min=0) = 0.9;
@@ -52,7 +52,7 @@ fn model(text: &str) -> Model {
     Model::new(ModelSpec::parse(text).unwrap())
 }
 
-/// A record of steps of the input; `outputs` in it are NaN.
+/// Without noise: with noise the slopes of a fit have a second-order part, the residual times the curvature.
 fn inputs(rows: usize, step: f64, outputs: usize, seed: u64) -> Record {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let u = excitation::steps(rows, 10..=30, 2.0, 8.0, &mut rng).unwrap();
@@ -114,7 +114,7 @@ fn predicted(
     (x, errors)
 }
 
-/// Knowledge of one parameter alone.
+/// Covariance with a single uncertain parameter.
 fn of_one(entry: usize, error: f64, outputs: &[f64]) -> FitUncertainty {
     let white = outputs.iter().map(|sigma| ArModel::white(*sigma));
     FitUncertainty {
@@ -137,7 +137,7 @@ fn slopes_are_those_of_predictions_with_initial_states_fitted_anew() {
     let setup = setup(&model, &records);
     let parameters = &truth[..4];
     for entry in 0..4 {
-        // Noise so small that the readings' own part of the error is nothing.
+        // Such a small noise that the contribution of the readings' errors is negligible.
         let known = of_one(entry, 1.0, &[2e-9, 1e-9]);
         let (x, errors) = predicted(&setup, parameters, &known, 12, &record);
         let h = 1e-5 * truth[entry];

@@ -33,12 +33,12 @@ fn two_records_together_say_more_than_either() {
             information[i] += error.powi(-2);
         }
     }
-    // Together they know at least what both know alone: correlated errors make it more.
+    // Together they have at least the information of both: correlated errors increase it.
     for i in 0..3 {
         assert!(errors[i].unwrap() < 1.1 * information[i].powf(-0.5));
     }
 
-    // One after the other as if they were one record: the levels jump, and the model cannot.
+    // Concatenated as if they were one record, the levels jump, and the model does not fit.
     let [first, second] = records;
     let joined = |a: &[Channel], b: &[Channel]| {
         let both =

@@ -1,4 +1,4 @@
-//! Standard errors under a noise that is not the metric's, against dense algebra.
+//! Standard errors for a noise that differs from the weighting, compared with dense algebra.
 
 use crate::support::{PRECISE, Rig};
 use approx::assert_relative_eq;
@@ -64,7 +64,7 @@ fn agrees_with_dense_algebra_whatever_the_metric() {
             assert_relative_eq!(ours.unwrap(), dense[(i, i)].sqrt(), max_relative = 1e-7);
         }
     }
-    // In its own metric it is the ordinary standard error.
+    // With the noise model as weighting it equals the ordinary standard error.
     let fit = fit_from(&setup, &[rig.truth(2)], &Noise::white(1), PRECISE).unwrap();
     let same = robust(&setup, &fit, 0).unwrap().std_errors;
     for (a, b) in same.iter().zip(fit.std_errors()) {

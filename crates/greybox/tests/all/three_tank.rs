@@ -48,7 +48,7 @@ fn intervals_hold_the_truth() {
     let each: Vec<f64> = (0..truth.len()).map(share).collect();
     let pooled = each.iter().sum::<f64>() / each.len() as f64;
     println!("{each:.2?}, pooled {pooled:.3}");
-    // Four standard deviations of a share of 0.95 over so many records; those of one record hang together.
+    // Four standard deviations of a share of 0.95 over this number of records; the results of one record are correlated.
     assert!(each.iter().all(|share| *share >= 0.86), "{each:.2?}");
     assert!((0.91..=0.985).contains(&pooled), "{pooled}");
 }

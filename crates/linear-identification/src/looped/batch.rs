@@ -90,7 +90,7 @@ impl Task<'_> {
     }
 }
 
-/// Why a fit is not to be trusted.
+/// Reason why a fit is not reliable.
 fn stopped(stop: Stop) -> &'static str {
     match stop {
         Stop::Iterations => "the fit ran out of iterations: try a lower --order",

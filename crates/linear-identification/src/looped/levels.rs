@@ -1,4 +1,4 @@
-//! Where zero of the signals is.
+//! Operating point (zero) of the signals.
 
 use fcloe::{LoopRecord, Offsets};
 use serde::Serialize;
@@ -6,26 +6,26 @@ use serde::Serialize;
 use super::Task;
 use crate::{Error, Method, residual::limits};
 
-/// A loop rests in the first rows if there are so many in which the drive stands still, and neither output nor command would go
-/// further than this share of its range at their present pace, in the time that the record itself takes to forget.
+/// A loop is at rest in the first rows if there are enough rows with a constant drive, and neither output nor command would change by more
+/// than this share of its range at their present rate, in the time of the record's own memory.
 const ROWS_AT_REST: usize = 6;
 const MOVES: f64 = 0.03;
-/// What is less than so many standard errors is noise.
+/// A difference below this number of standard errors is noise.
 const NOISE: f64 = 3.0;
-/// Without an integrator, rows for so many times that time are long enough to rest in, whatever the noise.
+/// Without an integrator, rows over this number of time constants are long enough to come to rest, whatever the noise.
 const LONG: f64 = 3.0;
 
-/// Where zero of reference, input and output is. The loop has to rest there when the record begins.
+/// Zero of reference, input and output. The loop has to be at rest there when the record begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum LevelChoice {
-    /// Estimated by fcloe; else the rows before the reference moves first, or the means
+    /// Estimated by fcloe; otherwise the means of the rows before the first change of the reference, or of all rows
     #[default]
     Auto,
     /// Estimated with the parameters, by fcloe alone
     Estimated,
-    /// Means of the first rows, in which the reference stands still
+    /// Means of the first rows, in which the reference is constant
     Rest,
     /// Means of the record
     Mean,
@@ -34,7 +34,7 @@ pub enum LevelChoice {
 }
 
 impl Task<'_> {
-    /// Where zero is for what cannot estimate it.
+    /// Zero of the signals for methods that cannot estimate it.
     pub(super) fn offsets_at_rest(&self) -> Result<Offsets, Error> {
         let zero = self.centred(Offsets::Deviations)?;
         let (drive, _) = zero.drive(&self.controller)?;
@@ -56,8 +56,8 @@ impl Task<'_> {
         })
     }
 
-    /// Whether output and command stand still too while the drive does. Under an integrator the output stands where the reference
-    /// is. Where nothing says that, the rows have to be enough for a slow transient to be seen.
+    /// Whether output and command are constant as long as the drive is. With an integrator the output at rest equals the reference. Without
+    /// this knowledge, there must be enough rows to see a slow transient.
     fn rests(&self, record: &LoopRecord, still: usize) -> bool {
         if still < ROWS_AT_REST || still >= record.len() {
             return false;
@@ -108,7 +108,7 @@ struct Trend {
 }
 
 impl Trend {
-    /// Of the values that are there.
+    /// Statistics of the values that are present.
     fn new(y: &[f64]) -> Self {
         let rows = y.iter().enumerate().filter(|(_, y)| !y.is_nan());
         let n = rows.clone().count() as f64;
@@ -134,7 +134,7 @@ impl Trend {
     }
 }
 
-/// After how many rows a record has forgotten what it was: its correlation with itself is below 1/e; up to a factor 2.
+/// Number of rows after which the autocorrelation of a record falls below 1/e; accurate to a factor 2.
 fn forgets_after(y: &[f64]) -> usize {
     let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
     let together = |lag: usize| {
@@ -148,7 +148,7 @@ fn forgets_after(y: &[f64]) -> usize {
         .unwrap_or(y.len())
 }
 
-/// Where the levels of a record come from.
+/// Source of the levels of a record.
 pub(super) fn chosen(record: &LoopRecord) -> LevelChoice {
     match record.offsets {
         Offsets::Estimated => LevelChoice::Estimated,

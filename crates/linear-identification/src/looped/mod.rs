@@ -1,5 +1,4 @@
-//! The methods that have to do with a loop: regressions, and closed-loop output error, batch and recursive. Without a controller they
-//! identify in open loop.
+//! The methods for a loop: regressions, and closed-loop output error, batch and recursive. Without a controller they identify in open loop.
 
 mod batch;
 mod levels;
@@ -24,47 +23,48 @@ use crate::{
 };
 pub use levels::LevelChoice;
 
-/// Points of the picture of condition (14).
+/// Number of points of the plot of condition (14).
 const POINTS: usize = 240;
-/// A controller that misses more than this share of the command is said.
+/// A controller whose output differs from the command by more than this share causes a warning.
 const MISSED: f64 = 0.03;
-/// A command at its limits for more than this share of the rows is said.
+/// A command at its limits in more than this share of the rows causes a warning.
 const LIMITED: f64 = 0.01;
 
-/// A simulation error below this share of the output's deviation is not compared with another.
+/// A simulation error below this share of the output's standard deviation is not compared.
 const SURELY_GOOD: f64 = 0.02;
-/// So many times the simulation error of the batch fit says that the end of a recursion is not the plant of the record.
+/// If the recursion's final model has a simulation error above the batch fit's times this factor, the final model is not the plant of the
+/// record.
 const MUCH_WORSE: f64 = 1.5;
 
-/// What a method that has to do with the loop says besides the model.
+/// Results of a method for a loop, in addition to the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InLoop {
     /// R of the controller from the constant on, in s; empty in open loop.
     pub r: Vec<f64>,
     /// S of the controller.
     pub s: Vec<f64>,
-    /// What the zero of the signals was taken from.
+    /// Source of the zero of the signals.
     pub levels_from: LevelChoice,
     /// The levels: of the reference (of the input in open loop), and of the output.
     pub levels: [f64; 2],
-    /// How far the controller is from the command that was measured, if it is.
+    /// Difference between the controller's output and the measured command, if it is measured.
     pub mismatch: Option<Mismatch>,
-    /// Where the fit or the recursion began.
+    /// Start of the fit or the recursion.
     pub start: Start,
-    /// Of a batch fit.
+    /// Result of a batch fit.
     pub batch: Option<Batch>,
     /// Memory of a recursion, `1/eta`, s.
     pub memory: Option<f64>,
-    /// Of a recursion, at its end.
+    /// State of a recursion at its end.
     pub health: Option<LoopHealth>,
-    /// Condition (14) of a recursion with the filter of the start, if the estimates are the plant; not where it is doubtful that they are.
+    /// Condition (14) of a recursion with the filter of the start, if the estimates are the true plant; none if this is doubtful.
     pub convergence: Option<Convergence>,
 }
 
-/// Where an estimate began.
+/// Start of an estimate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Start {
-    /// What gave it.
+    /// Source of the start.
     pub from: &'static str,
     /// Bandwidth of the filter that it began with, 1/s.
     pub bandwidth: f64,
@@ -72,7 +72,7 @@ pub struct Start {
     pub theta: Vec<f64>,
 }
 
-/// How a batch fit ended.
+/// End of a batch fit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Batch {
     /// Why.
@@ -81,7 +81,7 @@ pub struct Batch {
     pub iterations: usize,
     /// Starts that were tried.
     pub starts: usize,
-    /// Where the noise enters, as the residual tells.
+    /// Point where the noise enters, according to the residual.
     pub noise: NoisePath,
     /// Standard errors for a residual that is white, for comparison.
     pub white_std_errors: Vec<f64>,
@@ -97,7 +97,7 @@ pub struct Convergence {
     pub locus: Vec<(f64, f64, f64)>,
 }
 
-/// A record, its loop, and what is asked.
+/// A record, its loop, and the request.
 struct Task<'a> {
     record: &'a Record,
     request: &'a Request,
@@ -105,7 +105,7 @@ struct Task<'a> {
     orders: Orders,
 }
 
-/// What a method gives.
+/// Result of a method.
 struct Found {
     plant: PlantModel,
     std_errors: Vec<Option<f64>>,
@@ -118,14 +118,14 @@ struct Found {
     warnings: Vec<String>,
 }
 
-/// How a recursion went.
+/// Result of a recursion.
 struct Run {
     trajectory: Trajectory,
     health: LoopHealth,
     memory: f64,
 }
 
-/// Identifies; everything that [`crate::identify()`] refuses, and what `fcloe` refuses.
+/// Identifies. Errors: those of [`crate::identify()`] and of `fcloe`.
 pub(super) fn identify(record: &Record, request: &Request) -> Result<Identification, Error> {
     positive("--memory", "s", request.memory)?;
     positive("--bandwidth", "1/s", request.bandwidth)?;
@@ -141,7 +141,7 @@ pub(super) fn identify(record: &Record, request: &Request) -> Result<Identificat
 
 impl Task<'_> {
     fn identify(&self) -> Result<Identification, Error> {
-        // What is refused is the same for all methods.
+        // The checks are the same for all methods.
         let centred = self.centred(self.offsets_at_rest()?)?;
         let problem = Problem::new(
             std::slice::from_ref(&centred),
@@ -162,7 +162,7 @@ impl Task<'_> {
         Ok(LoopRecord::from_record(self.record, offsets)?)
     }
 
-    /// What the loop does with a plant in it.
+    /// Simulation of the loop with a plant.
     fn simulated(
         &self,
         record: &LoopRecord,
@@ -259,8 +259,8 @@ impl Task<'_> {
         })
     }
 
-    /// Why the end of a recursion is not to be taken for the plant, if there is a reason: its loop was about to become unstable, or one
-    /// model for the whole record simulates it much better.
+    /// Reason why the end of a recursion is not reliable, if there is one: its loop was nearly unstable, or one model for the whole record
+    /// has a much smaller simulation error.
     fn astray(&self, health: &LoopHealth, rmse: f64, deviation: f64, unit: &str) -> Option<String> {
         let untold = "so condition (14) is not told";
         if health.refused > 0 {
@@ -280,12 +280,12 @@ impl Task<'_> {
         let best = rms(errors(&self.record.outputs[0], &simulated));
         (rmse > MUCH_WORSE * best).then(|| {
             format!(
-                "--method fcloe simulates the record with an error of {best:.3} {unit} instead of {rmse:.3}: the plant drifts, or the recursion went astray, {untold}"
+                "--method fcloe simulates the record with an error of {best:.3} {unit} instead of {rmse:.3}: the plant drifts, or the recursion diverged, {untold}"
             )
         })
     }
 
-    /// Condition (14) of a recursion with the filter of the start, if the end is the truth.
+    /// Condition (14) of a recursion with the filter of the start, if the final estimates are the true plant.
     fn convergence(&self, start: &Start, end: &PlantModel) -> Result<Convergence, Error> {
         let start = PlantModel::from_theta(self.orders, &start.theta)?;
         let of = |plant| ClosedLoop::new(plant, &self.controller);
@@ -297,7 +297,7 @@ impl Task<'_> {
         })
     }
 
-    /// The record's name before what the crate says, which does not always know it.
+    /// Adds the record's name to an error of the crate, which does not always know the name.
     fn named(&self, error: Error) -> Error {
         match error {
             Error::Loop(fcloe::Error::ControllerMismatch { mismatch, size, .. }) => {
@@ -334,18 +334,18 @@ impl Task<'_> {
     }
 }
 
-/// The controller is a little off.
+/// Warning about a small difference between controller and command.
 fn missed(mismatch: &Mismatch) -> Option<String> {
     let share = mismatch.systematic / mismatch.size;
     (share > MISSED).then(|| {
         format!(
-            "the controller misses {:.0} % of what the measured command does with the reference: its errors go straight into the estimates; check gain and integral_time",
+            "the controller does not explain {:.0} % of the response of the measured command to the reference: this error biases the estimates; check gain and integral_time",
             100.0 * share
         )
     })
 }
 
-/// The command stands at its limits, where the loop is not linear.
+/// The command is at its limits, where the loop is not linear.
 fn limited(record: &Record, (low, high): (f64, f64)) -> Option<String> {
     let values = &record.inputs[0].values;
     let at = values.iter().filter(|u| **u <= low || **u >= high).count();

@@ -10,19 +10,19 @@ use super::levels::chosen;
 use super::{Found, LevelChoice, Run, Start, Task};
 use crate::{Error, Trajectory, residual::rms};
 
-/// The part of the record that a recursion is started from.
+/// The share of the record for the start of a recursion.
 const BEGINNING: f64 = 0.3;
-/// The memory that is not asked for: this part of the record, and so many time constants.
+/// The default memory: this share of the record, and this number of time constants.
 const MEMORY_PART: f64 = 0.2;
 const MEMORY_TIME_CONSTANTS: f64 = 10.0;
 
 impl Task<'_> {
-    /// Sample by sample, from what the beginning of the record gives.
+    /// Recursion from the estimates of the beginning of the record.
     pub(super) fn recursion(&self, record: LoopRecord) -> Result<Found, Error> {
         let rows = ((BEGINNING * record.len() as f64) as usize).max(1);
         let part =
             |signal: &Option<Vec<f64>>| signal.as_ref().map(|v| v[..rows.min(v.len())].to_vec());
-        // Levels that are not to be found are those of the whole record: the means of its beginning are others.
+        // If the levels are not estimated, those of the whole record are used: means of its beginning differ.
         let levels_from = chosen(&record);
         let record = match self.finds_levels(&record) {
             true => record,
@@ -49,7 +49,7 @@ impl Task<'_> {
             Ok(begun) => begun,
             Err(_) => {
                 warnings.push(
-                    "the first rows do not tell a start: it was taken from the whole record, so the recursion knows what it has not seen yet"
+                    "the first rows do not determine a start: the start was taken from the whole record, so the recursion uses future samples"
                         .to_owned(),
                 );
                 self.begun(record.clone())?
@@ -111,12 +111,12 @@ impl Task<'_> {
         })
     }
 
-    /// Whether the levels are to be found with the start.
+    /// Whether the levels are estimated together with the start.
     fn finds_levels(&self, record: &LoopRecord) -> bool {
         record.offsets == Offsets::Means && self.request.levels == LevelChoice::Auto
     }
 
-    /// What a recursion starts from: the batch fit where it has to find the levels too, else the best regression.
+    /// Start of a recursion: the batch fit if the levels have to be estimated too, else the best regression.
     fn begun(&self, record: LoopRecord) -> Result<Found, Error> {
         if self.finds_levels(&record) {
             let mut found = self.batch(record)?;
@@ -125,13 +125,13 @@ impl Task<'_> {
         }
         let found = self.regression(record.clone(), true);
         match found {
-            // Filters do not run through long gaps; the simulation of the output error does.
+            // Filters are not continued through long gaps; the simulation of the output error is.
             Err(Error::Loop(fcloe::Error::Gaps { .. })) => self.batch(record),
             found => found,
         }
     }
 
-    /// Those of `fcloe`, for the amplitude of this loop.
+    /// Settings of `fcloe`, for the amplitude of this loop.
     fn recursive_settings(
         &self,
         record: &LoopRecord,
@@ -141,7 +141,7 @@ impl Task<'_> {
         let (drive, _) = record.drive(&self.controller)?;
         let mean = drive.iter().sum::<f64>() / drive.len().max(1) as f64;
         let power = rms(drive.iter().map(|v| v - mean)).powi(2);
-        // They were tried on loops of the first and the second order.
+        // These values were tested on loops of first and second order.
         let (gain, step_limit) = match self.orders.n {
             1 => (10.0, 0.05),
             _ => (1.0, 0.02),
@@ -152,8 +152,8 @@ impl Task<'_> {
         })
     }
 
-    /// What was asked for; else a part of the record, and enough of the plant's time constants. It does not fade, as parameters that
-    /// drift are followed by forgetting alone.
+    /// The requested memory; else a share of the record, and enough of the plant's time constants. The memory stays constant, because only
+    /// forgetting makes the estimates follow drifting parameters.
     fn memory(&self, record: &LoopRecord, start: &PlantModel) -> f64 {
         let n = self.orders.n;
         let theta = start.theta();

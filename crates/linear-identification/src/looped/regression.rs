@@ -7,12 +7,12 @@ use super::levels::chosen;
 use super::{Found, Start, Task};
 use crate::{Error, residual::rms};
 
-/// Renewals of instruments with a filter that stays, and of both.
+/// Number of iterations of instruments with a constant filter, and of both instruments and filter.
 const INSTRUMENTS: usize = 3;
 const REFINEMENTS: usize = 10;
 
 impl Task<'_> {
-    /// The regression whose loop gives the record best, over the bandwidths.
+    /// The regression whose loop simulates the record best, over the bandwidths.
     pub(super) fn regression(
         &self,
         record: LoopRecord,
@@ -72,13 +72,13 @@ impl Task<'_> {
             match start::standard_errors(records, &self.controller, &filter, &plant) {
                 Ok(errors) => {
                     std_errors = errors.into_iter().map(Some).collect();
-                    "the standard errors take the levels for exact: --method fcloe estimates them"
+                    "the standard errors assume that the levels are exact: --method fcloe estimates them"
                         .to_owned()
                 }
                 Err(error) => format!("no standard errors: {error}"),
             }
         } else {
-            "noise biases least squares by more than standard errors would say: none are shown; --method iv and fcloe have them".to_owned()
+            "noise biases least squares by more than standard errors show, so none are given; --method iv and fcloe have them".to_owned()
         };
         Ok(Found {
             levels: self.levels_of(&record),
@@ -93,7 +93,7 @@ impl Task<'_> {
         })
     }
 
-    /// Instruments with the filter that stays, then with one that is renewed.
+    /// Instruments with a constant filter, then with an updated filter.
     fn instruments(
         &self,
         records: &[LoopRecord],

@@ -1,10 +1,10 @@
-//! Standard errors along the way, from the scatter of the estimating equations.
+//! Standard errors over time, from the variance of the estimating equations.
 //!
 //! With `R = P^-1` and the estimates `theta^` of now, what the stretch from one kept point to the next has said against them is
 //! ```text
 //! z_b = R_b (theta_b - theta^) - e^{-eta L} R_{b-1} (theta_{b-1} - theta^) = integral of phi (y - phi' theta^) e^{..} dt
 //! ```
-//! exactly for least squares. Stretches of a time constant or more are nearly independent whatever the colour of the noise, so that
+//! exactly for least squares. Stretches of a time constant or more are nearly independent whatever the spectrum of the noise, so that
 //! ```text
 //! cov theta^ = P S P,   S = sum_b e^{-2 eta (t - t_b)} z_b z_b'
 //! ```
@@ -18,7 +18,7 @@ use super::path::{Path, Point};
 use super::scaled::Scaled;
 use crate::Trajectory;
 
-/// Stretches that the parameters must be outnumbered by.
+/// Least number of segments per parameter.
 const SPARE: f64 = 2.0;
 
 /// The parameters in their units over the record, with standard errors.
@@ -71,7 +71,7 @@ fn covariance(ends: &[&Point], now: &Point, eta: f64) -> Option<DMatrix<f64>> {
         weights += weight;
         squares += weight * weight;
     }
-    // As many stretches of one weight would say as much.
+    // Number of segments of equal weight with the same information.
     let count = weights * weights / squares;
     if count.is_nan() || count <= p as f64 + SPARE {
         return None;

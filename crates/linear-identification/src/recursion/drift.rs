@@ -1,5 +1,5 @@
-//! Whether the estimates move with the level: near one level any process is linear, so that a model which holds at one level and not at
-//! another says that the process is not linear, or not of this order.
+//! Test whether the estimates depend on the level. Near a single level any process is linear, so estimates that depend on the level show
+//! that the process is not linear, or not of this order.
 //!
 //! What the recursion says at a time belongs to the mean of the output as the recursion remembers it,
 //! ```text
@@ -7,7 +7,7 @@
 //! ```
 //! The way of the level is cut into equal stretches, and the estimates of each are averaged.
 //!
-//! That they stand still says something only where the level has moved: where the memory is a small part of the record, and what it
+//! That they are constant says something only where the level has moved: where the memory is a small part of the record, and what it
 //! remembers covers a good part of the output's range. A shorter record cannot tell.
 
 use serde::Serialize;
@@ -18,52 +18,52 @@ use crate::{Order, Trajectory};
 /// Stretches of the level.
 const STRETCHES: usize = 8;
 
-/// The estimates move with the level where the ends of its way are so many standard errors apart.
+/// The estimates depend on the level if their values at both ends of the level's range differ by this number of standard errors.
 const APART: f64 = 3.0;
 
-/// The longest memory, of the record's length, and the least way of the remembered level, of the output's range, with which estimates
-/// that stand still say something. The default memory of a record that is long enough is a fifth of it.
+/// The longest memory, as a share of the record's length, and the least range of the remembered level, as a share of the output's range,
+/// for which constant estimates are significant. The default memory of a long record is a fifth of it.
 const LONGEST_MEMORY: f64 = 0.21;
 const LEAST_WAY: f64 = 0.2;
 
 /// Gain and time constant over the level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Drift {
-    /// Mean output that the recursion remembers, in the output's unit, rising.
+    /// Mean output within the recursion's memory, in the output's unit, rising.
     pub level: Vec<f64>,
-    /// Static gain `b_0` there.
+    /// Static gain `b_0` as a function of the level.
     pub gain: OverLevel,
     /// `a_1`: the time constant for n = 1, otherwise the sum of the time constants, s.
     pub time_constant: OverLevel,
     /// Memory over the length of the record.
     pub memory_part: f64,
-    /// Way of the level that is remembered, over the output's range.
+    /// Range of the remembered level, as a share of the output's range.
     pub level_part: f64,
 }
 
 impl Drift {
-    /// Whether gain or time constant move more than chance would have it.
+    /// Whether gain or time constant change by more than chance.
     #[must_use]
     pub fn moves(&self) -> bool {
         self.gain.moves() || self.time_constant.moves()
     }
 
-    /// Whether the level has moved enough for estimates that stand still to say that the process is linear.
+    /// Whether the range of the level is large enough to conclude from constant estimates that the process is linear.
     #[must_use]
     pub fn tells(&self) -> bool {
         self.memory_part <= LONGEST_MEMORY && self.level_part >= LEAST_WAY
     }
 }
 
-/// One parameter over the level.
+/// One parameter as a function of the level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OverLevel {
-    /// Its values.
+    /// Values of the parameter.
     pub values: Vec<f64>,
-    /// Their standard errors.
+    /// Standard errors of the means.
     pub std_errors: Vec<f64>,
-    /// Difference between the highest and the lowest level, in its standard errors. The two estimates are taken for independent; where
-    /// they share data the difference is known better than that.
+    /// Difference between the highest and the lowest level, in its standard errors. The two estimates are treated as independent; with
+    /// common data the difference is more accurate.
     pub difference: f64,
 }
 
@@ -79,7 +79,7 @@ impl OverLevel {
         }
     }
 
-    /// Whether it moves more than chance would have it.
+    /// Whether the parameter changes by more than chance.
     #[must_use]
     pub fn moves(&self) -> bool {
         self.difference.abs() > APART
@@ -117,7 +117,7 @@ impl Stretch {
     }
 }
 
-/// Nothing where the level stands, or where too little has been seen for standard errors.
+/// `None` if the level is constant, or if the record is too short for standard errors.
 pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order) -> Option<Drift> {
     let levels = remembered(scaled);
     let at = |i: usize, k: usize| (trajectory.values[i][k], trajectory.std_errors[i][k]);
@@ -133,7 +133,7 @@ pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order)
         .collect();
     let of = |pick: fn(f64, f64) -> f64, from| points.iter().map(|p| p.0).fold(from, pick);
     let (low, high) = (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY));
-    // Without points: from infinity down to minus infinity.
+    // Without points the range is from infinity down to minus infinity.
     if high <= low {
         return None;
     }
@@ -157,12 +157,12 @@ pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order)
         memory_part: 1.0 / (scaled.eta * duration),
         level_part: (high - low) / (range.1 - range.0),
     };
-    // one stretch alone, or standard errors of 0: nothing to compare
+    // a single interval, or standard errors of 0: no comparison
     let known = [&drift.gain, &drift.time_constant].map(|over| over.difference.is_finite());
     (known == [true, true]).then_some(drift)
 }
 
-/// The level that is remembered at every sample, scaled.
+/// The remembered level at every sample, scaled.
 fn remembered(scaled: &Scaled) -> Vec<f64> {
     let (mut level, mut length) = (0.0, 0.0);
     let mut levels = Vec::with_capacity(scaled.y.len());
@@ -172,7 +172,7 @@ fn remembered(scaled: &Scaled) -> Vec<f64> {
             continue;
         }
         let faded = (-scaled.eta * step).exp();
-        // in units of the memory: the whole past comes to 1
+        // in units of the memory: the whole past counts as 1
         let new = 1.0 - faded;
         length = faded * length + new;
         if length > 0.0 {

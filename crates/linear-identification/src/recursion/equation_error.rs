@@ -12,11 +12,11 @@ use crate::{Error, Order};
 
 /// P(0): all parameters are about 1.
 const P_EQUATION_ERROR: f64 = 100.0;
-/// The share of the readings that has to be left for the equation error where readings are missing.
+/// The share of the readings that must be usable for the equation error with missing readings.
 const LEAST_LEFT: f64 = 0.3;
 
-/// Least squares on `y_f = -a_1 y_f' - .. + b_0 u_f + .. + d`. Rows count where the reading is there and the filter of y has forgotten what long gaps were
-/// bridged with; in the others nothing is learnt and nothing forgotten.
+/// Least squares on `y_f = -a_1 y_f' - .. + b_0 u_f + .. + d`. Rows are used if the reading is present and the filter of y has forgotten
+/// long gaps; other rows cause neither an update nor forgetting.
 pub(super) fn equation_error(scaled: &Scaled, order: Order) -> Result<Path, Error> {
     let p = order.parameters();
     let start = DVector::from_vec(start(scaled, order));

@@ -21,7 +21,7 @@ use crate::{
 };
 pub use drift::{Drift, OverLevel};
 
-/// By a recursion without a loop.
+/// Identification by a recursion without a loop.
 pub(crate) fn identify(record: &Record, request: &Request) -> Result<Identification, Error> {
     // Filters and model begin with the first reading.
     let first = record.outputs[0].values.iter().position(|y| !y.is_nan());

@@ -16,16 +16,17 @@ use super::{
 use crate::{Error, Order, warnings::lower_or_faster};
 
 const P_OUTPUT_ERROR: f64 = 10.0;
-/// How far the plausible plants reach about the start, and the bounds on c: factors, the widest that are sure come first.
+/// Ranges of the plausible plants around the start, with bounds on c: factors; the widest range with guaranteed convergence is used.
 const PLAUSIBLE: [f64; 4] = [2.0, 1.5, 1.25, 1.1];
 const BOUNDS: [f64; 4] = [2.0, 1.5, 1.2, 1.05];
-/// The output error keeps every lag above this part of the sampling interval, where the others are those of the start. Less cannot be
-/// seen, and `y_m^(n)`, which is divided by `a_n`, would be so large that the recursion takes itself for sure.
+/// The output-error recursion keeps every lag above this share of the sampling interval, with the other lags as at the start. Shorter lags
+/// cannot be identified, and `y_m^(n)`, which is divided by `a_n`, would be so large that the recursion would underestimate its
+/// uncertainty.
 const SHORTEST_LAG: f64 = 0.05;
 
 /// Output error of a model in parallel.
 pub(super) fn output_error(scaled: &Scaled, order: Order) -> Result<Path, Error> {
-    // The crate's sizes are known when it is built: one for each order.
+    // The crate's sizes are fixed at compile time: one instance for each order.
     macro_rules! sizes {
         ($($n:literal, $m:literal => $p:literal;)*) => {
             match (order.n, order.m) {
@@ -50,7 +51,7 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
         SMatrix::identity() * P_OUTPUT_ERROR,
         Weights::least_squares(scaled.eta)?,
     )?;
-    // Nothing is forgotten: the regressor of c vanishes where the model is right.
+    // No forgetting: the regressor of c vanishes if the model is right.
     let filter = ContinuousRls::with_integrator(
         SVector::from(a),
         SMatrix::identity(),
@@ -61,7 +62,7 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
     let (bounds, plausible) = filter_bounds(&a)?;
     if plausible.is_none() {
         path.warnings.push(format!(
-            "no bounds on the error filter make convergence sure for any plants around the start, for n = {N}; compare with --method ct-rls"
+            "no bounds on the error filter guarantee convergence for plants around the start, for n = {N}; compare with --method ct-rls"
         ));
     }
     let filters = StateVariableFilters::<N>::with_input(scaled.bandwidth, scaled.hold)?;
@@ -101,7 +102,7 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
     if held > 0 {
         path.held = true;
         path.warnings.push(format!(
-            "a time constant is too short to be seen: in the second half a bound held a coefficient of A above 0 (steps: {held}), and standard errors \
+            "a time constant is too short to be identified: in the second half a bound held a coefficient of A above 0 (steps: {held}), and standard errors \
              are not known; {}",
             lower_or_faster(order)
         ));
@@ -136,7 +137,8 @@ fn at_rest<const N: usize>(scaled: &Scaled) -> [f64; N] {
     state
 }
 
-/// The widest bounds on c about the start with which C/A0 - 1/2 is strictly positive real for the plants about it, and how far those reach.
+/// The widest bounds on c around the start for which C/A0 - 1/2 is strictly positive real for the plants around it, and the range of these
+/// plants.
 fn filter_bounds<const N: usize>(a: &[f64; N]) -> Result<(Bounds<N>, Option<f64>), Error> {
     for reach in PLAUSIBLE {
         let plausible = about(a, reach)?;
@@ -156,7 +158,7 @@ fn about<const N: usize>(a: &[f64; N], factor: f64) -> Result<Bounds<N>, Error> 
     Ok(bounds.map_err(stabilized_oe::Error::from)?)
 }
 
-/// The plant that was found is none of those for which convergence is sure.
+/// Convergence is not guaranteed for the identified plant.
 fn left_plausible<const N: usize>(
     path: &Path,
     reach: Option<f64>,
@@ -168,13 +170,13 @@ fn left_plausible<const N: usize>(
     if about(a, reach)?.contains(&SVector::from(found)) {
         return Ok(None);
     }
-    // Outside the box the bounds may hold all the same.
+    // Outside the box the bounds may still be sufficient.
     let [.., here] = PLAUSIBLE;
     let (bounds, _) = filter_bounds(a)?;
     Ok(match check_filter_bounds(&bounds, &about(&found, here)?, 0.5)? {
         FilterBounds::PositiveReal => None,
         _ => Some(
-            "the error filter's bounds do not make convergence sure for the plant that was found (C/A - 1/2 is not strictly positive real): \
+            "the error filter's bounds do not guarantee convergence for the plant that was found (C/A - 1/2 is not strictly positive real): \
              compare with --method ct-rls"
                 .to_owned(),
         ),

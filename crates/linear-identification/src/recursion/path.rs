@@ -1,31 +1,32 @@
-//! The way of a recursion over a record.
+//! Trajectory of a recursion over a record.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::scaled::Scaled;
 use crate::{Error, Order};
 
-/// Points of the way that are kept.
+/// Number of stored points of the trajectory.
 const POINTS: usize = 500;
 
-/// Where the recursion was.
+/// A point of the recursion's trajectory.
 #[derive(Debug, Clone)]
 pub(super) struct Point {
-    /// Which sample.
+    /// Index of the sample.
     pub sample: usize,
-    /// In which there were readings, scaled.
+    /// Time with readings, scaled.
     pub time: f64,
     pub theta: DVector<f64>,
     /// `P^-1`
     pub information: DMatrix<f64>,
 }
 
-/// Its way over the record.
+/// Trajectory of the recursion over the record.
 #[derive(Debug, Clone)]
 pub(super) struct Path {
     pub order: Order,
     pub points: Vec<Point>,
-    /// Bounds on the parameters have acted in the second half: the scatter of the estimates says nothing of their errors then.
+    /// Bounds on the parameters were active in the second half: then the variance of the estimates contains no information about their
+    /// errors.
     pub held: bool,
     pub warnings: Vec<String>,
 }
@@ -64,16 +65,16 @@ impl Path {
     }
 }
 
-/// Whether the k-th of `count` samples is kept.
+/// Whether the k-th of `count` samples is stored.
 pub(super) fn is_kept(k: usize, count: usize) -> bool {
     k + 1 == count || k.is_multiple_of(count.div_ceil(POINTS))
 }
 
-/// The time of the rows that were learnt from, and how many these are.
+/// Total time and number of the rows that were used for updates.
 pub(super) struct Learnt {
     time: f64,
     pub rows: usize,
-    /// Whether all readings are there: then the time is the record's own, to the last digit.
+    /// Whether all readings are present: then the time equals the record's own exactly.
     whole: bool,
 }
 
@@ -95,7 +96,7 @@ impl Learnt {
         }
     }
 
-    /// A row that was held for a time, and whether it was learnt from.
+    /// Adds a row that was held for a time, and whether it was used for an update.
     pub fn after(&mut self, learnt: bool, held: f64) {
         if learnt {
             self.time += held;

@@ -12,16 +12,16 @@ const GRID: usize = 60;
 /// Bandwidth of the filters, over the inverse of the time constant of first order. Higher lets noise through, lower hides fast dynamics.
 const BANDWIDTH: f64 = 3.0;
 
-/// Below this over the time constant of first order the filters hide what is looked for.
+/// Below this multiple of the inverse time constant of first order, the filters suppress the dynamics of interest.
 const LEAST_BANDWIDTH: f64 = 0.1;
 
-/// So many times below that, and above the sampling rate, nothing is left of the signals.
+/// At frequencies below that, or above the sampling rate, by more than this factor the filtered signals vanish.
 const WIDEST: f64 = 100.0;
 
 /// The least memory, in time constants.
 const LEAST_MEMORY: f64 = 10.0;
 
-/// The memory is this part of the record where that is more.
+/// The memory is this share of the record, if that is longer.
 const MEMORY_PART: f64 = 0.2;
 
 /// A record, scaled.
@@ -37,7 +37,7 @@ pub(super) struct Scaled {
     unit: f64,
     /// Median step of the time, in the same unit.
     pub interval: f64,
-    /// Time as it is in the record, s.
+    /// Time of the record, s.
     pub seconds: Vec<f64>,
     /// Means and standard deviations of input and output.
     input: (f64, f64),
@@ -48,12 +48,12 @@ pub(super) struct Scaled {
     pub eta: f64,
     /// Gain and offset of the model of first order.
     pub first_order: [f64; 2],
-    /// Its simulation error, root mean square.
+    /// Simulation error, root mean square.
     first_order_error: f64,
 }
 
 impl Scaled {
-    /// The record must have rows, and signals that move. Also says what is doubtful.
+    /// The record must have rows, and signals that change. Also collects warnings.
     pub fn new(record: &Record, request: &Request) -> (Self, Vec<String>) {
         let begin = record.time.first().copied().unwrap_or(0.0);
         let (duration, step) = (record.duration(), record.sample_interval());
@@ -80,18 +80,18 @@ impl Scaled {
                  sample faster, or record longer"
             ));
         }
-        // The filters have to be seen by the samples.
+        // The bandwidth of the filters has to be below the sampling rate.
         let fastest = 1.0 / step;
         let bandwidth = request.bandwidth.unwrap_or((BANDWIDTH / unit).min(fastest));
         if bandwidth > 2.0 * fastest {
             warnings.push(format!(
-                "the filters' bandwidth of {bandwidth} 1/s is beyond what samples every {step} s show; take --bandwidth {fastest:.3} at most"
+                "the filters' bandwidth of {bandwidth} 1/s is too high for a sampling interval of {step} s; take --bandwidth {fastest:.3} at most"
             ));
         }
         let slowest = LEAST_BANDWIDTH / unit;
         if bandwidth < slowest {
             warnings.push(format!(
-                "the filters' bandwidth of {bandwidth} 1/s hides a time constant of {unit:.3} s: nothing is learnt of it, whatever the standard errors say; \
+                "the filters' bandwidth of {bandwidth} 1/s suppresses a time constant of {unit:.3} s: it cannot be identified, although its standard errors may be small; \
                  take --bandwidth {slowest:.3e} at least"
             ));
         }
@@ -188,7 +188,7 @@ impl Scaled {
     }
 }
 
-/// Mean and standard deviation of the values that are there.
+/// Mean and standard deviation of the present values.
 fn moments(values: &[f64]) -> (f64, f64) {
     let there = values.iter().filter(|v| !v.is_nan());
     let n = there.clone().count() as f64;
@@ -197,8 +197,8 @@ fn moments(values: &[f64]) -> (f64, f64) {
     (mean, (squares / n).sqrt())
 }
 
-/// Time constant, gain and offset of the model of first order with the least simulation error, that error, and whether it lies at
-/// the edge of the grid.
+/// Time constant, gain and offset of the model of first order with the least simulation error, that error, and whether the time constant is
+/// at an end of the grid.
 fn first_order(record: &Record, u: &[f64], y: &[f64], hold: Hold) -> (f64, [f64; 2], f64, bool) {
     let (shortest, longest) = (record.sample_interval(), record.duration());
     let ratio = (longest / shortest).max(1.0);
@@ -232,7 +232,7 @@ fn lagged(time: &[f64], u: &[f64], time_constant: f64, hold: Hold) -> Option<Vec
     Some(lagged)
 }
 
-/// `y = K x + d` and a decaying initial state, by least squares over the readings that are there: the squared error, and K and d.
+/// `y = K x + d` and a decaying initial state, by least squares over the present readings: the squared error, and K and d.
 fn line(time: &[f64], x: &[f64], y: &[f64], time_constant: f64) -> (f64, [f64; 2]) {
     let begin = time.first().copied().unwrap_or(0.0);
     let there: Vec<usize> = (0..x.len()).filter(|k| !y[*k].is_nan()).collect();

@@ -1,4 +1,4 @@
-//! What a linear model says from the input alone.
+//! Simulation of a linear model from the input alone.
 
 use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
 use nalgebra::{DMatrix, DVector};
@@ -6,10 +6,10 @@ use nalgebra::{DMatrix, DVector};
 use super::scaled::Scaled;
 use crate::{Error, Order};
 
-/// A free response that still counts for this part of itself at the end of the record.
+/// A free response is significant if this share of it is present at the end of the record.
 const LASTING: f64 = 0.2;
 
-/// The simulated output in its unit, from an initial state that is fitted; a warning where that state explains what it should not.
+/// The simulated output in its unit, from a fitted initial state; with a warning if this state explains too much.
 pub(super) fn simulate(
     scaled: &Scaled,
     order: Order,
@@ -28,7 +28,7 @@ pub(super) fn simulate(
     let lasting = fading.iter().rev().take(fading.len().div_ceil(10));
     let at_end = lasting.fold(0.0_f64, |most, x| most.max(x.abs()));
     let warning = (at_end > LASTING).then(|| {
-        "the model is so slow that its initial state is still seen at the end of the record: record longer".to_owned()
+        "the model is so slow that its initial state still matters at the end of the record: record longer".to_owned()
     });
     let simulated = forced
         .iter()
@@ -46,7 +46,7 @@ struct Driven<'a> {
     y: &'a [f64],
 }
 
-/// A simulated output: what the input does, and what the initial state does.
+/// A simulated output: the response to the input, and that to the initial state.
 struct Response {
     forced: Vec<f64>,
     fading: Vec<f64>,
@@ -65,7 +65,7 @@ impl Driven<'_> {
             .map(|state| self.response(&model, |_| 0.0, Some(state)))
             .collect::<Result<_, _>>()?;
         let count = self.y.len();
-        // each of size 1, so that none is lost beside another
+        // each is scaled to 1, so that none is lost by rounding
         let sizes: Vec<f64> = free
             .iter()
             .map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt())

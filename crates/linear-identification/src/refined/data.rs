@@ -1,11 +1,11 @@
-//! Records as `rivc` takes them.
+//! Records in the form of the crate `rivc`.
 
 use ct_signals::Record;
 use rivc::{Data, Structure};
 
 use crate::Mended;
 
-/// A record as the crate takes it; its reference only where it moves.
+/// A record for the crate `rivc`; its reference only if it changes.
 pub(crate) fn data(record: &Record) -> Data {
     let moves = record.references.first().is_some_and(|reference| {
         let (low, high) = reference.range();
@@ -22,7 +22,7 @@ pub(crate) fn parts(records: &[Mended], structure: &Structure) -> (Vec<(Record, 
         let mut first = true;
         for record in &mended.parts {
             let data = part(record, in_loop, !first);
-            // A record that is not cut is refused with what it lacks.
+            // A record that is not cut is rejected with the reason.
             if mended.parts.len() == 1 || data.is_long_enough(structure) {
                 all.push((record.clone(), data));
                 first = false;

@@ -1,13 +1,13 @@
-//! What is said of the delay.
+//! Setting of the delay.
 
-/// What is said of the delay.
+/// Setting of the delay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DelayChoice {
-    /// It is known, s.
+    /// Known delay, s.
     Known(f64),
-    /// It is estimated, up to a tenth of the record.
+    /// The delay is estimated, up to a tenth of the record.
     Auto,
-    /// It is estimated, up to this, s.
+    /// The delay is estimated, up to this value, s.
     UpTo(f64),
 }
 

@@ -30,12 +30,13 @@ use crate::{
     warnings::{doubtful, too_fast},
 };
 
-/// A delay that is looked for without a limit is at most this part of the shortest record.
+/// The default limit of an estimated delay as a share of the shortest record.
 const PART: f64 = 0.1;
-/// Instruments from a reference that explains less of the input are weak.
+/// Instruments from a reference that explains a smaller share of the input are weak.
 const EXPLAINED: f64 = 0.2;
 
-/// The plant alone, of one order, without a delay, and whether it is determined: the iteration has converged, and the highest coefficient of A differs from zero.
+/// The plant alone, of one order, without a delay, and whether it is determined: the iteration has converged, and the highest coefficient
+/// of A differs significantly from zero.
 pub(super) fn plant(records: &[Mended], request: &Request) -> Result<(rivc::Plant, bool), Error> {
     let (structure, settings) = asked(records, request);
     let (parts, _) = parts(records, &structure);
@@ -49,7 +50,7 @@ pub(super) fn plant(records: &[Mended], request: &Request) -> Result<(rivc::Plan
     Ok((found.plant, found.converged && known))
 }
 
-/// Structure and settings that a request comes to.
+/// Structure and settings of a request.
 fn asked(records: &[Mended], request: &Request) -> (Structure, rivc::Settings) {
     let Order { n, m } = request.order;
     let inputs = records
@@ -221,7 +222,7 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
     let deviation = rms(deviations.into_iter());
     if rmse > deviation {
         warnings.push(
-            "the model simulates worse than a constant does: the plant may be unstable without its controller, which these methods do not identify (--method fcloe does); the input may answer to the output alone, through a controller whose reference is not there or does not move; or order or --integrator do not belong".to_owned(),
+            "the model simulates worse than a constant does: the plant may be unstable without its controller, which these methods do not identify (--method fcloe does); the input may depend on the output alone, through a controller whose reference is missing or constant; or the order or --integrator is wrong".to_owned(),
         );
     }
     let input_names = first.inputs.iter();
@@ -266,14 +267,14 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
     Ok(identification)
 }
 
-/// Of a second input and of further records with their number: `b0_2`, `offset_2`.
+/// Name and unit of a parameter. Parameters of a second input and of further records have a number: `b0_2`, `offset_2`.
 fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, String) {
     let numbered = |name: String, index: usize| match index {
         0 => name,
         index => format!("{name}_{}", index + 1),
     };
     let output = &record.outputs[0].unit;
-    // With an integrator A begins with p: everything is divided by a time.
+    // With an integrator, A begins with p: all units are divided by a time.
     let lower = usize::from(integrator);
     match kind {
         Kind::A { power } => (format!("a{power}"), power_of_time(power - lower)),
@@ -308,7 +309,7 @@ fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, Stri
     }
 }
 
-/// The record's name in front, once.
+/// Puts the record's name in front, once.
 fn named(records: &[Record], error: rivc::Error) -> Error {
     let what = error.to_string();
     let own = records.iter().find_map(|record| {

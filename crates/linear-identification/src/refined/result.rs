@@ -1,8 +1,8 @@
-//! What SRIVC and RIVC say besides the model.
+//! Results of SRIVC and RIVC in addition to the model.
 
 use serde::Serialize;
 
-/// What SRIVC and RIVC say besides the model.
+/// Results of SRIVC and RIVC in addition to the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Refined {
     /// SRIVC, RIVC, CLSRIVC or CLRIVC.
@@ -17,7 +17,7 @@ pub struct Refined {
     pub inputs: Vec<String>,
     /// Noise of each record.
     pub noise: Vec<RecordNoise>,
-    /// Rows of each record that do not count, as the inputs before the record are not known under the delays.
+    /// Rows of each record that are not used, because the delayed inputs are from before the record.
     pub left_out: Vec<usize>,
     /// In a loop: share of the input's power that the reference explains.
     pub explained: Option<f64>,
@@ -30,8 +30,8 @@ pub struct Refined {
 /// The noise of a record, an autoregression counted in samples: of the residual for SRIVC.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordNoise {
-    /// Its coefficients; none where it is white.
+    /// Coefficients of the noise model; none for white noise.
     pub coefficients: Vec<f64>,
-    /// Standard deviation of what drives it, output unit.
+    /// Standard deviation of the innovations, output unit.
     pub deviation: f64,
 }

@@ -1,26 +1,26 @@
-//! Whether an input, or in a loop the reference, shows in the simulation error.
+//! Test whether the simulation error depends on an input or, in a loop, on the reference.
 
 use ct_signals::{Record, quoted, residual_tests};
 
 use crate::{Error, Shown};
 
-/// Lags of the test that the error has nothing of a signal, at most.
+/// Largest number of lags for the test that the error does not depend on a signal.
 const MOST_LAGS: usize = 25;
-/// A signal that shows in the error with less than this probability by chance is said.
+/// Significance level: a correlation of a signal with the error below this p-value is reported.
 const UNLIKELY: f64 = 0.01;
 
-/// The parts of a record, one behind the other.
+/// The parts of a record, one after the other.
 #[derive(Default)]
 pub(super) struct Joined {
     pub shown: Shown,
-    /// Of the signals that must not show in the error, and the error; with rows without a value between the parts.
+    /// Signals that must be uncorrelated with the error, and the error; with rows without a value between the parts.
     signals: Vec<ct_signals::Channel>,
     error: Vec<f64>,
     pub readings: Vec<f64>,
 }
 
 impl Joined {
-    /// In open loop every input is held against the error, in a loop the reference, as the input answers to the noise there.
+    /// In open loop the error is tested against every input, in a loop against the reference, because the input depends on the noise there.
     pub fn add(&mut self, record: &Record, in_loop: bool, error: impl Iterator<Item = f64>) {
         let signals: Vec<&ct_signals::Channel> = match record.references.first().filter(|_| in_loop)
         {
@@ -49,7 +49,7 @@ impl Joined {
     }
 }
 
-/// The signal that shows most in the simulation errors.
+/// The signal with the largest correlation with the simulation errors.
 #[derive(Default)]
 pub(super) struct Visible {
     tests: usize,
@@ -80,7 +80,7 @@ impl Visible {
         };
         (p * (self.tests as f64) < UNLIKELY).then(|| {
             format!(
-                "\"{}\" shows in the simulation error: the order is too low{several}, there is a delay (try --delay auto), or the plant is not linear; the standard errors do not hold then",
+                "the simulation error depends on \"{}\": the order is too low{several}, there is a delay (try --delay auto), or the plant is not linear; the standard errors do not hold then",
                 quoted(&name)
             )
         })

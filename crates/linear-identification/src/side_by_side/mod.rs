@@ -1,22 +1,23 @@
 //! Several methods and orders on one record, by the same measures.
 //!
-//! Each method fits what it fits; they are compared by one error: the model runs on the input alone, from an initial state and a level
-//! that are fitted to the record (`n + 1` numbers, least squares), on the record it was identified on and on others. A method that the
-//! record does not allow has a reason instead of a row.
+//! Methods have different criteria; they are compared by a common error: the model runs on the input alone, from an initial state and a
+//! level that are fitted to the record (`n + 1` numbers, least squares), on the record it was identified on and on others. A method that
+//! cannot be used on the record has a reason instead of a row.
 //!
-//! In a loop the command answers to the noise, and a model that takes this answer for the plant simulates better on the measured command
-//! than the plant does: there no method is called worse for its error, and that is said.
+//! In a loop the command depends on the noise, and a model that attributes this feedback to the plant simulates better on the
+//! measured command than the true plant: there methods are not ranked by their error, and a note says so.
 //!
-//! Missing readings have no error. Of a record that is cut at gaps of its input this error is that over the rows behind which the plant has forgotten them.
+//! Missing readings have no error. Of a record that is cut at gaps of its input this error is that over the rows after which the plant has
+//! forgotten them.
 //!
 //! Orders are chosen by
 //! - BIC: `N log sigma^2 + k log N`, `sigma` of the innovations of an autoregressive model of the simulation error, `k` its coefficients,
 //!   the `n + m + 1` parameters, and the initial state and level;
 //! - YIC (Young 1989): `log(sigma_e^2/sigma_y^2) + log(mean_i(se_i^2/theta_i^2))`, small where the fit is good and all parameters are
-//!   known; only where the method says standard errors.
+//!   known; only if the method gives standard errors.
 //!
-//! The order that is shown of a method has the least BIC of those whose parameters all differ significantly from zero, and whose time constants are no
-//! shorter than a step; where there is none, of all.
+//! The order that is shown of a method has the least BIC of those whose parameters all differ significantly from zero, and whose time
+//! constants are no shorter than a step; where there is none, of all.
 //!
 //! Reference: P. C. Young, Recursive estimation, forecasting and adaptive control, in C. T. Leondes (ed.), Control and Dynamic Systems 30,
 //! Academic Press 1989.
@@ -33,37 +34,43 @@ pub use self::result::{Outcome, Row, SideBySide};
 pub use crate::order::Orders;
 use crate::{Error, Mended, Method, Order, Request, Shown, identify_mended};
 
-/// A test with a smaller probability says that an assumption does not hold.
+/// Significance level of the tests of assumptions.
 const UNLIKELY: f64 = 0.01;
-/// A simulation error so many times the least one of its order says that something is wrong ...
+/// A simulation error above the least one of its order times this factor is reported ...
 const WORSE: f64 = 1.05;
-/// ... where the difference is this part of the output's deviation too.
+/// ... if the difference also exceeds this share of the output's standard deviation.
 const SEEN: f64 = 0.01;
 
 impl Method {
-    /// What has to hold for its estimates to be right.
+    /// Assumptions under which the method's estimates are consistent.
     #[must_use]
     pub fn assumes(self) -> &'static str {
         match self {
-            Self::CtRls | Self::Ls => "hardly any noise: it is in the regressor",
-            Self::StabilizedOe => "noise that the input does not answer to",
-            Self::Iv => "instruments that the noise does not reach: in a loop its controller",
-            Self::Fcloe => "one plant over the record; in a loop its controller",
+            Self::CtRls | Self::Ls => {
+                "hardly any noise: noise in the regressor biases the estimates"
+            }
+            Self::StabilizedOe => "noise that is not fed back to the input",
+            Self::Iv => {
+                "instruments that are uncorrelated with the noise: in a loop, the controller has to be given"
+            }
+            Self::Fcloe => {
+                "a constant plant over the record; in a loop, the controller has to be given"
+            }
             Self::Srivc => {
-                "one plant over the record; in a loop an input that is held between samples; noise of any colour, though white noise is what it is best for"
+                "a constant plant over the record; in a loop an input that is held between samples; white or coloured noise, with the least variance for white noise"
             }
             Self::Rivc => {
-                "one plant over the record and autoregressive noise; in a loop an input that is held between samples"
+                "a constant plant over the record and autoregressive noise; in a loop an input that is held between samples"
             }
             Self::RecursiveFcloe => {
-                "a plant that drifts slower than the memory; in a loop its controller"
+                "a plant that drifts slower than the memory; in a loop, the controller has to be given"
             }
         }
     }
 }
 
-/// Identifies by each of the methods with each of the orders, in parallel; `requests` holds what is asked of each method, its order aside.
-/// The record comes with others that are not fitted, and with whether it is of a loop.
+/// Identifies by each of the methods with each of the orders, in parallel; `requests` contains the options of each method without its
+/// order. The record comes with other records that are not fitted, and with whether it is of a loop.
 ///
 /// # Errors
 /// [`Error::AllRefused`] where every method refuses, with the reason of the first.
@@ -165,11 +172,11 @@ fn violated(
 ) -> Vec<String> {
     let mut violated = Vec::new();
     if in_loop && !method.is_of_loop() && !method.is_refined() {
-        violated.push("the input answers to the noise, through the controller".to_owned());
+        violated.push("the controller feeds the noise back to the input".to_owned());
     }
     if found.input_p < UNLIKELY {
         violated.push(
-            "the input shows in its error: the order is too low, there is a delay (srivc and rivc find one by --delay auto), or the plant is not linear"
+            "the simulation error depends on the input: the order is too low, there is a delay (srivc and rivc find one by --delay auto), or the plant is not linear"
                 .to_owned(),
         );
     }

@@ -1,4 +1,4 @@
-//! One method with one order, by the measures that are the same for all.
+//! Result of one method with one order, by measures that are common to all methods.
 
 use ct_signals::{ArModel, Channel, Record, residual_tests};
 
@@ -34,7 +34,7 @@ pub(super) fn outcome(
     let of_plant = found.parameters.iter();
     let of_plant = of_plant.filter(|p| !p.name.starts_with("offset"));
     let estimated = of_plant.clone().count();
-    // A delay may well be 0.
+    // A delay may be 0.
     let of_plant = of_plant.filter(|p| !p.name.starts_with("delay"));
     let parts: Vec<Option<f64>> = of_plant
         .map(|p| {
@@ -42,7 +42,7 @@ pub(super) fn outcome(
             error.map(|error| (error / p.value).powi(2))
         })
         .collect();
-    // Least squares says no standard errors; of the other methods one that is not known says that the parameter is not.
+    // Least squares gives no standard errors; for other methods an unknown standard error counts as not significant.
     let significant = found.method == Method::Ls
         || parts
             .iter()
@@ -57,7 +57,7 @@ pub(super) fn outcome(
         let mean = parts.iter().sum::<f64>() / parts.len() as f64;
         2.0 * (rmse / spread).ln() + mean.ln()
     });
-    // Where readings are missing the error is NaN.
+    // The error is NaN where readings are missing.
     let readings = record.outputs[0].present().count();
     let lags = (readings / 10).clamp(2, 25);
     let mut input_p = 1.0_f64;
@@ -84,7 +84,7 @@ pub(super) fn outcome(
         whiteness_p: residual_tests::ljung_box(&error, lags, 0)?,
         input_p,
         violated: Vec::new(),
-        // What is the same for all is said once.
+        // Warnings that are common to all methods are reported once.
         warnings: {
             let gaps = mended.gaps.and_then(|gaps| gaps.sentence());
             let own = found.warnings.iter();

@@ -1,11 +1,11 @@
-//! What came of all methods.
+//! Results of all methods.
 
 use missing_effect::{MendedGaps, Parameter};
 use serde::Serialize;
 
 use crate::{Method, Order, Shown};
 
-/// What came of all methods.
+/// Results of all methods.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SideBySide {
     /// Version of this record.
@@ -14,14 +14,14 @@ pub struct SideBySide {
     pub record: String,
     /// The record comes from a loop with a known controller: errors on the measured command do not rank the methods.
     pub in_loop: bool,
-    /// What was done about missing rows and samples of the input; nothing where there are none.
+    /// Handling of missing rows and samples of the input; `None` if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<MendedGaps>,
     /// Names of the records that were not fitted.
     pub test: Vec<String>,
-    /// One for each method, of the order with the least BIC; best simulation first, then those that were refused.
+    /// One row per method, with the order of least BIC; best simulation first, then the methods that failed.
     pub methods: Vec<Row>,
-    /// All methods with all orders, where there are several orders.
+    /// All methods with all orders, if there are several orders.
     pub orders: Vec<Row>,
     /// The record.
     #[serde(skip)]
@@ -35,17 +35,17 @@ pub struct Row {
     pub method: Method,
     /// The order.
     pub order: Order,
-    /// Wall time beside the others, s.
+    /// Wall time with all methods in parallel, s.
     pub seconds: f64,
-    /// What the method assumes.
+    /// Assumptions of the method.
     pub assumes: &'static str,
-    /// What it found.
+    /// Result of the method.
     pub found: Option<Outcome>,
-    /// Why it found nothing.
+    /// Reason why the method failed.
     pub refused: Option<String>,
 }
 
-/// What a method found.
+/// Result of a method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     /// a_1 to a_n, b_0 to b_m, and an offset where the method estimates one.
@@ -56,23 +56,24 @@ pub struct Outcome {
     pub rmse: f64,
     /// 100 (1 - rmse over the standard deviation of the output), %.
     pub fit_percent: f64,
-    /// The same on the records that were not fitted, all together.
+    /// Simulation error on the records that were not fitted, over all of them.
     pub test_rmse: Option<f64>,
-    /// %; nothing where the outputs stand still.
+    /// %; nothing where the outputs are constant.
     pub test_fit_percent: Option<f64>,
-    /// Whether all parameters differ significantly from zero, as far as standard errors are known, and no time constant is shorter than a step.
+    /// Whether all parameters differ significantly from zero, as far as standard errors are known, and no time constant is shorter than a
+    /// step.
     pub determined: bool,
-    /// See the module.
+    /// Criterion: see the module.
     pub bic: f64,
     /// See the module.
     pub yic: Option<f64>,
     /// p-value of the Ljung-Box test of the simulation error.
     pub whiteness_p: f64,
-    /// p-value of the test that the simulation error holds nothing of the input.
+    /// p-value of the test that the simulation error does not depend on the input.
     pub input_p: f64,
-    /// Which assumptions the record violates, in words.
+    /// Assumptions that the record violates, in words.
     pub violated: Vec<String>,
-    /// What the method itself says of doubts.
+    /// Warnings of the method.
     pub warnings: Vec<String>,
     /// The simulated output.
     #[serde(skip)]
@@ -80,7 +81,7 @@ pub struct Outcome {
 }
 
 impl Row {
-    /// What makes one order better than another: less is better.
+    /// Sort key of orders: less is better.
     pub(super) fn key(&self) -> (bool, f64) {
         let found = self.found.as_ref();
         found.map_or((true, f64::INFINITY), |found| {

@@ -1,5 +1,4 @@
-//! What a confirmed set of effects is still held against: the colour of each model's own residual, a jump of the reading, and
-//! any course of time.
+//! Tests of a confirmed set of effects against alternatives: AR noise alone, a level shift of the reading, and a function of time.
 
 use greybox::{Fit, coloured};
 use rayon::prelude::*;
@@ -20,16 +19,16 @@ use crate::{
     search::{confirm::confirm, find::Found, growth::by_clock},
 };
 
-/// What a doubt leaves.
+/// Result of the comparison with alternatives.
 pub(crate) struct Doubted<'a> {
     pub confirmed: Node<'a>,
-    /// The believed model with the colour of its own residual.
+    /// The believed model with a noise model fitted to its own residual.
     pub own_base: Fit,
-    /// The jump that explains more than what was confirmed.
+    /// The level shift that explains more than the confirmed set.
     pub jumped: Option<Jump>,
 }
 
-/// Takes from what is confirmed what something simpler explains as well; `in_loop`: the records come from a loop that is not simulated.
+/// Removes from the confirmed set what a simpler explanation covers as well; `in_loop`: the records come from a loop that is not simulated.
 pub(crate) fn doubt<'a>(
     base: &Node<'a>,
     found: &Found<'a>,
@@ -37,8 +36,8 @@ pub(crate) fn doubt<'a>(
 ) -> Result<Doubted<'a>, Error> {
     let noise = &found.noise;
     let mut confirmed = found.confirmed.clone();
-    // Each model with the colour of its own residual: what a coloured noise explains needs no effect. The richest model has
-    // taken a part of a slow noise for effects, and the colour that it leaves is too fast: chance is counted here too.
+    // Each model has a noise model of its own residual: an error that coloured noise explains needs no effect. The largest model explains a
+    // part of a slow noise by effects, so the noise model of its residual is too fast; chance is also evaluated with the own noise models.
     let own = |node: &Node<'a>| coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING);
     let (own_base, own_last) = rayon::join(|| own(base), || own(&confirmed));
     let (own_base, own_last) = (own_base?, own_last?);
@@ -51,7 +50,7 @@ pub(crate) fn doubt<'a>(
     if !confirmed.added.is_empty() && !needed_in_colour {
         confirmed = found.base.clone();
     }
-    // What is claimed has to be better than the simplest course of which no effect is the cause.
+    // A set of effects has to be better than the simplest course that no effect causes.
     let jumped = if confirmed.added.is_empty() {
         None
     } else {
@@ -60,7 +59,7 @@ pub(crate) fn doubt<'a>(
     if jumped.is_some() {
         confirmed = found.base.clone();
     }
-    // Noise that wanders bends to gains and saturations too, as their inputs are slow.
+    // Slow noise also biases gains and saturations, because their inputs are slow.
     let beyond_small_walk = |node: &Node| {
         Ok::<_, Error>(
             node.added.is_empty() || beyond_random_walk(node, base, Walk::SMALL_FROM_ZERO)?,
@@ -69,9 +68,9 @@ pub(crate) fn doubt<'a>(
     if !beyond_small_walk(&confirmed)? {
         confirmed = found.base.clone();
     }
-    // Drifts, swings and steps fit courses of any origin: they are believed where they leave noise, where a random walk does not
-    // explain as much, and where the other effects of the set are called for without them: what only corrects an imitation is not. Where
-    // white noise is left this is not asked, since an imitation hardly ever leaves white noise.
+    // Drifts, oscillations and steps fit disturbances of any origin. They are accepted only if their residual is noise, if a random walk
+    // does not explain as much, and if the other effects of the set are significant without them: an effect that only corrects a wrong one
+    // is not. With a white residual this test is not needed, because a wrong explanation hardly ever leaves white noise.
     if by_clock(&confirmed) {
         let others = without_clock(&confirmed, noise)?;
         let count = others.added.len();
@@ -96,7 +95,7 @@ pub(crate) fn doubt<'a>(
             confirmed = simpler;
         }
     }
-    // What was made smaller since is no longer what was held against it.
+    // If the set became smaller since, the earlier comparison is not valid any more.
     if !beyond_small_walk(&confirmed)? {
         confirmed = found.base.clone();
     }
@@ -110,13 +109,13 @@ pub(crate) fn doubt<'a>(
 /// The best smaller set without effects that follow time alone all of which are called for, and which leaves noise, nearly as little of
 /// it; `None` where there is none.
 ///
-/// In a loop the command answers to every disturbance, and the likelihood of a model that runs on the measured command is biased by as
-/// much as a few effects gain. A valve that sticks is then imitated by a pump that saturates and an outlet that changes at the instant of
-/// a slip: chosen instants and limits meet the noise better than what the valve is bound to do.
+/// In a loop the command depends on every disturbance, and the likelihood of a model that runs on the measured command is biased by as much
+/// as a few effects gain. A sticking valve can then be replaced by a saturating pump and an outlet that changes at the instant of a slip:
+/// free instants and limits fit the noise better than the physical law of the valve.
 fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Option<Node<'a>> {
     if confirmed
         .setup
-        .leaves_out("smaller sets in the place of the confirmed one")
+        .leaves_out("smaller sets as alternatives to the confirmed one")
     {
         return None;
     }

@@ -1,4 +1,4 @@
-//! What cannot be told apart: the effects that fit as well in the place of another.
+//! Ambiguity: effects that fit as well in place of an accepted one.
 
 use greybox::Noise;
 use plants::Placed;
@@ -11,20 +11,20 @@ use crate::{
     search::exchange::{NEAR, exchanges},
 };
 
-/// The mean square that a stand-in of an effect that follows time alone may leave, over what that leaves.
+/// Largest ratio of the mean squared residual of an alternative to that of an effect that is a function of time.
 pub(crate) const NEARLY: f64 = 1.05;
 
-/// An effect, what cannot be told apart from it, and where it may act.
+/// An effect, the alternatives that cannot be distinguished from it, and the places where it may act.
 pub(crate) struct Group {
-    /// Identifiers: the effect itself, then what fits as well in its place, best first.
+    /// Identifiers: the effect itself, then the alternatives, best first.
     pub members: Vec<String>,
-    /// The places of the effect itself, most likely first, where there are several.
+    /// The places of the effect itself, most likely first, if there are several.
     pub places: Vec<PlaceScore>,
 }
 
-/// For every added effect, itself and all that fit as well in its place.
+/// For every added effect: the effect, and all effects that fit as well in its place.
 ///
-/// `searched`: sets that the search has fitted, among them stand-ins that a new start may miss; `in_loop`: the records come from a loop
+/// `searched`: sets that the search has fitted, among them alternatives that a new start may miss; `in_loop`: the records come from a loop
 /// that is not simulated.
 pub(crate) fn groups<'a>(
     last: &Node<'a>,
@@ -47,9 +47,9 @@ pub(crate) fn groups<'a>(
                 })
                 .into_iter()
                 .collect();
-            // In the white metric a coloured residual counts each sample for less than one.
+            // With white-noise weighting, each sample of a coloured residual counts for less than one.
             let behind = |node: &Node| (node.fit.bic() - last.fit.bic()) / per_sample;
-            // A size at its edge speaks against a stand-in, but where the final model has it too.
+            // A size at a bound is evidence against an alternative, unless the final model has it too.
             let possible = |node: &Node| {
                 let narrow = in_loop && node.narrow_stiction().is_some();
                 let at_the_edge = |placed: &Placed| {
@@ -66,7 +66,7 @@ pub(crate) fn groups<'a>(
                 };
                 stand_in(set, last, position).is_some_and(|other| !found(other))
             };
-            // The exchanges of an only effect are all candidates there are.
+            // For a single effect, all candidates are alternatives.
             let known = if last.added.len() == 1 && singles.is_some() || last.setup.out_of_time() {
                 &[]
             } else {
@@ -103,8 +103,8 @@ pub(crate) fn groups<'a>(
                 if !possible(&node) {
                     continue;
                 }
-                // An effect at an instant or with a course that the fit has chosen follows any disturbance: what hangs on the
-                // plant's own signals and explains nearly as much cannot be told from it.
+                // A function of time with a fitted instant or course can follow any disturbance: an effect that depends on the plant's own
+                // signals and explains nearly as much cannot be distinguished from it.
                 let nearly = own.effect.by_clock
                     && node.added.iter().all(|placed| !placed.effect.by_clock)
                     && node.fit.cost < NEARLY * last.fit.cost;
@@ -120,7 +120,7 @@ pub(crate) fn groups<'a>(
         .collect()
 }
 
-/// What a set has in the place of the effect at a position of another set, where they differ in that alone.
+/// Effect of a set in place of another set's effect at this position, if the sets differ only there.
 fn stand_in(set: &Node, last: &Node, position: usize) -> Option<Placed> {
     let kept = last.added.iter().enumerate();
     let mut kept = kept.filter(|(k, _)| *k != position);

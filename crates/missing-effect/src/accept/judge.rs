@@ -1,4 +1,4 @@
-//! Whether a confirmed set of effects is the answer, beside what it leaves.
+//! Whether a confirmed set of effects explains the data, depending on its residual.
 
 use ct_signals::ArModel;
 use greybox::{Fit, Noise, coloured};
@@ -23,73 +23,73 @@ use crate::{
     search::confirm::confirm,
 };
 
-/// Where something remains that is not noise, effects are the whole answer if they explain this share at least of the excess
-/// error: the mean squared simulation error above the noise floor.
+/// If the residual is not noise, effects are the whole explanation if they explain at least this share of the excess error: the mean
+/// squared simulation error above the noise floor.
 ///
 /// The tests that confirm an effect take what remains for noise. Against a disturbance from outside, which is none, their
 /// probabilities do not hold: whatever effect happens to resemble it is "beyond chance". Over records of nine
 /// simulated disturbances such effects imitate up to six sevenths of one as a rule; a true effect beside which something small
 /// remains explains nineteen twentieths and more.
 pub(crate) const WHOLE: f64 = 0.9;
-/// They are a partial answer if they explain this share.
+/// Effects are a partial explanation from this share on.
 pub(crate) const PART: f64 = 0.38;
 
-/// A noise floor below this part of the error is none.
+/// A noise floor below this share of the error counts as zero.
 const NOTHING: f64 = 1e-9;
 
-/// How much of an answer a set of effects is.
+/// Grade of the explanation by a set of effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Grade {
-    /// It leaves noise, or explains [`WHOLE`] of the excess error.
+    /// The residual is noise, or the set explains [`WHOLE`] of the excess error.
     Whole,
-    /// It explains [`PART`] of it.
+    /// The set explains [`PART`] of the excess error.
     Part,
     /// Less.
     None,
 }
 
-/// What a set is judged by.
+/// Data for the acceptance test of a set.
 pub(crate) struct Judge<'s, 'a> {
     pub base: &'s Node<'a>,
     pub noise: &'s Noise,
     pub wandering: bool,
     /// The records come from a loop that is not simulated.
     pub in_loop: bool,
-    /// Models are compared and shown by their simulation error.
+    /// Whether models are compared and shown by their simulation error.
     pub by_simulation: bool,
-    /// The set was cut to as many effects as may be added.
+    /// Whether the set was cut to the permitted number of effects.
     pub stopped: bool,
-    /// What a jump of the reading leaves, where that is what there is.
+    /// Structure of the residual after a level shift of the reading, if the structure is a level shift.
     pub jumped: Option<Left>,
-    /// The single effects, in the metric in which they were refitted last.
+    /// The single effects, with the weighting of their last refit.
     pub singles: &'s [Node<'a>],
     /// The sets that the search has fitted.
     pub searched: &'s [&'s Node<'a>],
 }
 
-/// What was found of a set.
+/// Result of the acceptance test of a set.
 pub(crate) struct Judged<'a> {
     pub course: Course<'a>,
     pub grade: Grade,
-    /// The share of the excess error that it explains.
+    /// The share of the excess error that the set explains.
     pub share: f64,
-    /// Of an answer: what stands in for each of its effects, and where each may act.
+    /// For an accepted set: the alternatives to each of its effects, and the places where each may act.
     pub groups: Vec<Group>,
-    /// What was taken out of it.
+    /// Effects that were removed from the set.
     pub dropped: Vec<Placed>,
 }
 
 impl<'a> Judge<'_, 'a> {
-    /// The set, or what stays of it.
+    /// The accepted set, or the accepted part of it.
     ///
-    /// Beside something that is not noise, an effect that one of the clock stands in for is no answer: it is some course of time, and
-    /// whatever is left may have made it. That speaks against this effect alone. The others stay where they are called for
-    /// without it, and are the answer where they explain enough without it: what was there to mend an imitation is neither.
+    /// If the residual is not noise, an effect that a function of time can replace is not accepted: an unknown disturbance may have caused
+    /// both. This applies to that effect alone. The other effects stay if they are significant without it, and are accepted if they explain
+    /// enough without it: effects that only compensated a rejected one are dropped too.
     pub fn judge(&self, mut set: Node<'a>) -> Result<Judged<'a>, Error> {
         let mut judged = self.as_it_is(&set, None)?;
         loop {
             let courses = judged.courses_of_time();
-            // What remains beside a set that was cut is what was cut off, and the result says so.
+            // If a set was cut, its unexplained part includes the effects that were cut off, and the result reports this.
             if self.stopped || courses.is_empty() || judged.grade != Grade::Whole {
                 return Ok(judged);
             }
@@ -106,7 +106,7 @@ impl<'a> Judge<'_, 'a> {
                     dropped.extend(courses);
                     judged = Judged { dropped, ..others };
                 }
-                // What follows time alone may be a part of the answer, and no more.
+                // A function of time can be a part of the explanation only.
                 _ => {
                     return Ok(Judged {
                         grade: Grade::Part,
@@ -117,7 +117,8 @@ impl<'a> Judge<'_, 'a> {
         }
     }
 
-    /// `beside`: what remains beside a larger set. A colour that takes it up, with what that set explained, makes no noise of it.
+    /// `beside`: structure in the residual of a larger set. A noise model that absorbs this structure, and the part that the larger set
+    /// explained, does not make it noise.
     fn as_it_is(&self, set: &Node<'a>, beside: Option<Left>) -> Result<Judged<'a>, Error> {
         let mut course = self.course(set)?;
         course.left = course.left.or(beside);
@@ -173,14 +174,14 @@ impl<'a> Judge<'_, 'a> {
         )
     }
 
-    /// The models on the way to a set.
+    /// The models from the base to a set.
     pub fn course(&self, set: &Node<'a>) -> Result<Course<'a>, Error> {
         let mut nodes = trail(self.base, set, &set.setup.white_noise())?;
         let last = nodes.pop().unwrap_or_else(|| self.base.clone());
         let in_noise = if self.by_simulation || self.stopped {
             last.clone()
         } else {
-            // The trail is shorter where an effect could not be simulated beside the others.
+            // The series of models is shorter if an effect could not be simulated together with the others.
             let whole = last.added.len() == set.added.len();
             let ends: Vec<_> = whole.then(|| last.fit.x.clone()).into_iter().collect();
             refine(set, self.noise, &ends)?
@@ -188,13 +189,13 @@ impl<'a> Judge<'_, 'a> {
         self.ending(nodes, last, in_noise.fit)
     }
 
-    /// The course of these models and one more, which is fitted.
+    /// Adds one more model to the series, and fits it.
     pub fn longer(&self, nodes: Vec<Node<'a>>, last: Node<'a>) -> Result<Course<'a>, Error> {
         let fit = last.fit.clone();
         self.ending(nodes, last, fit)
     }
 
-    /// `in_noise`: the last model's fit in the metric of the noise.
+    /// `in_noise`: the last model's fit weighted by the noise model.
     fn ending(
         &self,
         mut nodes: Vec<Node<'a>>,
@@ -202,13 +203,13 @@ impl<'a> Judge<'_, 'a> {
         in_noise: Fit,
     ) -> Result<Course<'a>, Error> {
         let own = coloured(&last.setup, in_noise, NOISE_ORDER, STOPPING)?;
-        // That the residual wanders says less than that it jumps.
+        // A slow drift of the residual is weaker evidence than an abrupt change.
         let left = match remains(&last, &own)? {
             Some(left) if !matches!(left.what, Remains::Slow(..)) => Some(left),
             left => self.jumped.or(left),
         };
-        // The last model is shown in the noise's metric, where its parameters are best known; a model that lacks
-        // something is not: a metric that takes what it lacks for noise would let its simulation drift off.
+        // The last model is shown with the noise weighting, in which its parameters are most accurate. An incomplete model is not: a
+        // weighting that treats the missing effect as noise would let its simulation drift.
         if !self.wandering && !self.stopped && left.is_none() {
             last.fit = own.clone().continuing(&last.fit);
         }
@@ -218,7 +219,7 @@ impl<'a> Judge<'_, 'a> {
 }
 
 impl Judged<'_> {
-    /// The effects of an answer that one of the clock stands in for, where something remains beside them.
+    /// Effects of a set that a function of time can replace, if the residual is not noise.
     fn courses_of_time(&self) -> Vec<Placed> {
         if self.grade != Grade::Whole || self.course.left.is_none() {
             return Vec::new();
@@ -232,11 +233,11 @@ impl Judged<'_> {
     }
 }
 
-/// The models from the believed one to the last, and what the last one leaves.
+/// The models from the believed one to the last, and the residual structure of the last one.
 pub(crate) struct Course<'a> {
-    /// At least the believed one.
+    /// The models, at least the believed one.
     pub nodes: Vec<Node<'a>>,
-    /// The last one with the colour of its own residual.
+    /// The last model with the noise model of its own residual.
     pub own: Fit,
     pub left: Option<Left>,
 }
@@ -246,7 +247,7 @@ impl<'a> Course<'a> {
         &self.nodes[self.nodes.len() - 1]
     }
 
-    /// What is reported of each model.
+    /// Report of each model.
     pub fn steps(
         &self,
         floor: &Floors,
@@ -269,18 +270,18 @@ impl<'a> Course<'a> {
     }
 }
 
-/// The share of the excess error, in mean square above the noise floor, that a model explains of its base; of several outputs each error is
-/// taken over the floor of its output.
+/// The share of the excess error, in mean square above the noise floor, that a model explains relative to its base; for several outputs
+/// each error is divided by the floor of its output.
 pub(crate) fn explained(base: &Node, last: &Node, floor: &[f64]) -> Result<f64, Error> {
     let series = |node: &Node| node.setup.disturbance(&node.fit.x);
     let (before, after) = (series(base)?, series(last)?);
-    // A floor of nothing leaves all of the error to be explained.
+    // With a noise floor of zero, all of the error is to be explained.
     let rms = base.setup.rms_per_output(&before);
     let least = |(floor, rms): (&f64, &f64)| floor.max(NOTHING * rms).max(f64::MIN_POSITIVE);
     let scales: Vec<f64> = floor.iter().zip(&rms).map(least).collect();
     let mean_square = |series: &[Vec<f64>]| base.setup.weighted_rms(series, &scales).powi(2);
     let (before, after) = (mean_square(&before), mean_square(&after));
-    // A slow noise may be larger in the long run than it was in the record.
+    // A slow noise may have a larger variance in the long run than in the record.
     let floor = after.min(1.0);
     Ok((before - after) / (before - floor).max(f64::MIN_POSITIVE))
 }
@@ -304,7 +305,8 @@ mod tests {
         simulated,
     };
 
-    /// A pump that saturates beside a swing of the reading that has no name; what stays of the saturation and a drift of the sensor.
+    /// A saturating pump together with an oscillation of the reading that has no name; returns the estimate of the saturation and a drift
+    /// of the sensor.
     fn judged(swing: f64) -> (bool, Vec<&'static str>, Vec<&'static str>) {
         let read = |t: f64, level: f64| level + swing * (t / 150.0).sin();
         let problem = simulated::tank(|u| u.min(4.2), read, 0.0, 1);
@@ -346,7 +348,7 @@ mod tests {
             (kept, dropped),
             (vec!["pump_saturation"], vec!["sensor_drift"])
         );
-        // Where the swing is as large as what the saturation makes, the saturation is no answer either.
+        // If the oscillation is as large as the effect of the saturation, the saturation is not accepted either.
         let (fair, ..) = judged(1.0);
         assert!(!fair);
     }

@@ -1,8 +1,8 @@
-//! The simplest course of time that no effect describes: from one sample to the next the reading is another.
+//! Level shift: the simplest function of time that no effect describes. From one sample to the next the reading changes by a constant.
 //!
-//! A recalibration, a sensor that was moved, a cable that was changed. An outlet that opens at that instant imitates it
-//! in part, and beside it a wide play of the sensor or a leak the rest: down to the noise, with three sizes or four for
-//! what is one. So whatever is claimed has to be better than a jump.
+//! Causes are a recalibration, a sensor that was moved, a cable that was changed. An outlet that opens at that instant explains a part of
+//! the level shift, and a wide hysteresis of the sensor or a leak the rest: down to the noise, with three or four sizes instead of one. So
+//! a set of effects has to be better than a level shift.
 
 use ct_signals::Record;
 use greybox::{Noise, fit_from};
@@ -18,26 +18,26 @@ use crate::{
     },
 };
 
-/// Instants that are tried, those where the whitened residual is largest.
+/// Number of instants that are tried, those with the largest whitened residual.
 const INSTANTS: usize = 4;
-/// The jump's first size is that of the residual's means over so many samples before and after.
+/// The first size of the level shift is the difference of the residual's means over this number of samples before and after.
 const AROUND: usize = 8;
-/// A jump has a size and an instant; the fit counts the size.
+/// A level shift has a size and an instant; the fit counts the size.
 const INSTANT: f64 = 1.0;
 
-/// A model with a jump of the reading, fitted.
+/// A fitted model with a level shift of the reading.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Jump {
-    /// Its criterion.
+    /// Criterion of the model with the level shift.
     pub bic: f64,
-    /// The last sample before it.
+    /// The last sample before the level shift.
     before: usize,
-    /// The output that jumps.
+    /// The output with the level shift.
     output: usize,
 }
 
 impl Jump {
-    /// What it leaves to be explained of the record.
+    /// Description of the level shift as unexplained structure of the record.
     pub fn left(self, record: &Record) -> Left {
         Left {
             what: Remains::Instant(record.time[self.before + 1], 0.0),
@@ -47,14 +47,14 @@ impl Jump {
     }
 }
 
-/// A node with a jump of the reading where that helps most, in the metric of a noise; `None` where the record is too short, no
-/// fit succeeds, or there are several records.
+/// A model with a level shift of the reading at the best instant, weighted by a noise model; `None` if the record is too short, no fit
+/// succeeds, or there are several records.
 pub(crate) fn jump(node: &Node, noise: &Noise) -> Result<Option<Jump>, Error> {
     let [record] = node.setup.records else {
         return Ok(None);
     };
     let residuals = node.setup.disturbance(&node.fit.x)?;
-    // Beside all else that the model lacks, an instant stands out where the residual's own colour does not foretell it.
+    // In the presence of other model errors, an instant is abrupt only if the residual's own noise model does not predict it.
     let noise_of_residual = residual_colour(&node.setup, &residuals)?;
     let whitened = noise_of_residual.whiten(&residuals);
     let mut instants: Vec<(f64, usize, usize)> = Vec::new();
@@ -97,7 +97,7 @@ pub(crate) fn jump(node: &Node, noise: &Noise) -> Result<Option<Jump>, Error> {
         .min_by(|a, b| a.bic.total_cmp(&b.bic)))
 }
 
-/// The mean of the samples that are there; zero where none is.
+/// The mean of the present samples; zero if there is none.
 fn mean(series: &[f64]) -> f64 {
     let present = || series.iter().filter(|value| !value.is_nan());
     present().sum::<f64>() / present().count().max(1) as f64
@@ -122,7 +122,7 @@ mod tests {
     /// The records do not begin at zero \[s\].
     const BEGIN: f64 = 100.0;
 
-    /// A linear tank whose reading is another from a sample on.
+    /// A linear tank whose reading is shifted from a sample on.
     fn problem(by: f64, records: usize, seed: u64) -> Problem {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let plant = Plant::SingleTankLinear;
@@ -154,7 +154,7 @@ mod tests {
                 Remains::Instant(BEGIN + INTERVAL * AT as f64, 0.0)
             );
         }
-        // Where the reading does not jump, the best of several is less than its two parameters cost.
+        // Without a level shift, the best of several instants lowers the criterion by less than the penalty of its two parameters.
         let worth = (1..=10).filter(|seed| {
             let problem = problem(0.0, 1, *seed);
             let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();

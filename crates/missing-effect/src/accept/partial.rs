@@ -1,12 +1,12 @@
-//! The largest part of the error that effects explain, where none explains all of it.
+//! Partial explanation: the largest part of the error that effects explain, if no set explains all of it.
 //!
 //! Measured records often hold several causes, and noise that is nearly integrated. That no set of effects leaves noise does not mean
 //! that nothing was found: a set is a partial answer where
-//! - it explains [`PART`](crate::accept::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one with an
-//!   effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::accept::judge::WHOLE) of it,
-//!   alone and beyond what a random walk explains;
+//! - it explains [`PART`](crate::accept::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one
+//!   with an effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::accept::judge::WHOLE) of it, alone and
+//!   beyond what a random walk explains;
 //! - of several effects: they are called for where each model has a noise model of its own, of limited memory;
-//! - it foretells the next sample as well as the model without it does, each beside a noise model of its own;
+//! - it predicts the next sample as well as the model without it does, each beside a noise model of its own;
 //! - what is fitted to one half of the record predicts the other (two-fold cross-validation);
 //! - sizes are inside their bounds, and states are physical;
 //! - a single jump of the reading does not explain more.
@@ -34,44 +34,44 @@ use crate::{
     search::find::Found,
 };
 
-/// Sets of one size that are refitted, those with the least simulation error.
+/// Number of sets of one size that are refitted, those with the least simulation error.
 const REFITTED: usize = 6;
-/// Largest set, but for the confirmed one.
+/// Largest size of a set, except for the confirmed one.
 const MOST: usize = 3;
-/// A larger set leaves at most this part of what the smaller one leaves of the excess error.
+/// A larger set leaves at most this share of the excess error of the smaller set.
 const LEFT: f64 = 0.5;
 
-/// A set explains this part of the mean squared error at least on a half of the record that was not fitted.
+/// Least share of the mean squared error that a set explains on a half of the record that was not fitted.
 const CARRIED_OVER: f64 = 0.3;
 
-/// The innovations beside a set are at most so many times as large as those beside the base: what imitates a slow course by moves of its
-/// own is rougher than the record.
+/// Largest ratio of the innovation variance with a set to that with the base: a set that compensates for a slow course by its own fast
+/// changes is rougher than the record.
 const ROUGHER: f64 = 1.05;
 
-/// By how much the logarithm of the mean square with a jump has to lie below that of a set.
+/// Least difference between the logarithms of the mean square for a level shift and for a set.
 const JUMP_CLEARLY: f64 = 0.1;
 
-/// Stiction that the shape of the record shows is a partial answer from this share on.
+/// Stiction that the shape of the record confirms is a partial explanation from this share on.
 const PART_BY_SHAPE: f64 = 0.15;
 
-/// Why a narrow band of stiction is refused.
-const NARROW_BAND: &str = "in a loop that is not simulated a disturbance that comes back through the command looks like a narrow band";
+/// Reason for rejecting a narrow band of stiction.
+const NARROW_BAND: &str = "in a loop that is not simulated, a disturbance fed back through the command looks like a periodic effect";
 
-/// A set that was tested, and with what result.
+/// A tested set with its result.
 pub(crate) struct Tested<'a> {
     /// The set, fitted to the simulation error.
     pub node: Node<'a>,
     /// The share of the excess error that it explains.
     pub share: f64,
-    /// Fall of the criterion, each model under its own noise model.
+    /// Fall of the criterion, each model with a separate noise model.
     pub bic_fall: f64,
-    /// The record has the shape of a valve that sticks, and the set is that.
+    /// The record has the signature of valve stiction, and the set is stiction.
     pub shape: bool,
-    /// Why it is refused; empty where it is accepted.
+    /// Reasons for the rejection; empty if the set is accepted.
     pub reasons: Vec<String>,
 }
 
-/// The set that explains the largest part of the excess error, accepted or, where none is, the best that was refused.
+/// The set that explains the largest part of the excess error: an accepted one or, if there is none, the best rejected one.
 ///
 /// `floor`: standard deviation of each output's noise \[output unit\]; `in_loop`: the records come from a loop that is not simulated.
 pub(crate) fn largest_part<'a>(
@@ -122,7 +122,7 @@ pub(crate) fn largest_part<'a>(
                 if in_loop && tested.node.narrow_stiction().is_some() {
                     tested.reasons.push(NARROW_BAND.to_string());
                 }
-                // The shape says more than an error that cannot fall far.
+                // The characteristic shape is stronger evidence than the limited fall of the error.
                 let alone = tested
                     .node
                     .added
@@ -134,7 +134,7 @@ pub(crate) fn largest_part<'a>(
                 }
                 Ok::<_, Error>(tested)
             })
-            // A set that cannot be fitted beside a noise model of its own, or to a half of the record, is no answer.
+            // A set that cannot be fitted with a separate noise model, or to a half of the record, is not accepted.
             .filter(|tested| {
                 !matches!(
                     tested,
@@ -170,11 +170,11 @@ pub(crate) fn largest_part<'a>(
     Ok(best)
 }
 
-/// The part of the mean squared error that a set explains on one half of a record when it was fitted to the other, both ways
-/// (two-fold cross-validation); initial states as on held-out records. Negative where it does harm; of several records the longest.
+/// The part of the mean squared error that a set explains on one half of a record after a fit to the other half, both ways (two-fold
+/// cross-validation); initial states as on held-out records. Negative if the error rises; of several records the longest is used.
 ///
-/// A noise model that is nearly integrated looks at changes from sample to sample alone, and takes any slow effect for noise. Physics
-/// that is real helps on data that were not fitted; what imitates a slow disturbance does not.
+/// A nearly integrated noise model uses changes from sample to sample only, and treats any slow effect as noise. A true effect
+/// reduces the error on data that were not fitted; an effect that only fits a slow disturbance does not.
 fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
     let white = base.setup.white_noise();
     let records = base.setup.records.iter();
@@ -198,7 +198,7 @@ fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
         let other = std::slice::from_ref(&halves[1 - fitted]);
         held_out_rmse(&half, other)
     };
-    // Outputs count by what the base leaves of them.
+    // Outputs are weighted by the residuals of the base.
     let both = |node: &Node| Ok::<_, Error>((error(node, 0)?, error(node, 1)?));
     let (of_base, of_node) = (both(base)?, both(node)?);
     let scales: Vec<f64> = of_base
@@ -209,7 +209,7 @@ fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
         .collect();
     let mean = |half: &[f64]| -> f64 {
         let outputs = half.iter().zip(&scales);
-        // An output that one half lacks says nothing.
+        // An output without readings in one half is left out.
         let outputs = outputs.filter(|(_, scale)| **scale > 0.0);
         outputs.map(|(rms, scale)| (rms / scale).powi(2)).sum()
     };
@@ -217,7 +217,7 @@ fn carried_over<'a>(base: &Node<'a>, node: &Node<'a>) -> Result<f64, Error> {
     Ok(1.0 - of_both(&of_node) / of_both(&of_base))
 }
 
-/// Whether a set leaves at most [`LEFT`] of what each smaller one of its effects leaves, accepted or refused.
+/// Whether a set leaves at most [`LEFT`] of the residual of each of its subsets, accepted or rejected.
 fn says_more(one: &Tested, smaller: &[(Vec<Placed>, f64)]) -> bool {
     let added = &one.node.added;
     smaller.iter().all(|(subset, share)| {
@@ -227,7 +227,7 @@ fn says_more(one: &Tested, smaller: &[(Vec<Placed>, f64)]) -> bool {
     })
 }
 
-/// Accepted sets before refused ones, those that the shape of the record shows before others, then by what they explain.
+/// Sort key: accepted sets before rejected ones, those with the characteristic shape before others, then by the explained part.
 fn key(tested: &Tested) -> (bool, bool, f64) {
     (tested.reasons.is_empty(), tested.shape, tested.share)
 }
@@ -263,16 +263,16 @@ fn test<'a>(
         bic_fall = own.gain_over(own_base);
         if node.added.len() > 1 && bic_fall <= BIC_MARGIN {
             reasons.push(
-                "several effects bend to much, and each with a noise model of its own the model without them is as probable"
+                "several effects together are very flexible, and with a separate noise model the model without them is as probable"
                     .to_string(),
             );
         }
         let outputs = own.fit.noise.iter().zip(own_base.fit.noise.iter());
         let mut rougher = outputs.map(|(own, base)| own.sigma() > ROUGHER * base.sigma());
         if rougher.any(|rougher| rougher) {
-            reasons.push("from sample to sample the record does not go as this has it".to_string());
+            reasons.push("the changes from sample to sample contradict it".to_string());
         }
-        // A share that is no number is none.
+        // A share that is NaN counts as zero.
         if carried_over(base, &node)?.max(0.0) < CARRIED_OVER {
             reasons.push(
                 "what is fitted to one half of the record does not predict the other".to_string(),
@@ -282,19 +282,19 @@ fn test<'a>(
     let timeless = without_clock(&node, &node.setup.white_noise())?;
     if required > PART && node.added.len() > 1 {
         reasons.push(
-            "with an effect that follows time alone a set bends to any disturbance".to_string(),
+            "with an effect that is a function of time, the set fits any disturbance".to_string(),
         );
     }
     if required > PART && !beyond_random_walk(&node, &timeless, Walk::ANY)? {
         reasons.push("a random walk explains as much".to_string());
     }
     if !node.plausible() {
-        reasons.push("a size stands at a bound, or a state is not physical".to_string());
+        reasons.push("a size is at a bound, or a state is not physical".to_string());
     }
-    // A jump at a free instant imitates much where set points step: it has to explain clearly more.
+    // A level shift at a free instant explains much if set points change in steps: it has to explain clearly more.
     let clearly = JUMP_CLEARLY * node.setup.samples() as f64;
     if jump + clearly < node.fit.bic() {
-        reasons.push("a single jump of the reading explains more".to_string());
+        reasons.push("a single level shift of the reading explains more".to_string());
     }
     Ok(Tested {
         node,

@@ -1,4 +1,4 @@
-//! Whether effects that follow time alone explain more than a random walk beside the noise does.
+//! Test whether functions of time explain more than a random walk in addition to the noise.
 //!
 //! **Model of the residual** (local level model): `e[k] = l[k] + v[k]`, `l[k+1] = l[k] + w[k]`, `v` and `w` white with variances
 //! `s^2` and `q s^2`, `l[0]` zero or unknown. No autoregressive model of low order describes it, and every drift, step or slow period looks
@@ -6,11 +6,11 @@
 //! search over its logarithm.
 //!
 //! Both residuals are whitened first by the noise model of the set with the effects: beside coloured noise a random walk would
-//! otherwise describe the noise, and the effects with it. Whitened, a walk is a walk still, smaller by the sum of the filter `A(1)`; sizes
+//! otherwise describe the noise, and the effects with it. A whitened walk is still a walk, smaller by the factor `A(1)`; sizes
 //! are stated in the standard deviation of the noise itself.
 //!
-//! **Parameters**: a walk that is taken for the plant's response bends the parameters, so each model is fitted again beside the walk, in
-//! one step from its linearisation. Without that step some effect seems to go beyond the walk in one record of thirty whose noise wanders.
+//! **Parameters**: a walk that is attributed to the plant biases the parameters, so each model is fitted again beside the walk, in
+//! one step from its linearisation. Without that step a false effect is significant in one of thirty records with drifting noise.
 //!
 //! **Cost**: `O(N p^2)` for a value of `q`.
 //!
@@ -29,55 +29,57 @@ use crate::{
     },
 };
 
-/// Decades of `q` that are searched, and values in each.
+/// Number of decades of `q` in the search, and values in each.
 const DECADES: std::ops::Range<i32> = -9..2;
 const EACH: i32 = 6;
 
-/// The chi-square law holds roughly here, as the walk's size is chosen and the fit is one step: so many times less risk is taken.
+/// The chi-square distribution is only approximate here, because the walk's size is fitted and the fit is one step: therefore the
+/// significance level is divided by this.
 const STRICTER: f64 = 3.0;
 
-/// A walk bends the parameters by moves of the output of about this rms, over that of the noise, at most: that of a walk which ends at half
-/// the size of the noise.
+/// A walk changes the output through the parameters by about this rms relative to the noise, at most: that of a walk that ends at half the
+/// size of the noise.
 const BENDING: f64 = 0.35;
 
-/// The random walks that may stand in the place of effects.
+/// The random walks that may replace effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Walk {
-    /// Its first value is unknown (diffuse start); otherwise zero, so that an offset which stays is no walk.
+    /// The first value is unknown (diffuse start); otherwise it is zero, so that a constant offset is no random walk.
     pub anywhere: bool,
-    /// Standard deviation at the end of a record over that of the noise, at most.
+    /// Largest standard deviation at the end of a record relative to the noise.
     pub largest: f64,
-    /// Whether the parameters are fitted again beside it.
+    /// Whether the parameters are fitted again together with the walk.
     pub fitted_again: bool,
 }
 
 impl Walk {
-    /// Of any size; the models are as they were fitted.
+    /// A walk of any size; the models keep their fitted parameters.
     pub const ANY: Self = Self {
         anywhere: true,
         largest: f64::INFINITY,
         fitted_again: false,
     };
-    /// No larger than the noise; it bends the parameters too.
+    /// A walk no larger than the noise; it also changes the parameters.
     pub const SMALL: Self = Self {
         anywhere: true,
         largest: 1.0,
         fitted_again: true,
     };
-    /// The same from zero, against which effects may be held that are hardly more than an offset.
+    /// A small walk that starts at zero, for a comparison with effects that are nearly an offset.
     pub const SMALL_FROM_ZERO: Self = Self {
         anywhere: false,
         ..Self::SMALL
     };
 }
 
-/// Residuals whitened by the noise model of their output, over its innovations, beside their derivatives by the free parameters, row by row,
-/// a series for each record and output; the residual is the last column. The first samples of a record are left out: they have no complete past, and are scaled otherwise, so that
-/// a level other than zero would look like a jump.
+/// Residuals whitened by the noise model of their output, divided by its innovations, with their derivatives with respect to the free
+/// parameters, row by row, a series for each record and output; the residual is the last column. The first samples of a record are left
+/// out: they have no complete past and another scaling, so that a constant level would look like a step.
 struct Whitened {
     columns: usize,
     series: Vec<Vec<f64>>,
-    /// Size of a slow move of the output in the whitened rows, over that of their innovations, where the move is as large as the noise.
+    /// Gain of the whitening filter for a slow change of the output: its size in the whitened rows over that of their innovations, for a
+    /// change as large as the noise.
     slow: f64,
 }
 
@@ -93,7 +95,7 @@ impl Whitened {
                 1.0
             };
             for row in rows.chunks_exact_mut(columns) {
-                // The row of a missing sample stays one without a residual.
+                // The row of a missing sample has no residual.
                 if row[columns - 1].is_nan() {
                     whitener.skip();
                 } else {
@@ -110,8 +112,8 @@ impl Whitened {
         }
     }
 
-    /// Minus twice the logarithm of the likelihood under white noise and a random walk, at its best over the parameters (one step of
-    /// Gauss-Newton in the metric of this noise, within [`BENDING`]) and over `q`.
+    /// Minus twice the logarithm of the likelihood with white noise and a random walk, minimised over the parameters (one Gauss-Newton step
+    /// weighted by this noise model, within [`BENDING`]) and over `q`.
     fn deviance(&self, walk: Walk) -> f64 {
         let rows = |values: &Vec<f64>| values.len() / self.columns;
         let longest = self.series.iter().map(rows).max().unwrap_or(1);
@@ -131,7 +133,7 @@ impl Whitened {
             let mut rows = rows.chunks_exact(self.columns);
             let mut variance = 0.0;
             level.fill(0.0);
-            // The first sample tells where it begins.
+            // The first sample determines the start.
             if anywhere {
                 let Some(first) = rows.find(|row| !row[last].is_nan()) else {
                     continue;
@@ -158,7 +160,7 @@ impl Whitened {
             }
         }
         let count = triangle.rows() as f64;
-        // A walk bends the parameters by no more than what moves the output, slowly, as far as the walk goes.
+        // A walk changes the parameters by no more than slow parameter changes would change the output.
         let bend = ((self.slow * BENDING).powi(2) * count / last.max(1) as f64).sqrt();
         for row in self
             .series
@@ -178,11 +180,11 @@ impl Whitened {
     }
 }
 
-/// Whether a set lowers the deviance beyond chance against one that lacks some of its effects, where the residual of either may hold a
+/// Whether a set lowers the deviance significantly compared with a set that lacks some of its effects, if either residual may contain a
 /// random walk.
 pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node, walk: Walk) -> Result<bool, Error> {
     let noise = colour(gained)?;
-    // A model that cannot be simulated any more is beyond nothing.
+    // A model that cannot be simulated any more is not significant.
     let (Some(with), Some(without)) = (
         of_node(gained, &noise, walk),
         of_node(lacking, &noise, walk),
@@ -226,8 +228,7 @@ mod tests {
 
     const N: usize = 600;
 
-    /// Noise of this correlation from sample to sample, a random walk of this standard deviation at the end, and a line that rises by so
-    /// much.
+    /// Noise with this correlation from sample to sample, a random walk with this standard deviation at the end, and a line with this rise.
     fn series(correlation: f64, walk: f64, rise: f64, seed: u64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (mut level, mut noise): (f64, f64) = (0.0, 0.0);
@@ -268,7 +269,7 @@ mod tests {
             };
             of(centred) - of(gained)
         };
-        // Beyond the penalty of a parameter and the margin.
+        // Larger than the penalty of a parameter and the margin.
         let named = |correlation: f64, walk: f64, rise: f64| {
             (0..100)
                 .filter(|&seed| fall(correlation, walk, rise, seed) > (N as f64).ln() + BIC_MARGIN)
@@ -278,14 +279,14 @@ mod tests {
             let walks = [0.5, 3.0].map(|walk| named(correlation, walk, 0.0));
             assert!(walks.iter().all(|count| *count <= 1), "{walks:?}");
         }
-        // A drift whose rms is as large as the noise; three times as large beside coloured noise.
+        // A drift with an rms as large as the noise; three times as large for coloured noise.
         let drifts = (named(0.0, 0.0, 3.5), named(0.8, 0.0, 10.0));
         assert!(drifts.0 >= 97 && drifts.1 >= 90, "{drifts:?}");
     }
 
     #[test]
     fn parameters_are_fitted_again_beside_the_walk_as_far_as_it_bends_them() {
-        // The parameter's derivative is a line; the line in the series is one that the parameter should follow, or a much steeper one.
+        // The parameter's derivative is a line; the line in the series agrees with the parameter, or is much steeper.
         let fits = |rise: f64| {
             let series = series(0.0, 0.1, rise, 5);
             let t = |k: usize| k as f64 / N as f64;
@@ -325,14 +326,14 @@ mod tests {
             };
             of(&offset) - of(&white)
         };
-        // A jump of one standard deviation in the first sample is what a walk would need.
+        // A step of one standard deviation in the first sample would need a walk.
         assert!(fall(false) > 20.0, "{}", fall(false));
         assert!(fall(true).abs() < 1e-6);
     }
 
     #[test]
     fn a_small_walk_is_small_beside_the_noise_itself() {
-        // A line beside noise with a long memory is told from a walk as large as the noise better than from one of any size.
+        // With noise of a long memory, a line is better distinguished from a walk as large as the noise than from a walk of any size.
         let noise = Noise::of(vec![ArModel::from_coefficients(&[0.8], 0.6).unwrap()]);
         let falls = (0..40).map(|seed| {
             let series = series(0.8, 0.0, 5.0, seed);

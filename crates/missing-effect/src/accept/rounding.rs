@@ -1,8 +1,8 @@
-//! Readings that a converter has rounded with their noise.
+//! Readings that a converter has rounded together with their noise.
 //!
 //! The readings themselves are the evidence: nearly all are multiples of one number `D`, which needs no fit and no criterion. The criterion
-//! hardly falls: the noise that is rounded with the level (dither) makes the mean reading nearly linear in the level, and rounding acts as a
-//! further noise of variance `D^2/12`.
+//! hardly falls, because the noise acts as dither and makes the mean reading nearly linear in the level, and rounding acts as a further
+//! noise of variance `D^2/12`.
 //!
 //! **Reference**: B. Widrow, I. Kollar, Quantization Noise, Cambridge 2008, ch. 4 and 19.
 
@@ -20,17 +20,17 @@ use crate::{
     },
 };
 
-/// Rounding is named where its variance is this part of the mean squared error that is left. Where it is clearly more than that error, the
-/// level rests, or the grid is not that of a converter.
+/// Rounding is named if its variance is this share of the mean squared residual. If it clearly exceeds the residual, the level is constant,
+/// or the grid is not that of a converter.
 const SHARE: RangeInclusive<f64> = 1.0 / 3.0..=1.1;
 
-/// A model with rounding, and what rounding makes of the error.
+/// A model with quantisation, and the share of quantisation in the error.
 pub(crate) struct Rounded<'a> {
     /// The model with rounding at the first of the outputs.
     pub node: Node<'a>,
-    /// What is named with it.
+    /// Group of the rounding effect.
     pub group: Group,
-    /// The outputs whose readings are rounded, at least one: that first of whose error rounding makes most.
+    /// The outputs with rounded readings, at least one: first the one with the largest share of rounding in its error.
     pub outputs: Vec<RoundedOutput>,
 }
 
@@ -39,14 +39,14 @@ pub(crate) struct Rounded<'a> {
 pub(crate) struct RoundedOutput {
     /// The output.
     pub output: usize,
-    /// The number that readings are multiples of \[output unit\].
+    /// The quantisation step of the readings \[output unit\].
     pub step: f64,
-    /// Share of rounding alone in the mean squared error of the model without it.
+    /// Share of quantisation alone in the mean squared error of the model without it.
     pub share: f64,
 }
 
-/// The model with rounding, where the readings are multiples of a number and rounding makes a good part
-/// of the error; `None` where it has it already.
+/// The model with quantisation, if the readings are multiples of a number and quantisation causes a large part of the error; `None` if the
+/// model already has it.
 pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error> {
     let Some(effect) = EffectInfo::find(EFFECT) else {
         return Ok(None);
@@ -65,7 +65,7 @@ pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error>
     };
     let error = node.fit.rmse[output].powi(2);
     let rounding = step.powi(2) / 12.0;
-    // The readings give the step to all their digits; a fit adds nothing.
+    // The readings determine the step exactly; a fit would not improve it.
     let mut setup = node.setup.clone();
     setup.fixed.insert(format!("{EFFECT}.step"), step);
     let setup = setup.with_structure(structure.with(placed)?)?;
@@ -92,7 +92,7 @@ pub(crate) fn rounded<'a>(node: &Node<'a>) -> Result<Option<Rounded<'a>>, Error>
     }))
 }
 
-/// The outputs whose readings are rounded, that first of whose error rounding makes most.
+/// The outputs with rounded readings, first the one with the largest share of rounding in its error.
 fn rounded_outputs(node: &Node) -> Vec<RoundedOutput> {
     let rounds = |output: usize| {
         let step = exact_reading_step(node.setup.records, output)?;
@@ -125,7 +125,7 @@ mod tests {
         let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
         let found = rounded(&node).unwrap().unwrap();
         let steps: Vec<(usize, f64)> = found.outputs.iter().map(|o| (o.output, o.step)).collect();
-        // The quieter one first: more of its error is rounding.
+        // The output with less noise first: rounding is a larger part of its error.
         assert!(
             steps[0].0 == 1 && (steps[0].1 - 0.3).abs() < 1e-9,
             "{steps:?}"

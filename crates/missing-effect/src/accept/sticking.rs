@@ -1,8 +1,8 @@
-//! The shape that a valve which sticks leaves in a loop: the output stands still while the command moves on, then jumps.
+//! Signature of valve stiction in a loop: the output is constant while the command changes, then it jumps.
 //!
-//! An integrating controller drives the command across the band of the valve, which follows in one slip: a triangle of the command
-//! beside a rectangle of the output. The instants of the slips hang on the noise, so that no simulation from the command meets all of them
-//! and the error falls by a part only, however surely the valve sticks. The shape is seen without any model.
+//! An integrating controller drives the command across the band of the valve, which follows in one slip: a triangle of the command beside a
+//! rectangle of the output. The instants of the slips depend on the noise, so no simulation from the command predicts all of them, and the
+//! error falls by a part only, even for a clearly sticking valve. The shape is detected without any model.
 //!
 //! **Reference**: M. Kano, H. Maruta, H. Kugemoto, K. Shimizu, Practical model and detection algorithm for valve stiction, Proc. IFAC
 //! DYCOPS 2004, 859-864.
@@ -11,29 +11,30 @@ use crate::fit::series::series;
 use ct_signals::Record;
 use statrs::statistics::{Data, OrderStatistics};
 
-/// A jump is a change of the output by more than this part of its range (95 %) within so many samples.
+/// A jump is a change of the output by more than this share of its range (95 %) within this number of samples.
 const JUMP: (f64, usize) = (0.4, 4);
-/// Between two jumps the output stands still where it varies (80 %) by less than this part of its range ...
+/// Between two jumps the output is constant if its spread (80 %) is below this share of its range ...
 const STILL: f64 = 0.35;
-/// ... while the command moves over more than this part of its own, and relatively more than the output by this factor.
+/// ... while the command moves over more than this share of its own range, and relatively more than the output by this factor.
 const MOVED: (f64, f64) = (0.25, 1.2);
 /// Fewest samples of a plateau.
 const SHORTEST: usize = 6;
-/// The valve sticks where so many plateaus are seen, in this part of the jumps, over this part of the record.
+/// The valve sticks if there are this many plateaus, this share of the jumps leads to plateaus, and the plateaus cover this share of the
+/// record.
 const PLATEAUS: usize = 3;
 const OF_JUMPS: f64 = 0.5;
 const OF_RECORD: f64 = 0.35;
 
-/// Plateaus of the output while the command moves.
+/// Plateaus of the output while the command changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Shape {
     jumps: usize,
     plateaus: usize,
-    /// The part of the record that plateaus cover.
+    /// The share of the record that plateaus cover.
     share: f64,
 }
 
-/// Whether some record has the shape of a valve that sticks.
+/// Whether some record has the signature of valve stiction.
 pub(crate) fn sticks(records: &[Record]) -> bool {
     series(records).any(|(record, output)| {
         let shape = shape(&record.inputs[0].values, &output.interpolated());
@@ -43,7 +44,7 @@ pub(crate) fn sticks(records: &[Record]) -> bool {
     })
 }
 
-/// The width of the middle part of values that holds this share of them.
+/// The width of the central interval that contains this share of the values.
 fn spread(values: &[f64], share: f64) -> f64 {
     let mut data = Data::new(values.to_vec());
     data.quantile(0.5 + 0.5 * share) - data.quantile(0.5 - 0.5 * share)
@@ -64,7 +65,7 @@ fn shape(command: &[f64], output: &[f64]) -> Shape {
     if !(moves > 0.0 && range > 0.0) {
         return none;
     }
-    // Instants of the jumps, each in the middle of its steepest change.
+    // Instants of the jumps, each at its steepest change.
     let change = |k: usize| (output[k + within] - output[k]).abs();
     let mut edges = vec![0];
     let mut k = 0;

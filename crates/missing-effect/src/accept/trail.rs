@@ -1,4 +1,4 @@
-//! The trail: the believed model, then one effect after the other, so that the error can be watched falling.
+//! Error ladder: the believed model, then one effect after the other, so that the fall of the error is visible.
 
 use greybox::Noise;
 use plants::Placed;
@@ -13,13 +13,13 @@ use crate::{
     },
 };
 
-/// Further starts of every step, because its minimum must not hang on where the search came from: so many, ...
+/// Further starts of every step, because its minimum must not depend on the path of the search: this many, ...
 const STARTS_AROUND: usize = 6;
-/// ... and as many again and again while it was not found twice, in so many rounds at most on the way and at its end. The model that
-/// names the effects is held to the same as the believed one.
+/// ... and the same number again until the minimum is found twice; largest number of rounds for intermediate models and for the last one.
+/// The model that names the effects has to meet the same condition as the believed one.
 const ROUNDS: (u64, u64) = (2, 4);
 
-/// The believed model, then one effect after the other, first what lowers the error most.
+/// The believed model, then one effect after the other, each time the one that lowers the error most.
 pub(crate) fn trail<'a>(
     base: &Node<'a>,
     last: &Node<'a>,
@@ -41,7 +41,7 @@ pub(crate) fn trail<'a>(
             break;
         };
         let mut node = refine(&first, noise, &[])?;
-        // The end of the search has no vote: how often its minimum is found is counted over the starts around it.
+        // Starts from the search are not counted: how often the minimum is found is counted over the starts around it.
         (node.fit.starts, node.fit.agree) = (0, 0);
         let rounds = if k + 1 == last.added.len() {
             ROUNDS.1
@@ -55,7 +55,7 @@ pub(crate) fn trail<'a>(
         }
         trail.push(node);
     }
-    // Out of time the models on the way may have ended above the set that they lead to.
+    // If the time is over, intermediate models may have a higher cost than the final set.
     if let Some(end) = trail.last_mut()
         && end.added.len() == last.added.len()
         && end.added.iter().all(|placed| last.added.contains(placed))

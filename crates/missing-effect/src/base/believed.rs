@@ -1,4 +1,4 @@
-//! The fit of the believed model, from many starts.
+//! Fit of the believed model, from many starts.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -18,11 +18,11 @@ use crate::{
 
 /// Share of the time limit in which the best fit follows changed ranges.
 const FOLLOW: f64 = 0.1;
-/// Random starts of the plant alone, before its effects are put on.
+/// Random starts of the plant alone, before its effects are added.
 const BARE_STARTS: usize = 12;
 
-/// The believed model, fitted to simulation error; its best minimum is found at least twice, or 96 starts were tried. In a
-/// loop that is known it is then fitted there. After this share of the time limit it has no further starts.
+/// The believed model, fitted to simulation error; its best minimum is found at least twice, or 96 starts were tried. If the loop is known,
+/// the model is then fitted in the loop. After this share of the time limit no further start is used.
 pub(crate) fn base<'a>(
     problem: &'a Problem,
     options: &Options<'a>,
@@ -57,8 +57,8 @@ pub(crate) fn base<'a>(
     let mut starts = options.starts.max(10);
     let one_by_one = one_by_one(&setup, options.seed)?;
     let fit = loop {
-        // The start of one effect after the other comes first: out of time no other is followed. What the user guesses of some
-        // parameters goes with it.
+        // The start with effects added one by one comes first: if the time is over, no other start is used. It includes the user's guesses
+        // of parameters.
         let mut all: Vec<Vec<f64>> = one_by_one.iter().cloned().collect();
         all.extend(random_starts(&setup, starts, options.seed));
         if !problem.start.is_empty() {
@@ -78,8 +78,8 @@ pub(crate) fn base<'a>(
         starts *= 2;
     };
     setup.choose_substeps(&fit.x)?;
-    // Levels that are not measured are known now: ranges and operating levels follow them, and the parameters that are relative to
-    // these have to follow, whatever the time.
+    // Levels that are not measured are estimated now: ranges and operating levels depend on them, and the parameters relative to these have
+    // to be updated, whatever the time limit is.
     if let Some(limit) = &setup.time_limit {
         limit.allow(share + FOLLOW);
     }
@@ -91,15 +91,16 @@ pub(crate) fn base<'a>(
         fit,
         added: Vec::new(),
     };
-    // Random starts hardly find the places of many effects at once, nor, where most levels are hidden, that of one: a leak of
-    // the first of three tanks ended at the plant without it from every start.
+    // Random starts rarely find the places of many effects at once, or of one effect if most levels are not measured: a leak of the first
+    // of three tanks ended at zero from every start.
     if !problem.effects.is_empty() {
         begun_again(&mut node, &problem.effects, &white)?;
     }
     enclose(problem, options, node)
 }
 
-/// A start of a plant with effects: the plant is fitted without them, and one after the other is put on, first what lowers the error most.
+/// A start of a plant with effects: the plant is fitted without them, then effects are added one after the other, each time the one that
+/// lowers the error most.
 ///
 /// From random starts of all at once hardly any fit of several effects finds its way. `None`: the plant has no effects.
 fn one_by_one(setup: &Setup, seed: u64) -> Result<Option<Vec<f64>>, Error> {
@@ -137,7 +138,7 @@ fn one_by_one(setup: &Setup, seed: u64) -> Result<Option<Vec<f64>>, Error> {
         remaining.retain(|placed| Some(placed) != first.added.last());
         node = first;
     }
-    // What was not put on for want of time is as any start has it.
+    // Parameters that were not estimated because of the time limit have the values of any start.
     let mut x = random_starts(setup, 1, seed).swap_remove(0);
     let own = node.setup.names();
     for (name, value) in setup.names().iter().zip(&mut x) {

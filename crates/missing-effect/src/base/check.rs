@@ -1,11 +1,11 @@
-//! Whether the parts of a problem go together, before anything is fitted: a held-out record is first simulated when the search is over.
+//! Consistency of the parts of a problem, checked before any fit, because a held-out record is first simulated after the search.
 
 use ct_signals::Channel;
 
 use crate::{Error, Problem};
 
 impl Problem {
-    /// Refuses records whose outputs are not the model's, and a controller that reads an output that there is not.
+    /// Rejects records whose outputs are not the model's, and a controller that reads an output that does not exist.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let outputs = self.known.outputs(self.plant).len();
         let Some(first) = self.records.first() else {
@@ -40,8 +40,8 @@ impl Problem {
     }
 }
 
-/// The first place at which only one of two records has an output, or one has an output that the other has elsewhere: their names
-/// may differ where there is one.
+/// The first difference in the outputs of two records: an output that only one has, or that the other has at another position. A single
+/// output may have different names.
 fn difference<'a>(
     own: &'a [Channel],
     first: &'a [Channel],
@@ -56,7 +56,7 @@ fn difference<'a>(
     })
 }
 
-/// An output as messages name it.
+/// Name of an output in messages.
 fn named(output: Option<&Channel>) -> String {
     output.map_or("missing".to_string(), |output| {
         format!("column \"{}\"", output.name)
@@ -96,7 +96,7 @@ mod tests {
         simulated::problem(Plant::CascadedTanks, known, records)
     }
 
-    /// What both commands say, before they have fitted anything.
+    /// Checks that `compare` and `diagnose` share, before any fit.
     fn refused(problem: &Problem) -> String {
         let stopped = std::sync::atomic::AtomicBool::new(true);
         let options = Options {

@@ -1,8 +1,7 @@
-//! Records from a closed loop: the loop simulated from its reference where its controller is known, and what is said where
-//! it cannot be.
+//! Records from a closed loop: the loop is simulated from its reference if its controller is known; otherwise a warning is given.
 //!
-//! The noise comes back through the command. A model that runs on the measured command is then wrong in a way that
-//! depends on the colour of the noise (`greybox`, `feedback.rs`); one whose loop runs on the reference is not.
+//! The noise comes back through the command. A model that runs on the measured command is then wrong in a way that depends on the spectrum
+//! of the noise (`greybox`, `feedback.rs`); one whose loop runs on the reference is not.
 
 use greybox::{Replay, Setup, coloured, fit_from};
 use plants::Variable;
@@ -16,24 +15,24 @@ use crate::{
     },
 };
 
-/// Feedback is said to be there below this p-value.
+/// Significance level of the feedback test.
 const FEEDBACK: f64 = 1e-4;
-/// A controller whose command differs from the measured one by more than this part of what that moves is another one.
-/// What it differs by less is known, and simulated with the loop.
+/// Largest relative difference between the controller's command and the measured one. A controller with a larger difference is not used; a
+/// smaller difference is simulated as a known input of the loop.
 const OTHER_CONTROLLER: f64 = 0.05;
 
-/// What follows where a model runs on the measured command of a loop.
-const MEASURED: &str = "The model runs on the measured command, which holds the noise: where the noise has another colour than the one that was found, estimates and scores are biased, and the standard errors are made wider for it.";
+/// Consequence of running a model on the measured command of a loop.
+const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and scores are biased; the standard errors are enlarged for this.";
 
-/// Closes the loop around a fitted node where that is possible, and says what is known of the loop.
+/// Closes the loop around a fitted model if possible, and describes the loop.
 pub(crate) fn enclose<'a>(
     problem: &Problem,
     options: &Options,
     node: Node<'a>,
 ) -> Result<(Node<'a>, Option<ControlLoop>), Error> {
     let Some(controller) = &problem.controller else {
-        // A term in time that was kept from this record has followed its noise, what came later too: the residual beside it says
-        // nothing of what the command answers to.
+        // A function of time that was fitted to this record has also fitted its noise, with future values: its residual cannot be used to
+        // test for feedback.
         let timed = problem
             .terms
             .iter()
@@ -88,7 +87,7 @@ pub(crate) fn enclose<'a>(
     }
     let fit = fit_from(&setup, &[x], &node.fit.noise, STOPPING)?.continuing(&node.fit);
     let said = format!(
-        "The loop is simulated from its reference: no noise that came back through the command is in the model. The measured command agrees with the controller's to {mismatch:.4} {} rms.",
+        "The loop is simulated from its reference: so noise fed back through the command does not enter the model. The measured command agrees with the controller's to {mismatch:.4} {} rms.",
         problem.records[0].inputs[0].unit
     );
     let enclosed = Node { setup, fit, ..node };
@@ -116,8 +115,8 @@ fn chance(p: f64) -> String {
     }
 }
 
-/// How far the measured commands are from the controller's own, and which part that is of what they move; the worst
-/// record's.
+/// Difference between the measured commands and the controller's output, and its ratio to the standard deviation of the command; for the
+/// worst record.
 fn disagreement(replays: &[Replay]) -> (f64, f64) {
     replays
         .iter()
@@ -128,8 +127,7 @@ fn disagreement(replays: &[Replay]) -> (f64, f64) {
         )
 }
 
-/// p-value of the test that the command does not depend on past residuals; of several records the smallest, corrected for
-/// having taken it.
+/// p-value of the test that the command does not depend on past residuals; of several records the smallest, corrected for the selection.
 fn feedback_p(node: &Node) -> Result<f64, Error> {
     let residuals = node.setup.residuals(&node.fit.x)?;
     let outputs = node.setup.outputs();
@@ -140,7 +138,7 @@ fn feedback_p(node: &Node) -> Result<f64, Error> {
             let record = &node.setup.records[i / outputs];
             // The first parameter of every plant is its gain.
             let gain = record.references.is_empty().then_some(node.fit.x[0]);
-            // What was not read moved no controller.
+            // A missing reading has not affected the controller.
             let read: Vec<f64> = residual
                 .iter()
                 .map(|e| if e.is_nan() { 0.0 } else { *e })
@@ -151,8 +149,8 @@ fn feedback_p(node: &Node) -> Result<f64, Error> {
     Ok((least * residuals.len() as f64).min(1.0))
 }
 
-/// Standard errors that allow for a bias from feedback: the fits in the metric of white noise and of the noise that was
-/// found are both right where no noise comes back, and differ by about the bias where it does.
+/// Standard errors that allow for a bias from feedback: the fits with white-noise weighting and with the noise model are both consistent
+/// without feedback, and differ by about the bias with feedback.
 pub(crate) fn widened(
     node: &Node,
     std_errors: Vec<Option<f64>>,
@@ -165,7 +163,7 @@ pub(crate) fn widened(
         .collect())
 }
 
-/// Where the fit in another metric ends: white noise for one with a noise model, and the other way round.
+/// Fit with the other weighting: white noise for a fit with a noise model, and the reverse.
 pub(crate) fn other_metric(setup: &Setup, node: &Node) -> Result<Vec<f64>, Error> {
     Ok(if node.fit.noise.order() == 0 {
         coloured(setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.x

@@ -1,5 +1,5 @@
-//! The fitted plant linearised: its slowest time constant, and whether the loop that the model file describes can have
-//! produced the record: an unstable one cannot.
+//! Linearisation of the fitted plant: its slowest time constant, and whether the loop in the model file is stable; an unstable loop cannot
+//! have produced the record.
 
 use greybox::LinearPlant;
 use nalgebra::DMatrix;
@@ -7,10 +7,10 @@ use plants::controller::Controller;
 
 use crate::{Error, fit::node::Node};
 
-/// A loop that grows e-fold so often over the longest record cannot have produced it.
+/// A loop that grows by this number of factors e over the longest record cannot have produced it.
 const GROWTH: f64 = 1.0;
 
-/// Refuses a controller that makes the fitted plant unstable at its operating point.
+/// Rejects a controller that makes the fitted plant unstable at its operating point.
 ///
 /// The sampled loop is linearised; what an effect adds as memory (dead time, lags) is left out.
 pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), Error> {
@@ -31,7 +31,7 @@ pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), E
         }
     }
     for i in 0..m {
-        // What stands for an operating point is a constant, and no part of the loop.
+        // A constant for an operating point is not a part of the loop.
         let constant = own.b[i] == 0.0 && (0..m).all(|j| own.a[i][j] == f64::from(i == j));
         for j in 0..m {
             a[(n + i, n + j)] = if constant { 0.0 } else { own.a[i][j] };
@@ -54,7 +54,7 @@ pub(crate) fn check_stable(node: &Node, controller: &Controller) -> Result<(), E
     Ok(())
 }
 
-/// The slowest time constant of a fitted plant at its operating point \[s\]; infinite for one that integrates.
+/// The slowest time constant of a fitted plant at its operating point \[s\]; infinite for an integrating plant.
 ///
 /// What an effect adds as memory is left out.
 pub(crate) fn slowest_time_constant(node: &Node) -> Result<f64, Error> {
@@ -68,7 +68,7 @@ pub(crate) fn slowest_time_constant(node: &Node) -> Result<f64, Error> {
     })
 }
 
-/// The fastest time constant of a fitted plant at its operating point \[s\], a tenth of a sampling interval at least.
+/// The fastest time constant of a fitted plant at its operating point \[s\], at least a tenth of a sampling interval.
 pub(crate) fn fastest_time_constant(node: &Node) -> Result<f64, Error> {
     let a = linearised(node)?.a;
     let a = DMatrix::from_fn(a.len(), a.len(), |i, j| a[i][j]);

@@ -1,4 +1,4 @@
-//! Whether the input depends on past residuals: a test for feedback that nobody declared.
+//! Test for undeclared feedback: whether the input depends on past residuals.
 //!
 //! **Regression**: the change of the input, `u[k] - u[k-1]`, on its own past and on the residual, which a controller has read,
 //! ```text
@@ -10,11 +10,11 @@
 //! (1995) 225-250).
 //!
 //! **Sign**: a controller counteracts, so the first response that is significant has the sign that moves the output back. Where a row's
-//! input acted before its output was read (the rain of the day before), the output foretells the input with the other sign, and
-//! without any controller. Where the record has a set point the sign is not asked for: the gain of a model that runs on the command
-//! of a loop may have the wrong one.
+//! input acted before its output was read (the rain of the day before), the output predicts the input with the other sign, and without any
+//! controller. Where the record has a set point the sign is not asked for: the gain of a model that runs on the command of a loop may have
+//! the wrong one.
 //!
-//! **Assumptions**: a controller acts at every sample. An input that stands still at most samples is none's, and one
+//! **Assumptions**: a controller acts at every sample. An input that is constant at most samples is none's, and one
 //! that its own past predicts exactly says nothing. Changes beyond five robust standard deviations are clipped: steps of a set
 //! point would drown the response to noise.
 //!
@@ -29,18 +29,18 @@ use statrs::statistics::{Data, OrderStatistics};
 const OWN: usize = 12;
 /// The residuals that are tested: the present one and those before it.
 pub(crate) const LAGS: usize = 7;
-/// The input moves at this part of the samples at least.
+/// The input has to change at this share of the samples at least.
 const MOVES: f64 = 0.5;
-/// Past residuals explain this part at least of what the input's own past does not: less biases no estimate.
+/// Least share of the input's changes, beyond its own past, that past residuals explain: a smaller share causes no relevant bias.
 const EXPLAINED: f64 = 0.02;
-/// A response is significant from so many standard errors on.
+/// A response is significant from this number of standard errors on.
 const SIGNIFICANT: f64 = 4.0;
-/// The input's own past leaves this part at least of its changes.
+/// Least share of the input's changes that its own past does not predict.
 const PREDICTABLE: f64 = 1e-6;
-/// Changes are clipped at so many robust standard deviations.
+/// Changes are clipped at this number of robust standard deviations.
 const CLIPPED: f64 = 5.0;
 
-/// The probability that an input without feedback looks so; 1 where the test says nothing.
+/// p-value of the hypothesis that the input is without feedback; 1 if the test is not possible.
 ///
 /// `input` and `residual`: one value for each sample of one record; `gain`: a number of the sign of the plant's gain, `None` where it
 /// is not to be relied on.
@@ -68,7 +68,7 @@ pub(crate) fn feedback_p(input: &[f64], residual: &[f64], gain: Option<f64>) -> 
         *change = change.clamp(-most, most);
     }
     let (input, residual) = (standardised(input), standardised(residual));
-    // changes[k - 1] is the change to sample k. What is explained comes last, what is tested before it.
+    // changes[k - 1] is the change to sample k. The dependent variable is the last column, the tested variables come before it.
     let mut gram = DMatrix::<f64>::zeros(columns, columns);
     let mut row = vec![0.0; columns];
     for k in first..n {
@@ -111,12 +111,12 @@ pub(crate) fn feedback_p(input: &[f64], residual: &[f64], gain: Option<f64>) -> 
     FisherSnedecor::new(LAGS as f64, freedom).map_or(1.0, |f| f.sf(statistic))
 }
 
-/// A regression of the last column on the first ones.
+/// Regression of the last column on the first ones.
 struct Regression {
-    /// Sum of squares that is left.
+    /// Residual sum of squares.
     left: f64,
     coefficients: Vec<f64>,
-    /// Of the coefficients, for a residual of unit variance.
+    /// Variances of the coefficients for a residual of unit variance.
     variances: Vec<f64>,
 }
 
@@ -143,7 +143,7 @@ fn fitted(gram: &DMatrix<f64>, count: usize) -> Option<Regression> {
     })
 }
 
-/// A series about its mean, of unit mean square.
+/// A series minus its mean, scaled to unit mean square.
 fn standardised(x: &[f64]) -> Vec<f64> {
     let n = x.len().max(1) as f64;
     let mean = x.iter().sum::<f64>() / n;
@@ -164,8 +164,8 @@ mod tests {
     const N: usize = 800;
     const SAID: f64 = 1e-4;
 
-    /// A first-order plant `x+ = 0.9 x + 0.1 u` whose model has a gain that is wrong by a third, so that the residual depends on the
-    /// input's past; `noise` is added to the reading, `command` gives the input from its past value, the reading and a random number.
+    /// A first-order plant `x+ = 0.9 x + 0.1 u` with a model whose gain is wrong by a third, so that the residual depends on the input's
+    /// past; `noise` is added to the reading, `command` gives the input from its past value, the reading and a random number.
     fn run(
         seed: u64,
         integrated: f64,
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn inputs_without_feedback_are_not_said_to_have_it() {
-        // Correlated, integrated, a square wave, and steps at random: beside white noise and a random walk.
+        // Correlated, integrated, a square wave, and steps at random: in addition to white noise and a random walk.
         for integrated in [0.0, 0.02] {
             assert_eq!(said(integrated, |_, u, _, own| 0.95 * u + own), 0);
             assert_eq!(said(integrated, |_, u, _, own| u + 0.1 * own), 0);
@@ -223,13 +223,13 @@ mod tests {
             .collect();
         let before = |gain| feedback_p(&input, &late, gain);
         assert!(!shown(Some(1.0)));
-        // The correlation is there, and has not the sign of a controller.
+        // The correlation is significant, but does not have the sign of a controller.
         assert!(before(None) < SAID && before(Some(1.0)) > SAID);
     }
 
     #[test]
     fn a_controller_is_seen() {
-        // Proportional and integral, about a set point that steps.
+        // Proportional and integral control, with a set point that changes in steps.
         let controller = |k: usize, u: f64, y: f64, _| {
             let set_point = if k % 200 < 100 { 1.0 } else { 0.0 };
             0.8 * u + 0.2 * (2.0 * (set_point - y))

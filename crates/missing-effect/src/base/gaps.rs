@@ -1,7 +1,8 @@
-//! Records in which rows or samples of an input are missing: how long an input may be held is a matter of the plant, so a first fit says it.
+//! Records with missing rows or samples of an input: the longest time for which an input may be held depends on the plant, so a first fit
+//! determines it.
 //!
 //! Through a gap that is short beside the fastest time constant of the plant the input is held; at a longer one the record is cut, and the
-//! simulation begins anew behind it with states of its own ([`ct_signals::Gaps`]). The parts keep their time stamps and so their clock: a
+//! simulation starts again after it with states of its own ([`ct_signals::Gaps`]). The parts keep their time stamps and so their clock: a
 //! drift runs through them. What is reported is joined again to the records that were given.
 
 use ct_signals::{Gaps, Record};
@@ -9,9 +10,9 @@ use ct_signals::{Gaps, Record};
 use super::{believed::base, control_loop::fastest_time_constant};
 use crate::{Diagnosis, Error, LONGEST_HOLD, MendedGaps, Options, Problem, Shown};
 
-/// For the first fit it is held for so many sampling intervals.
+/// For the first fit, the input is held for this number of sampling intervals.
 const FIRST_HOLD: f64 = 20.0;
-/// Share of the time limit that the first fit has.
+/// Share of the time limit for the first fit.
 const FITTED: f64 = 0.1;
 
 /// A problem whose records have no gaps.
@@ -20,11 +21,11 @@ pub(crate) struct Mended {
     pub gaps: MendedGaps,
     /// Parts of each record, fitted ones first.
     parts: Vec<usize>,
-    /// Records that are fitted.
+    /// Number of fitted records.
     fitted: usize,
 }
 
-/// All records with the parts that they fall into.
+/// All records, cut into their parts.
 fn cut(records: &[Record], longest: f64) -> (Vec<Record>, Vec<usize>, Gaps) {
     let (mut all, mut counts, mut gaps) = (Vec::new(), Vec::new(), Gaps::default());
     for record in records {
@@ -36,7 +37,7 @@ fn cut(records: &[Record], longest: f64) -> (Vec<Record>, Vec<usize>, Gaps) {
     (all, counts, gaps)
 }
 
-/// Something is left of every record where inputs are held for at most `limit` \[s\].
+/// Checks that every record keeps a part if inputs are held for at most `limit` \[s\].
 fn check_parts<'a>(
     mut records: impl Iterator<Item = &'a Record>,
     parts: &[usize],
@@ -53,7 +54,7 @@ fn check_parts<'a>(
 }
 
 impl Mended {
-    /// `None` where no record has a gap.
+    /// `None` if no record has a gap.
     pub fn of(problem: &Problem, options: &Options) -> Result<Option<Self>, Error> {
         let mut records = problem.records.iter().chain(&problem.test);
         let in_loop = problem.controller.is_some();
@@ -93,7 +94,7 @@ impl Mended {
         }))
     }
 
-    /// Joins what is shown of parts to the records that they are of, and says what was done.
+    /// Joins the results of the parts of a record, and reports the handling of gaps.
     pub fn report(&self, diagnosis: &mut Diagnosis) {
         diagnosis.records = self.joined(&diagnosis.records, |whole: &mut Shown, part| {
             whole.time.extend(part.time);
@@ -137,7 +138,7 @@ impl Mended {
         self.parts.iter().filter_map(of_one).collect()
     }
 
-    /// The name of an initial state, `level(0), record 3`, by the record and the part of it, where it is cut.
+    /// The name of an initial state, `level(0), record 3`, with the record and, for a cut record, the part.
     fn named(&self, name: &str) -> String {
         let Some((state, number)) = name.rsplit_once(", record ") else {
             return name.to_string();

@@ -1,4 +1,4 @@
-//! What is to be diagnosed and how.
+//! The problem of a diagnosis and its options.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
@@ -8,53 +8,53 @@ use ct_signals::Record;
 use greybox::PriorValue;
 use plants::{Known, Placed, Plant, Term, controller::Controller};
 
-/// What is to be diagnosed.
+/// The problem of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// The believed plant.
     pub plant: Plant,
-    /// What is known of it.
+    /// Known constants of the plant.
     pub known: Known,
-    /// The effects that are on already.
+    /// The effects in the model.
     pub effects: Vec<Placed>,
-    /// Terms of the user's own that are on already; a fit changes their scale.
+    /// Terms of the user's own in the model; a fit changes their scale.
     pub terms: Vec<Term>,
     /// First guesses, by name: `alpha`, `overflow.rim`.
     pub start: BTreeMap<String, f64>,
     /// Names in `start` that are not fitted.
     pub fixed: Vec<String>,
-    /// What is known of parameters beside the records, by the same names.
+    /// Priors of parameters, by the same names.
     pub priors: BTreeMap<String, PriorValue>,
     /// The records that are fitted together.
     pub records: Vec<Record>,
-    /// The controller of the loop, where there is one: it must make the fitted plant stable.
+    /// The controller of the loop, if there is one: it must stabilise the fitted plant.
     pub controller: Option<Controller>,
-    /// Records that take no part in any fit or choice and are only scored.
+    /// Held-out records, which are scored but not used for fits or selection.
     pub test: Vec<Record>,
 }
 
-/// How to search.
+/// Options of the search.
 #[derive(Debug, Clone, Copy)]
 pub struct Options<'a> {
     /// Largest number of effects to add.
     pub max_effects: usize,
-    /// Random starts of the base fit, at least ten; more are drawn until the best minimum is found twice.
+    /// Random starts of the base fit, at least ten; more are used until the best minimum is found twice.
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
-    /// Where a controller is known and the records hold its reference: the loop is simulated; otherwise the model runs on
-    /// the measured command.
+    /// If a controller is known and the records contain its reference: the loop is simulated; otherwise the model runs on the measured
+    /// command.
     pub simulate_loop: bool,
     /// Cancellation flag: when set, the computation ends soon with [`greybox::Error::Stopped`].
     pub stop: Option<&'a AtomicBool>,
-    /// Limit on the time of the search: what it does not allow is left out, and [`crate::Effort`] says what. `None`: no limit. A
-    /// result depends on the speed of the machine only where the limit is reached.
+    /// Time limit of the search: steps beyond it are left out, and [`crate::Effort`] lists them. `None`: no limit. A result depends on the
+    /// speed of the computer only if the limit is reached.
     pub time_limit: Option<Duration>,
-    /// Interruption flag: when set, the search ends soon with the best that was found so far.
+    /// Interruption flag: when set, the search ends soon with the best result so far.
     pub interrupt: Option<&'a AtomicBool>,
 }
 
-/// A limit for a person who waits: the program's. [`Options::default`] has none, so that results do not depend on the machine.
+/// Time limit of the interactive program. [`Options::default`] has none, so that results do not depend on the computer.
 pub const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 impl Default for Options<'_> {
@@ -71,10 +71,10 @@ impl Default for Options<'_> {
     }
 }
 
-/// How far the computation is.
+/// Progress of the computation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// What is being done.
+    /// Name of the current phase.
     pub phase: &'static str,
     /// Steps done.
     pub done: usize,

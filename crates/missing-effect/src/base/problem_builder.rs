@@ -16,7 +16,7 @@ pub struct ProblemBuilder {
 }
 
 impl Problem {
-    /// The believed plant, what is known of it, and the records that are fitted together.
+    /// The believed plant, its known constants, and the records that are fitted together.
     pub fn builder(plant: Plant, known: Known, records: impl Into<Vec<Record>>) -> ProblemBuilder {
         ProblemBuilder {
             problem: Self {
@@ -42,7 +42,7 @@ impl ProblemBuilder {
         self
     }
 
-    /// Terms of the user's own that are on already.
+    /// Terms of the user's own in the model.
     pub fn terms(mut self, terms: impl Into<Vec<Term>>) -> Self {
         self.problem.terms = terms.into();
         self
@@ -61,7 +61,7 @@ impl ProblemBuilder {
         self.start(parameter, value)
     }
 
-    /// What is known of a parameter beside the records.
+    /// Prior of a parameter.
     pub fn prior(mut self, parameter: impl Into<String>, prior: PriorValue) -> Self {
         self.problem.priors.insert(parameter.into(), prior);
         self
@@ -73,7 +73,7 @@ impl ProblemBuilder {
         self
     }
 
-    /// Records that take no part in any fit or choice and are only scored.
+    /// Held-out records, which are scored but not used for fits or selection.
     pub fn test(mut self, records: impl Into<Vec<Record>>) -> Self {
         self.problem.test = records.into();
         self

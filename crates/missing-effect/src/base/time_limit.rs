@@ -1,17 +1,17 @@
-//! The limit on the time of a search: the share that each of its phases has, and what was left out.
+//! Time limit of a search: the share of each phase, and the steps that were left out.
 
 use std::sync::atomic::Ordering;
 
 use crate::{Effort, Options, fit::node::Node};
 
-/// Lets the fits of a search go on until this share of its time has passed.
+/// Allows the fits of a search until this share of its time has passed.
 pub(crate) fn allow(node: &Node, share: f64) {
     if let Some(limit) = &node.setup.time_limit {
         limit.allow(share);
     }
 }
 
-/// What the time limit left out of a search.
+/// Steps that the time limit left out of a search.
 pub(crate) fn effort(node: &Node, options: &Options) -> Effort {
     let limit = node.setup.time_limit.as_ref();
     let interrupted = options

@@ -1,4 +1,4 @@
-//! What could be done instead: the same again, over and over, over a wider range, or with a second sensor.
+//! Alternatives to an experiment: the same again, repetitions, a wider range, or a second sensor.
 
 use super::{
     experiments::{Before, Search, Tried},
@@ -10,11 +10,11 @@ use super::{
 use crate::Error;
 use effect_search::design::{Kind, Power, Prospect, Sequence, power, prospect, times_as_long};
 
-/// Nobody repeats an experiment more often.
+/// Largest useful number of repetitions of an experiment.
 const MOST_TIMES: f64 = 20.0;
 
 impl Search<'_, '_> {
-    /// Played how many times over the experiment decides, if it does.
+    /// Number of repetitions after which the experiment decides, if it does.
     pub fn times_as_long(
         &self,
         (best, sequence): &Tried,
@@ -28,7 +28,7 @@ impl Search<'_, '_> {
         (prospect(&tried.power) == Prospect::Decides && !tried.at_limit).then_some(times)
     }
 
-    /// What a wider range would give.
+    /// Result of a wider range.
     pub fn wider(
         &self,
         bounds: &Bounds,
@@ -44,7 +44,7 @@ impl Search<'_, '_> {
         let best = promised
             .first()
             .and_then(|best| self.confirmed(best, &wider, before));
-        // The best of a few that were drawn at random is not what the range would give.
+        // The best of a few random experiments does not represent the range.
         let best = best.filter(|_| !self.leaves_out("a wider range"));
         Ok(best.map(|best| Wider {
             low: wider.low,
@@ -95,7 +95,7 @@ impl Search<'_, '_> {
             let known = &before.known[1 - truth];
             second_sensor::in_experiment(&simulated[truth], node, other, known, self.metric)
         };
-        // Records that were recorded anew have decided nothing yet: what is ahead is what a parameter costs.
+        // Repeated records have not decided anything before: the criteria differ only by the penalty of a parameter.
         let [a, b] = self.nodes.each_ref().map(|node| node.fit.price);
         let fewer = b - a;
         let fresh = |if_true: [f64; 2]| -> Power { power(if_true, [fewer, -fewer]) };

@@ -1,4 +1,4 @@
-//! The search among the sequences: all of them linearised, the most promising refitted.
+//! The search among the sequences: all are linearised, and those with the largest predicted power are refitted.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -21,14 +21,14 @@ use crate::{Error, Problem, Progress, base::time_limit::allow, fit::node::Node};
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 6;
 const MOST_REFITS: usize = 30;
-/// So many sequences are tried whatever the time limit.
+/// Number of sequences that are tried whatever the time limit is.
 const FEWEST: usize = 2;
-/// A sequence that drives a controller to a limit is applied so that it crosses its range in so many time constants.
+/// A sequence that drives a controller to a limit is slowed down so that it crosses its range in this number of time constants.
 const SLOWER: [f64; 2] = [1.0, 4.0];
-/// A level below this share of the highest one is none.
+/// A level below this share of the highest one counts as empty.
 const DRAINED: f64 = 1e-6;
 
-/// What the search needs to know.
+/// Data of the search.
 pub(crate) struct Search<'s, 'a> {
     pub problem: &'s Problem,
     pub nodes: &'s [Node<'a>; 2],
@@ -39,13 +39,13 @@ pub(crate) struct Search<'s, 'a> {
     pub progress: &'s (dyn Fn(Progress) + Sync),
 }
 
-/// What it finds.
+/// Result of the search.
 pub(crate) struct Found {
     pub candidates: Vec<Candidate>,
     pub overfull: usize,
     pub limited: usize,
     pub best: Candidate,
-    /// The best one's sequence.
+    /// The sequence of the best experiment.
     pub values: Vec<f64>,
     pub again: Option<Candidate>,
     pub wider: Option<Wider>,
@@ -53,31 +53,31 @@ pub(crate) struct Found {
     pub second_sensor: Option<SecondSensor>,
 }
 
-/// A sequence and what it promises.
+/// A sequence and its predicted power.
 pub(crate) type Tried = (Candidate, Sequence);
 
-/// What each node knows from the records, and how far each is from the other's simulation of them.
+/// Information of each model from the records, and the distance of each from the other's simulation of them.
 pub(crate) struct Before {
     pub known: [Triangle; 2],
     noise_free: [Vec<Record>; 2],
-    /// `misfit[i]`: of the other to what `i` shows.
+    /// `misfit[i]`: misfit of the other model to the response of model `i`.
     pub misfit: [f64; 2],
-    /// Smallest and largest level of each vessel, by either.
+    /// Smallest and largest level of each vessel, for either model.
     levels: Vec<(f64, f64)>,
 }
 
 impl Search<'_, '_> {
-    /// By how much the criterion of the second is above that of the first.
+    /// Criterion of the second model minus that of the first.
     pub fn ahead(&self) -> f64 {
         self.nodes[0].gain_over(&self.nodes[1])
     }
 
-    /// By how much each is ahead of the other.
+    /// Advantage of each model over the other.
     pub fn ahead_of_each(&self) -> [f64; 2] {
         [self.ahead(), -self.ahead()]
     }
 
-    /// Whether a part has to be left out for want of time, or because the user gave up.
+    /// Whether a part has to be left out because of the time limit or a cancellation.
     pub fn leaves_out(&self, part: &str) -> bool {
         self.nodes[0].setup.leaves_out(part)
     }
@@ -140,7 +140,7 @@ impl Search<'_, '_> {
                 let (low, high) = (either[0].0.min(either[1].0), either[0].1.max(either[1].1));
                 Reach {
                     level: plant.level_name(vessel).to_string(),
-                    // A tank that drains for long keeps a level that nobody would read.
+                    // A tank that drains for a long time has a level below any reading.
                     low: if low.abs() < DRAINED * high.abs() {
                         0.0
                     } else {
@@ -171,7 +171,7 @@ impl Search<'_, '_> {
         })
     }
 
-    /// A sequence, linearised; made slower where it would drive the controller to a limit.
+    /// A sequence, linearised; slowed down if it would drive the controller to a limit.
     fn off_the_limits(
         &self,
         sequence: Sequence,
@@ -192,7 +192,8 @@ impl Search<'_, '_> {
         Some((first, sequence))
     }
 
-    /// The same, the other refitted; as it was where the time did not suffice, for what a refit misses would count as power.
+    /// Candidates with the other model refitted; unchanged if the time is over, because the error of an incomplete refit would count as
+    /// power.
     pub fn confirmed(
         &self,
         (candidate, sequence): &Tried,
@@ -221,14 +222,14 @@ impl Search<'_, '_> {
         })
     }
 
-    /// It would lead a level above the tank.
+    /// Whether a level would rise above the tank.
     fn overfills(&self, candidate: &Candidate) -> bool {
         let height = self.problem.known.tank_height.unwrap_or(f64::INFINITY);
         candidate.reaches.iter().any(|reach| reach.high > height)
     }
 
-    /// All sequences within limits, linearised, the best first; and how many would overfill a tank, or drive the controller to a
-    /// limit.
+    /// Predicted power of all sequences within limits, linearised, the best first; and the number that would overfill a tank, or drive the
+    /// controller to a limit.
     pub fn promises(
         &self,
         bounds: &Bounds,
@@ -239,7 +240,7 @@ impl Search<'_, '_> {
             .into_iter()
             .enumerate()
             .collect();
-        // Where the time does not suffice for all, those that are tried are drawn at random.
+        // If the time does not suffice for all, a random selection is tried.
         all.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
         let (total, begun, done) = (all.len(), AtomicUsize::new(0), AtomicUsize::new(0));
         let mut tried: Vec<(usize, Tried)> = all
@@ -263,7 +264,7 @@ impl Search<'_, '_> {
         let finite = tried.len();
         tried.retain(|(candidate, _)| !self.overfills(candidate));
         let overfull = finite - tried.len();
-        // At a limit the loop is open, and a fit of the loop only nearly right. Where nothing stays off the limits, so be it.
+        // At a limit the loop is open, and a fit of the loop is only approximate. If every sequence reaches a limit, this is accepted.
         let mut limited = tried.iter().filter(|(tried, _)| tried.at_limit).count();
         if limited < tried.len() {
             tried.retain(|(candidate, _)| !candidate.at_limit);
@@ -274,7 +275,8 @@ impl Search<'_, '_> {
         Ok((tried, [overfull, limited]))
     }
 
-    /// Refits in rounds until a refit leads, so that no promise is above what a refit has shown; as far as the time suffices.
+    /// Refits in rounds until the best experiment is a refitted one, so that no predicted power exceeds a confirmed one, as far as the time
+    /// suffices.
     pub fn refit(&self, tried: &mut Vec<Tried>, bounds: &Bounds, before: &Before) {
         let mut done = 0;
         while done < MOST_REFITS
@@ -290,7 +292,7 @@ impl Search<'_, '_> {
                 .into_par_iter()
                 .map(|i| (i, self.confirmed(&tried[i], bounds, before)))
                 .collect();
-            // From behind, so that what cannot be refitted can be left out.
+            // In reverse order, so that candidates without a refit can be removed.
             for (i, candidate) in confirmed.into_iter().rev() {
                 match candidate {
                     Some(candidate) => tried[i].0 = candidate,
@@ -304,13 +306,13 @@ impl Search<'_, '_> {
                 total: MOST_REFITS,
             });
         }
-        // After so many rounds the best of those that were refitted.
+        // After this number of rounds, the best refitted experiment is used.
         tried.sort_by_key(|(candidate, _)| !candidate.refitted);
     }
 
     pub fn run(&self, bounds: &Bounds, seed: u64) -> Result<Found, Error> {
         let before = self.before()?;
-        // A misfit that is too large before the experiment would make the experiment's too small.
+        // A misfit that is too large before the experiment would make that of the experiment too small.
         if self.nodes[0].setup.out_of_time() {
             return Err(Refused::OutOfTime.into());
         }
@@ -335,7 +337,7 @@ impl Search<'_, '_> {
         };
         let instead = || !self.leaves_out("what could be done instead");
         let again = instead().then(|| self.again(bounds, &before)).flatten();
-        // More than plenty needs no wider range.
+        // With ample power no wider range is needed.
         let wider = if best.power.power < PLENTY && instead() {
             self.wider(bounds, seed, &before)?
         } else {

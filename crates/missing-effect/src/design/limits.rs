@@ -1,4 +1,4 @@
-//! What the user allows an experiment to do, checked against the record and the plant.
+//! Limits of an experiment from the user, checked against the record and the plant.
 
 use ct_signals::{MIN_ROWS, ROWS_PER_PARAMETER, Record, shown};
 use effect_search::design::Room;
@@ -6,22 +6,22 @@ use serde::Serialize;
 
 use crate::{Problem, numbers::significant};
 
-/// A range reaches so many times as far from zero as the records at most.
+/// Largest distance of a range from zero, as a multiple of that of the records.
 const WIDEST: f64 = 1e6;
 
-/// So much, to three digits and not less.
+/// The value rounded up to three digits.
 fn at_least(value: f64) -> String {
     let digit = 10_f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 2.0);
     let rounded = (value / digit - 1e-9).ceil() * digit;
     format!("{}", significant(rounded, 3).parse().unwrap_or(rounded))
 }
 
-/// What an experiment may do; what is `None` follows from the records.
+/// Limits of an experiment; `None` is derived from the records.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
-    /// Smallest and largest value of what is applied: the command, or in a loop the reference. Without it what the records visited.
+    /// Smallest and largest value of the applied signal: the command, or in a loop the reference. By default the range of the records.
     pub range: Option<(f64, f64)>,
-    /// Largest change of what is applied in a second. Without it there is none.
+    /// Largest change of the applied signal per second; none by default.
     pub slew: Option<f64>,
     /// Length \[s\]. Without it that of the longest record.
     pub duration: Option<f64>,
@@ -33,7 +33,7 @@ pub struct Limits {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refused {
-    /// One effect twice.
+    /// The two effects are the same.
     #[error("--between {effect} {effect}: an effect cannot be told from itself; name two")]
     SameEffect {
         /// The effect.
@@ -71,19 +71,19 @@ pub enum Refused {
         /// Second end.
         high: f64,
     },
-    /// The range leaves what can be computed with.
+    /// The range is too large for the computation.
     #[error(
         "--range {low:e} {high:e} goes beyond {most:.2e}, a million times what the records visited; stay within it"
     )]
     TooWide {
-        /// As given.
+        /// Lower end as given.
         low: f64,
         /// As given.
         high: f64,
-        /// How far either end may be from zero.
+        /// Largest distance of either end from zero.
         most: f64,
     },
-    /// The range leaves what the plant can do.
+    /// The range exceeds the plant's limits.
     #[error(
         "--range {} {} leaves {} .. {}, {what}; stay within it",
         shown(*low),
@@ -96,16 +96,16 @@ pub enum Refused {
         low: f64,
         /// Second end.
         high: f64,
-        /// Lower end of what is possible.
+        /// Lower end of the possible range.
         from: f64,
-        /// Upper end of what is possible.
+        /// Upper end of the possible range.
         to: f64,
-        /// What bounds it.
+        /// Name of the bound.
         what: &'static str,
     },
-    /// What is applied never moved, and nobody says how far it may.
+    /// The applied signal is constant in the records, and no range is given.
     #[error(
-        "the records hold one {what} of {} alone, which says nothing of where it may go; give --range",
+        "the records hold one {what} of {} alone, so its permitted range is not known; give --range",
         shown(*value)
     )]
     NoRange {
@@ -131,7 +131,7 @@ pub enum Refused {
         /// The sampling interval \[s\].
         interval: f64,
     },
-    /// So many samples that nobody meant it.
+    /// More samples than any reasonable experiment has.
     #[error(
         "--duration {} s holds {samples} samples at one every {} s, and {most} are the most that are searched; give a shorter one",
         shown(*duration),
@@ -142,7 +142,7 @@ pub enum Refused {
         duration: f64,
         /// Samples in it.
         samples: usize,
-        /// The most.
+        /// Largest number of samples.
         most: usize,
         /// The sampling interval \[s\].
         interval: f64,
@@ -152,11 +152,11 @@ pub enum Refused {
     Slew {
         /// Largest change in a second.
         slew: f64,
-        /// How far that leads.
+        /// Resulting change.
         moves: f64,
         /// The length \[s\].
         duration: f64,
-        /// The range's width.
+        /// Width of the range.
         span: f64,
     },
     /// The limit on the time has passed before anything could be said.
@@ -164,7 +164,7 @@ pub enum Refused {
         "the time did not suffice to fit both effects and to try experiments; allow more (--effort thorough), or give fewer rows or a shorter --duration"
     )]
     OutOfTime,
-    /// Everything that was tried would overfill a tank.
+    /// Every tried sequence would overfill a tank.
     #[error(
         "every experiment between {} and {} would lead above the tank_height of {}; give a --range that stays lower",
         shown(*low),
@@ -181,10 +181,10 @@ pub enum Refused {
     },
 }
 
-/// The most samples of an experiment: a week at one a second is too many to search among.
+/// Largest number of samples of an experiment: a week at one sample per second is too long for the search.
 const MOST_SAMPLES: usize = 200_000;
 
-/// The limits as they hold, in seconds and the units of what is applied.
+/// The checked limits, in seconds and the units of the applied signal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bounds {
     /// Smallest value.
@@ -193,7 +193,7 @@ pub struct Bounds {
     pub high: f64,
     /// Smallest and largest value in the records.
     pub visited: (f64, f64),
-    /// Where the two come from.
+    /// Source of the two values.
     pub range_from: &'static str,
     /// Largest change in a second, where there is a limit.
     pub slew: Option<f64>,
@@ -205,7 +205,7 @@ pub struct Bounds {
     pub samples: usize,
 }
 
-/// What the records visited of what is applied.
+/// Range of the applied signal in the records.
 fn visited(records: &[Record], looped: bool) -> (f64, f64) {
     let applied = |record: &Record| match (record.references.first(), looped) {
         (Some(reference), true) => reference.range(),
@@ -219,20 +219,20 @@ fn visited(records: &[Record], looped: bool) -> (f64, f64) {
         })
 }
 
-/// The limits of what can be applied at all, and what sets them.
+/// The limits of the applied signal, and their origin.
 fn possible(problem: &Problem, looped: bool) -> Option<(f64, f64, &'static str)> {
     if looped {
         let height = problem.known.tank_height?;
         return Some((0.0, height, "the tank_height of the model file"));
     }
     let most = problem.known.input_range?;
-    // A command that has been negative may be so again.
+    // A command that has been negative may be negative again.
     let low = visited(&problem.records, false).0.min(0.0);
     Some((low, most, "the input_range of the model file"))
 }
 
 impl Bounds {
-    /// What sequences may do within them.
+    /// Limits for sequences.
     pub(crate) fn room(&self) -> Room {
         Room {
             low: self.low,
@@ -337,19 +337,19 @@ impl Bounds {
         })
     }
 
-    /// A wider range that the user might allow: all that is possible, or half as far again either way.
+    /// A wider range that the user might allow: the largest possible one, or half as much again in each direction.
     pub(crate) fn wider(&self, problem: &Problem, looped: bool) -> Option<Self> {
         let (low, high) = match possible(problem, looped) {
             Some((from, to, _)) if !looped => (from, to),
             other => {
                 let more = 0.25 * (self.high - self.low);
                 let (from, to) = other.map_or((f64::NEG_INFINITY, f64::INFINITY), |p| (p.0, p.1));
-                // What has never been negative stays so.
+                // A signal that has never been negative stays nonnegative.
                 let from = if self.low >= 0.0 { from.max(0.0) } else { from };
                 ((self.low - more).max(from), (self.high + more).min(to))
             }
         };
-        // What the slew cannot cross is no wider range.
+        // A range that the slew limit cannot cross is no wider range.
         let reaches = self
             .slew
             .is_none_or(|slew| slew * self.duration >= high - low);

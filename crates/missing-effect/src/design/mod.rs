@@ -1,4 +1,4 @@
-//! The next experiment: the one that tells two effects apart which the records leave undecided.
+//! Design of the next experiment, which distinguishes two effects that the records do not distinguish.
 //!
 //! Each of the two is fitted to the records. Sequences within the user's limits are then applied to either fit, and it is
 //! reckoned how far the other stays behind what they show (`separation.rs`). The most promising are confirmed by refits.
@@ -43,8 +43,8 @@ use experiments::Search;
 use separation::Metric;
 use simulated::Loop;
 
-/// An effect, and the vessel it is to act in; `None`: of those in which it explains the records well, the one in which it comes
-/// nearest to the other effect.
+/// An effect, and the vessel it acts in; `None`: among the vessels in which it fits the records well, the one in which it is closest to the
+/// other effect.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidacy {
     /// The effect.
@@ -62,16 +62,16 @@ impl Candidacy {
 
 /// Shares of the time limit after which the phases end: the fit of the believed model, ...
 const BELIEVED: f64 = 0.15;
-/// ... the fits of both effects, ...
+/// ... fits of both effects, ...
 const BOTH: f64 = 0.3;
-/// ... the trial of experiments, ...
+/// ... trials of experiments, ...
 const TRIALS: f64 = 0.5;
-/// ... the refits of the best of them, ...
+/// ... refits of the best experiments, ...
 pub(crate) const REFITS: f64 = 0.7;
-/// ... and the look at what could be done instead.
+/// ... and evaluation of alternatives.
 pub(crate) const INSTEAD: f64 = 0.8;
 
-/// Both alternatives on the records, and the metric in which they are compared.
+/// Both alternatives on the records, and the noise model for their comparison.
 struct Fitted<'a> {
     nodes: [Node<'a>; 2],
     base: Node<'a>,
@@ -114,7 +114,7 @@ pub fn design(
     for Candidacy { effect, .. } in between {
         Domain::check(effect, problem.plant, unit.map_or("", |unit| unit))?;
     }
-    // What is wrong with the limits is said before anything is computed, as far as it can be.
+    // Errors in the limits are reported before the computation as far as possible.
     let looped = problem.controller.is_some() && options.simulate_loop;
     let has_reference = problem.records.iter().all(|r| !r.references.is_empty());
     Bounds::new(problem, limits, looped && has_reference, 0)?;
@@ -149,7 +149,7 @@ pub fn design(
         between: [0, 1].map(|i| alternative(&fitted, i)),
         bic_ahead: search.ahead(),
         prospect: match effect_search::design::prospect(&found.best.power) {
-            // A power that no refit has confirmed is a promise.
+            // A power without confirmation by a refit is only a prediction.
             Prospect::Decides if !found.best.refitted => Prospect::May,
             prospect => prospect,
         },
@@ -189,7 +189,7 @@ impl<'a> Fitted<'a> {
     }
 }
 
-/// Both effects fitted to the records, in the metric of the noise that the better of them leaves.
+/// Both effects fitted to the records, weighted by the noise model of the better one.
 fn fitted<'a>(
     problem: &'a Problem,
     between: [Candidacy; 2],
@@ -220,7 +220,7 @@ fn fitted<'a>(
         Ok(nodes)
     };
     let [first, second] = [fits(between[0])?, fits(between[1])?];
-    // Whichever vessels are still open, the two are told apart only where the nearest are.
+    // If the vessels of the effects are not determined, the comparison uses the closest pair.
     let rough = first
         .iter()
         .flat_map(|a| second.iter().map(move |b| [a, b]))
@@ -236,7 +236,7 @@ fn fitted<'a>(
     let fit = &nodes[usize::from(nodes[1].fit.bic() < nodes[0].fit.bic())].fit;
     let scales = fit.scales();
     let base = refine(&base, &noise, &[])?;
-    // What was fitted in part would seem to be a twin of the model without it.
+    // An incomplete fit would seem identical to the model without the effect.
     if base.setup.out_of_time() {
         return Err(Refused::OutOfTime.into());
     }
@@ -247,7 +247,7 @@ fn fitted<'a>(
     })
 }
 
-/// Sum of the squares by which two fits differ on the records, outputs by their weights.
+/// Sum of squared differences of two fits on the records, outputs weighted.
 fn apart([a, b]: [&Node; 2]) -> f64 {
     let residuals = |node: &Node| {
         let series = node.setup.residuals(&node.fit.x)?;

@@ -1,4 +1,4 @@
-//! The result of a design: plain structs, written as JSON as they stand; everything that is printed is derived from them.
+//! The result of a design: plain structs, written to JSON unchanged; all printed text is derived from them.
 
 use effect_search::design::{Kind, Power, Prospect};
 use plants::Domain;
@@ -7,29 +7,29 @@ use serde::Serialize;
 use super::limits::Bounds;
 use crate::{Effort, Parameter, result::domain_of};
 
-/// One of the two effects that are to be told apart.
+/// One of the two effects to be distinguished.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alternative {
     /// The effect.
     pub effect: String,
     /// The vessel it acts in, where the plant has more than one: `upper` or `lower`.
     pub place: Option<String>,
-    /// The size that the records give it.
+    /// Size of the effect on the records.
     pub size: Option<Parameter>,
-    /// The size ends at the edge of what is plausible.
+    /// The size is at a bound of its plausible range.
     pub at_the_edge: bool,
     /// Root mean square of the simulation error with it on the records, in the output's unit.
     pub rmse: f64,
-    /// By how much it lowers the criterion of the believed model.
+    /// Fall of the criterion from the believed model.
     pub bic_gain: f64,
-    /// How a person confirms it at the plant; empty outside hydraulics.
+    /// How to confirm the effect at the plant; empty outside hydraulics.
     pub confirm: String,
 }
 
-/// From where to where a level moves in an experiment, by either model.
+/// Range of a level in an experiment, for either model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reach {
-    /// Its name: `level`, or `level_upper` and `level_lower`.
+    /// Name of the level: `level`, or `level_upper` and `level_lower`.
     pub level: String,
     /// Lowest, in the output's unit.
     pub low: f64,
@@ -42,65 +42,65 @@ pub struct Reach {
 pub struct Candidate {
     /// Kind of the sequence.
     pub kind: Kind,
-    /// Its smallest value.
+    /// Smallest value.
     pub low: f64,
-    /// Its largest value.
+    /// Largest value.
     pub high: f64,
-    /// How long a level is held \[s\].
+    /// Duration of each level \[s\].
     pub clock: f64,
     /// Levels of a staircase.
     pub levels: Option<usize>,
-    /// Which of several draws of a multi-level sequence.
+    /// Number of the random draw of a multi-level sequence.
     pub draw: Option<u64>,
-    /// It changes by at most so much in a second, where it was made slower than the limits ask for, to keep a controller off its
-    /// limits.
+    /// Largest change per second, if it is smaller than the limits require in order to keep a controller off its limits.
     pub slew: Option<f64>,
-    /// What it gives.
+    /// Power of the experiment.
     pub power: Power,
     /// The power is that of a refit; otherwise that of the models linearised at their fits.
     pub refitted: bool,
-    /// Where the levels go.
+    /// Ranges of the levels.
     pub reaches: Vec<Reach>,
-    /// How far a level leaves what it visited in the records, as a part of that: beyond it neither model is known.
+    /// Largest excursion of a level outside its range in the records, as a share of that range: outside the range neither model is
+    /// validated.
     pub excursion: f64,
-    /// In a loop: the controller comes to a limit, where the loop is open.
+    /// In a loop: whether the controller reaches a limit, where the loop is open.
     pub at_limit: bool,
 }
 
-/// What a wider range would give.
+/// Result of a wider range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Wider {
-    /// Its lower end.
+    /// Lower end.
     pub low: f64,
-    /// Its upper end.
+    /// Upper end.
     pub high: f64,
     /// The best experiment within it.
     pub best: Candidate,
 }
 
-/// What another sensor would give: the other level measured too, with the same noise.
+/// Benefit of another sensor: the other level measured too, with the same noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SecondSensor {
     /// The level that is not measured.
     pub level: String,
-    /// In records like those that there are, the one level measured that is.
+    /// For records like the existing ones, with one measured level.
     pub existing_without: Power,
-    /// In records like those that there are, both levels measured.
+    /// For records like the existing ones, with both levels measured.
     pub existing_with: Power,
-    /// In the best experiment, both levels measured there.
+    /// For the best experiment, with both levels measured.
     pub best_with: Power,
 }
 
-/// What a person applies to the plant.
+/// The sequence to apply to the plant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sequence {
-    /// Name of what is applied: that of the command, or in a loop that of the reference.
+    /// Name of the applied signal: the command, or in a loop the reference.
     pub name: String,
     /// Its unit.
     pub unit: String,
     /// Instants \[s\].
     pub time: Vec<f64>,
-    /// Values, each held until the next instant as the model file has it.
+    /// Values, each held until the next instant according to the model file.
     pub values: Vec<f64>,
 }
 
@@ -111,15 +111,15 @@ pub struct Design {
     pub schema: u32,
     /// The two effects.
     pub between: [Alternative; 2],
-    /// By how much the criterion of the second is above that of the first on the records that there are.
+    /// Criterion of the second model minus that of the first on the existing records.
     pub bic_ahead: f64,
-    /// What the best experiment can be expected to do.
+    /// Expected result of the best experiment.
     pub prospect: Prospect,
-    /// The reference of the loop is applied, not the command.
+    /// Whether the reference of the loop is applied, not the command.
     pub in_loop: bool,
-    /// The limits that hold.
+    /// The limits in force.
     pub limits: Bounds,
-    /// The experiments, the best first: of those that have power in plenty the one that stays nearest to what the records visited.
+    /// The experiments, the best first: among those with ample power, the one closest to the range of the records.
     pub candidates: Vec<Candidate>,
     /// Experiments that were left out because they would overfill a tank.
     pub overfull: usize,
@@ -127,11 +127,11 @@ pub struct Design {
     pub limited: usize,
     /// What the longest record had, once more.
     pub again: Option<Candidate>,
-    /// The best of a wider range, where there is one to be had.
+    /// The best experiment of a wider range, if a wider range is possible.
     pub wider: Option<Wider>,
-    /// Repeated so many times, the best experiment would decide; `None` where it does already, or would not.
+    /// Number of repetitions after which the best experiment decides; `None` if one is enough, or none would decide.
     pub times_as_long: Option<usize>,
-    /// What a second sensor would give, where the plant has another level.
+    /// Benefit of a second sensor, if the plant has another level.
     pub second_sensor: Option<SecondSensor>,
     /// The best experiment.
     pub experiment: Sequence,
@@ -139,7 +139,7 @@ pub struct Design {
     pub noise_floor: f64,
     /// The findings in words.
     pub sentences: Vec<String>,
-    /// What the time limit left out.
+    /// Steps that the time limit left out.
     pub effort: Effort,
     /// The plant, as the model file names it.
     pub plant: String,
@@ -150,13 +150,13 @@ pub struct Design {
 }
 
 impl Design {
-    /// The domain of the model, which says what things are called.
+    /// Physical domain of the model, which determines the words.
     #[must_use]
     pub fn domain(&self) -> Domain {
         domain_of(&self.plant, &self.output_unit)
     }
 
-    /// No experiment tells the two apart: none is worth making.
+    /// Whether no experiment distinguishes the two.
     #[must_use]
     pub fn twins(&self) -> bool {
         self.prospect == Prospect::Twins

@@ -1,4 +1,4 @@
-//! What a sensor in a tank whose level is not measured would add: it is measured too, with the noise of the first output.
+//! Benefit of a sensor in a tank whose level is not measured: the level is measured too, with the noise of the first output.
 
 use ct_signals::Record;
 use effect_search::design::least;
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{Error, fit::node::Node};
 
-/// The vessel that it would stand in: the first one that is not measured; `None` where all are.
+/// The vessel of the additional sensor: the first one that is not measured; `None` if all are measured.
 pub(crate) fn place(structure: &Structure) -> Option<usize> {
     let measured = |vessel| {
         let mut outputs = structure.scales.outputs.iter();
@@ -20,7 +20,7 @@ pub(crate) fn place(structure: &Structure) -> Option<usize> {
     (0..structure.plant.vessels()).find(|vessel| !measured(*vessel))
 }
 
-/// The structure with that sensor as its last output.
+/// The structure with the additional sensor as its last output.
 fn with_sensor(structure: &Structure) -> Option<Structure> {
     let vessel = place(structure)?;
     let mut with = structure.clone();
@@ -33,7 +33,7 @@ fn with_sensor(structure: &Structure) -> Option<Structure> {
     Some(with)
 }
 
-/// Records with a further output, of which no sample is there yet.
+/// Records with a further output, which has no samples yet.
 fn with_output(records: &[Record]) -> Vec<Record> {
     let mut records = records.to_vec();
     for record in &mut records {
@@ -44,7 +44,7 @@ fn with_output(records: &[Record]) -> Vec<Record> {
     records
 }
 
-/// The setup of a node's structure with that sensor on records that have it.
+/// The setup of a model's structure with the additional sensor on records that have it.
 fn setup<'a>(node: &Node, records: &'a [Record]) -> Option<Setup<'a>> {
     let structure = with_sensor(&node.setup.structure)?;
     let mut setup = Setup::new(structure, records, node.setup.fixed.clone()).ok()?;
@@ -52,7 +52,7 @@ fn setup<'a>(node: &Node, records: &'a [Record]) -> Option<Setup<'a>> {
     Some(setup)
 }
 
-/// Records as one model shows them, with that sensor; `x`: its vector for these records.
+/// Records simulated by one model, with the additional sensor; `x`: the model's parameter vector for these records.
 fn shown(truth: &Node, records: &[Record], x: &[f64]) -> Option<Vec<Record>> {
     let mut records = with_output(records);
     let mut series = setup(truth, &records)?.simulate(x).ok()?.output.into_iter();
@@ -62,7 +62,7 @@ fn shown(truth: &Node, records: &[Record], x: &[f64]) -> Option<Vec<Record>> {
     Some(records)
 }
 
-/// The folded rows of a model against what the other shows, that sensor among the outputs.
+/// The R factor of a model compared with the other's simulation, with the additional sensor among the outputs.
 ///
 /// Where the areas are not known, a level of the other tank is known in units of its own alone: then its sensor's scale and zero are
 /// fitted too.
@@ -97,7 +97,7 @@ fn rows(stand_in: &Node, x: &[f64], records: &[Record], metric: &Metric) -> Opti
     Some(rows.fold(&all, &Noise::of(models), &weights))
 }
 
-/// The separation in records like the existing ones, with that level measured too.
+/// The separation in records like the existing ones, with the level measured too.
 pub(crate) fn in_existing(truth: &Node, stand_in: &Node, metric: &Metric) -> Option<f64> {
     let records = noise_free(truth).ok()?;
     let records = shown(truth, &records, &unlooped(truth))?;
@@ -106,7 +106,7 @@ pub(crate) fn in_existing(truth: &Node, stand_in: &Node, metric: &Metric) -> Opt
     for (name, prior) in priors_of_truth(truth, stand_in) {
         let setup = &stand_in.setup;
         let column = |free: &usize| setup.names()[*free] == name;
-        // The parameters that are fitted come first, here as there.
+        // The fitted parameters come first in both vectors.
         if let Some(column) = setup.free().iter().position(column) {
             let scale = metric.scales[0] / prior.std_error;
             let mut row = vec![0.0; last + 1];
@@ -119,7 +119,7 @@ pub(crate) fn in_existing(truth: &Node, stand_in: &Node, metric: &Metric) -> Opt
     Some(least(&rows, &Triangle::new(0)) / metric.variance())
 }
 
-/// The separation in an experiment that was simulated with the truth, with that level measured too.
+/// The separation in an experiment simulated with the true model, with the level measured too.
 pub(crate) fn in_experiment(
     simulated: &SimulatedExperiment,
     truth: &Node,

@@ -10,10 +10,10 @@ use crate::{
     sentences::{with_error, with_unit},
 };
 
-/// Criteria that differ by less are equal, in words.
+/// Criteria with a smaller difference are called equal.
 const TWIN: f64 = 0.01;
 
-/// An effect, with the tank where there are two, and its size.
+/// An effect, with its tank if there are two, and its size.
 fn sized(alternative: &Alternative, domain: Domain) -> String {
     let size = alternative.size.as_ref().map_or(String::new(), |size| {
         let name = size.name.rsplit('.').next().unwrap_or_default();
@@ -22,7 +22,7 @@ fn sized(alternative: &Alternative, domain: Domain) -> String {
     format!("{}{size}", named(alternative, domain))
 }
 
-/// An effect, with the tank where there are two.
+/// An effect, with its tank if there are two.
 pub(super) fn named(alternative: &Alternative, domain: Domain) -> String {
     match &alternative.place {
         Some(place) => {
@@ -36,7 +36,7 @@ pub(super) fn named(alternative: &Alternative, domain: Domain) -> String {
     }
 }
 
-/// A probability that is not called certain or impossible.
+/// A probability in words, never certain or impossible.
 fn probability(p: f64) -> String {
     if p > 0.99 {
         "above 0.99".to_string()
@@ -55,12 +55,12 @@ fn with_power(power: &Power) -> String {
     )
 }
 
-/// The same of an experiment, with what is to be known of it.
+/// Power of an experiment in words, with reservations.
 fn promised(candidate: &Candidate) -> String {
     format!("{}{}", with_power(&candidate.power), reservation(candidate))
 }
 
-/// What a power that is not confirmed is followed by.
+/// Reservation about a power that is not confirmed.
 fn reservation(candidate: &Candidate) -> &'static str {
     if candidate.refitted {
         ""
@@ -99,7 +99,7 @@ pub(super) fn described(candidate: &Candidate, unit: &str) -> String {
     sequence + &slowly
 }
 
-/// What the records say already.
+/// Evidence in the existing records.
 fn so_far(design: &Design) -> Vec<String> {
     let domain = design.domain();
     let [a, b] = &design.between;
@@ -112,19 +112,19 @@ fn so_far(design: &Design) -> Vec<String> {
     };
     said.push(if design.bic_ahead.abs() > GROUP_MARGIN {
         format!(
-            "The records that there are decide for {}: the criterion of {} is higher by {ahead}.",
+            "The existing records decide for {}: the criterion of {} is higher by {ahead}.",
             sized(first, domain),
             sized(second, domain)
         )
     } else if design.bic_ahead.abs() < TWIN {
         format!(
-            "The records that there are leave it open: {} and {} fit alike.",
+            "The existing records leave it open: {} and {} fit equally well.",
             sized(first, domain),
             sized(second, domain)
         )
     } else {
         format!(
-            "The records that there are leave it open: {} fits best, the criterion of {} is higher by {ahead} alone.",
+            "The existing records leave it open: {} fits best, the criterion of {} is higher by {ahead} alone.",
             sized(first, domain),
             sized(second, domain)
         )
@@ -148,7 +148,7 @@ fn so_far(design: &Design) -> Vec<String> {
                 ""
             };
             said.push(format!(
-                "They do not call for {}: {called}{edge}. What is hardly there is hardly told from anything.",
+                "They do not support {}: {called}{edge}. An effect that is hardly present cannot be distinguished from others.",
                 named(alternative, domain)
             ));
         }
@@ -156,7 +156,7 @@ fn so_far(design: &Design) -> Vec<String> {
     said
 }
 
-/// What there is to say, the experiment first.
+/// All sentences, the experiment first.
 pub(super) fn of(design: &Design) -> Vec<String> {
     let mut said = so_far(design);
     let unit = &design.experiment.unit;
@@ -172,7 +172,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     };
     if design.twins() {
         said.push(format!(
-            "{} tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters shows what {} would show.",
+            "{} tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters gives nearly the response of {}.",
             if design.effort.left_out.is_empty() {
                 "No experiment within these limits"
             } else {
@@ -256,7 +256,7 @@ pub(super) fn of(design: &Design) -> Vec<String> {
     }
     if let Some(second) = &design.second_sensor {
         said.push(format!(
-            "With {} measured too, with the same noise: in records like those that there are {} (instead of {}), in the best experiment {}.",
+            "With {} measured too, with the same noise: in records like the existing ones {} (instead of {}), in the best experiment {}.",
             domain.level_words(&second.level),
             with_power(&second.existing_with),
             with_power(&second.existing_without),

@@ -1,4 +1,4 @@
-//! How far apart an experiment takes two models: the least misfit of the one to what the other would show.
+//! Separation of two models by an experiment: the least misfit of one model to the response of the other.
 //!
 //! [`effect_search::design`] has the noncentrality and its linear form.
 //!
@@ -12,8 +12,8 @@
 //! `y_B = P_B C (r - y_B)` and `u_A = C (r - y_A)`.
 //!
 //! **The refit** does without the straight line: B is fitted to A's simulation of the existing records and of the experiment, both free of
-//! noise; from its misfit the one to the existing records alone is taken off. A side measurement (a prior) is there in both, as A would have
-//! it read.
+//! noise; from its misfit the one to the existing records alone is taken off. A side measurement (a prior) is there in both, as A would
+//! have it read.
 
 use std::collections::BTreeMap;
 
@@ -26,20 +26,20 @@ use crate::{
     fit::node::{FINE, Node},
 };
 
-/// Starts around B's fit beside itself.
+/// Starts around B's fit, in addition to the fit itself.
 const STARTS_AROUND: usize = 4;
 
-/// The metric in which both are compared.
+/// The noise model for the comparison of both.
 #[derive(Debug, Clone)]
 pub(crate) struct Metric {
     /// The noise.
     pub noise: Noise,
-    /// Standard deviation of its innovations at each output \[output unit\].
+    /// Standard deviation of the innovations at each output \[output unit\].
     pub scales: Vec<f64>,
 }
 
 impl Metric {
-    /// What costs are divided by: the variance of the first output's innovations, in units of which outputs count \[output unit squared\].
+    /// Divisor of costs: the innovation variance of the first output, with the scaling of the outputs \[output unit squared\].
     pub fn variance(&self) -> f64 {
         self.scales[0].powi(2)
     }
@@ -50,7 +50,8 @@ impl Metric {
         noise.stationary_std() / noise.sigma() * self.scales[0]
     }
 
-    /// A setup with other records in which outputs count by this noise, and not by what a model without noise leaves of them.
+    /// A setup with other records, in which outputs are weighted by this noise and not by their residuals (a noise-free simulation has
+    /// none).
     pub fn with_records<'a, 'b>(
         &self,
         setup: &Setup<'a>,
@@ -65,10 +66,10 @@ impl Metric {
     }
 }
 
-/// A model's information on its free parameters from the records that are there: rows `[R | 0]`, the initial states eliminated.
+/// A model's information on its free parameters from the existing records: rows `[R | 0]`, the initial states eliminated.
 pub(crate) fn information(node: &Node, metric: &Metric) -> Triangle {
     let setup = &node.setup;
-    // A fit weighs its outputs by their own residuals; here they count as in the metric.
+    // A fit weights its outputs by their own residuals; here the weights are those of the noise model.
     let weighed = || {
         let mut setup = setup.clone();
         setup.known_scales = Some(metric.scales.clone());
@@ -79,7 +80,7 @@ pub(crate) fn information(node: &Node, metric: &Metric) -> Triangle {
     effect_search::design::information(rows, setup.free(), setup.parameter_count())
 }
 
-/// A model's vector for an experiment: its parameters, the levels at which it begins, lags at rest.
+/// A model's vector for an experiment: its parameters, its initial levels, lags at rest.
 pub(crate) fn vector(node: &Node, setup: &Setup, simulated: &SimulatedExperiment) -> Vec<f64> {
     let mut x = node.fit.x[..node.setup.parameter_count()].to_vec();
     x.extend(&simulated.initial);
@@ -87,7 +88,7 @@ pub(crate) fn vector(node: &Node, setup: &Setup, simulated: &SimulatedExperiment
     x
 }
 
-/// The linear form: what a model cannot imitate of an experiment that was simulated with the other.
+/// The linear form: the part of an experiment, simulated with one model, that the other model cannot fit.
 pub(crate) fn linear(
     simulated: &SimulatedExperiment,
     stand_in: &Node,
@@ -101,7 +102,7 @@ pub(crate) fn linear(
     Some(effect_search::design::least(&rows, known) / metric.variance())
 }
 
-/// One model's simulation of the existing records.
+/// Simulation of the existing records by one model.
 pub(crate) fn noise_free(truth: &Node) -> Result<Vec<Record>, Error> {
     let mut series = truth.setup.simulate(&truth.fit.x)?.output.into_iter();
     let mut records = truth.setup.records.to_vec();
@@ -111,7 +112,7 @@ pub(crate) fn noise_free(truth: &Node) -> Result<Vec<Record>, Error> {
     Ok(records)
 }
 
-/// The parameters and the plant's initial states of a node, in the order of a setup without a loop.
+/// The parameters and the plant's initial states of a model, in the order of a setup without a loop.
 pub(crate) fn unlooped(node: &Node) -> Vec<f64> {
     let mut x = node.fit.x[..node.setup.parameter_count()].to_vec();
     for r in 0..node.setup.records.len() {
@@ -120,7 +121,7 @@ pub(crate) fn unlooped(node: &Node) -> Vec<f64> {
     x
 }
 
-/// What is known of a model's parameters beside the records, free of noise as the simulation of another model is: that one's values.
+/// Priors of a model's parameters with the values of another model, without noise like that model's simulation.
 pub(crate) fn priors_of_truth(truth: &Node, stand_in: &Node) -> BTreeMap<String, PriorValue> {
     let mut priors = stand_in.setup.prior_values();
     let names = truth.setup.names()[..truth.setup.parameter_count()].iter();
@@ -145,7 +146,8 @@ pub(crate) fn misfit_before(
     Ok(fit_from(&setup, &[unlooped(stand_in)], &metric.noise, FINE)?.cost)
 }
 
-/// The same with the experiment among the records, in units of the noise and beyond what was there `before`.
+/// Separation with the experiment among the records and the parameters refitted, in units of the noise and in excess of the separation
+/// `before`.
 pub(crate) fn refitted(
     existing: &[Record],
     simulated: &SimulatedExperiment,

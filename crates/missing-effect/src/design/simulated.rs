@@ -1,11 +1,11 @@
-//! An experiment simulated with a fitted model: without noise, from rest, in the loop where there is one.
+//! An experiment simulated with a fitted model: without noise, from rest, in the loop if there is one.
 
 use ct_signals::{Hold, Record};
 use plants::{Command, MAX_VESSELS, Simulator, Structure, controller::Controller};
 
 use crate::fit::node::Node;
 
-/// What the experiment is applied to.
+/// Open or closed loop of the experiment.
 #[derive(Debug, Clone)]
 pub(crate) enum Loop<'a> {
     /// The command itself.
@@ -14,26 +14,26 @@ pub(crate) enum Loop<'a> {
     Closed(&'a Controller),
 }
 
-/// What came out.
+/// Result of a simulated experiment.
 #[derive(Debug, Clone)]
 pub(crate) struct SimulatedExperiment {
-    /// The record that the experiment would give, free of noise.
+    /// The record of the experiment, without noise.
     pub record: Record,
-    /// Levels when it began.
+    /// Initial levels.
     pub initial: Vec<f64>,
-    /// A controller came to a limit.
+    /// Whether a controller reached a limit.
     pub at_limit: bool,
     /// Smallest and largest level of each vessel.
     pub levels: Vec<(f64, f64)>,
 }
 
-/// Time constants for which the plant is left to settle, and the most samples that this takes in a loop.
+/// Time constants for the plant to settle, and the largest number of samples for this in a loop.
 const SETTLE: f64 = 12.0;
 const MOST_SETTLING: usize = 20_000;
-/// Parts of a time constant in which a plant without a loop settles.
+/// Steps per time constant for the settling of a plant without a loop.
 const PARTS: f64 = 4.0;
 
-/// Where it settles under the first value: levels, and the command.
+/// Steady state under the first value: levels, and the command.
 struct Rest {
     levels: [f64; MAX_VESSELS],
     command: f64,
@@ -41,8 +41,7 @@ struct Rest {
     regulator: Option<plants::controller::Regulator<f64>>,
 }
 
-/// The structure in which the plant settles, and its parameters: what follows the clock begins with the record, and has not
-/// run before.
+/// The structure in which the plant settles, and its parameters: functions of time begin with the record and are not active before.
 fn settling(node: &Node) -> (Structure, Vec<f64>) {
     let setup = &node.setup;
     let mut structure = setup.structure.clone();
@@ -85,7 +84,7 @@ fn rest(node: &Node, into: &Loop, first: f64, interval: f64, time_constant: f64)
         Loop::Closed(controller) => {
             let mut simulator = Simulator::<f64>::new(&structure, &theta, levels, middle).ok()?;
             simulator.set_substeps(node.setup.substeps);
-            // All of the command in the state that it sees.
+            // The command without its state before saturation.
             let seen = controller.linear(interval).c;
             let states: Vec<f64> = seen.iter().map(|c| c * middle).collect();
             let mut regulator = controller.start(&states);
@@ -105,7 +104,7 @@ fn rest(node: &Node, into: &Loop, first: f64, interval: f64, time_constant: f64)
     }
 }
 
-/// Simulates a sequence; `None` where the simulation does not stay finite, or nobody waits any more.
+/// Simulates a sequence; `None` if the simulation diverges, or if the search was cancelled.
 pub(crate) fn simulate_experiment(
     node: &Node,
     into: &Loop,

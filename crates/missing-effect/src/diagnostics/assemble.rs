@@ -1,4 +1,4 @@
-//! A result without its findings: the models that were fitted, the noise floors, the records.
+//! The parts of a result without the findings: fitted models, noise floors, records.
 
 use ct_signals::Clock;
 use greybox::Noise;
@@ -7,7 +7,7 @@ use crate::{
     Diagnosis, Effort, NoiseFloor, Problem, Rankings, Shown, Step, Verdict, result::Floors,
 };
 
-/// The noise floors that a noise model stands for.
+/// The noise floors of a noise model.
 pub(crate) fn floors(problem: &Problem, noise: &Noise, source: &str) -> Floors {
     let outputs = problem.records[0].outputs.iter().zip(noise.iter());
     let floors = outputs.map(|(output, noise)| NoiseFloor {

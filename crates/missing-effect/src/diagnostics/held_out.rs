@@ -1,22 +1,22 @@
-//! Records that take part in no fit and no choice: their initial states are fitted on the first samples, the rest is scored.
+//! Held-out records: their initial states are fitted on the first samples, the rest is scored.
 
 use ct_signals::{Channel, Record};
 use greybox::{Stopping, fit_initial_levels};
 
 use crate::{Error, HeldOutError, PerOutput, Step, fit::node::Node};
 
-/// Samples of a held-out record on which its initial levels are fitted, and which are not scored.
+/// Samples of a held-out record for the fit of its initial levels, which are not scored.
 const HEAD: usize = 5;
 
-/// Held-out records as a model simulates them.
+/// Simulation of held-out records by a model.
 pub(crate) struct HeldOut {
     /// A series for each record and output.
     pub series: Vec<Vec<f64>>,
-    /// Of each output: samples that are scored, their root mean square error, and its parts.
+    /// For each output: number of scored samples, their root mean square error, and its parts.
     pub outputs: Vec<(usize, f64, HeldOutError)>,
 }
 
-/// Rows until so many samples of an output are there: the initial levels follow from them.
+/// Rows until this number of samples of an output is present: the initial levels follow from them.
 fn head(output: &Channel) -> usize {
     let present = output.values.iter().enumerate();
     present
@@ -25,7 +25,7 @@ fn head(output: &Channel) -> usize {
         .map_or(output.values.len(), |(last, _)| last + 1)
 }
 
-/// A record up to where the last of its outputs has so many samples, without what the others have beyond theirs.
+/// A record up to the row where each of its outputs has this number of samples, without further samples.
 fn beginning(record: &Record) -> Record {
     let rows = record.outputs.iter().map(head).max().unwrap_or(0);
     let mut begun = Record {
@@ -38,7 +38,7 @@ fn beginning(record: &Record) -> Record {
     begun
 }
 
-/// Initial levels from the first [`HEAD`] samples with everything else frozen; scored on the rest.
+/// Initial levels from the first [`HEAD`] samples with all other parameters fixed; scored on the rest.
 pub(crate) fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
     if test.is_empty() {
         return Ok(None);
@@ -46,7 +46,7 @@ pub(crate) fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, 
     let parameters = &node.fit.x[..node.setup.parameter_count()];
     let heads: Vec<Record> = test.iter().map(beginning).collect();
     let mut begun = node.setup.with_records(&heads)?;
-    // A few samples take no time, and an error from wrong levels would be no error of the model.
+    // A fit to a few samples takes no time, and an error from wrong levels would not be an error of the model.
     (begun.time_limit, begun.interrupt) = (None, None);
     let x = fit_initial_levels(
         &begun,
@@ -73,7 +73,7 @@ pub(crate) fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, 
             }
             count += pairs.len();
         }
-        // NaN of an output of which nothing is left to be scored.
+        // NaN for an output without scored samples.
         let [rmse, offset, gain, shape] = parts.map(|sum| (sum / count as f64).sqrt());
         let error = HeldOutError {
             offset,
@@ -92,8 +92,8 @@ pub(crate) fn held_out_rmse(node: &Node, test: &[Record]) -> Result<Vec<f64>, Er
     Ok(held_out.into_iter().map(|(_, rmse, _)| rmse).collect())
 }
 
-/// Sums of squares of measured minus model: all of it, what its mean explains, what a factor on the model's deviations from
-/// their mean explains beside it, and what is left.
+/// Sums of squares of measured minus model: the total, the part of its mean, the part of a factor on the model's deviations from their
+/// mean, and the rest.
 fn error_parts(pairs: &[(f64, f64)]) -> [f64; 4] {
     let n = pairs.len().max(1) as f64;
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
@@ -112,12 +112,12 @@ fn error_parts(pairs: &[(f64, f64)]) -> [f64; 4] {
     [all, offset, gain, (all - offset - gain).max(0.0)]
 }
 
-/// The share of the excess error on held-out records that the last model explains of the first one's.
+/// The share of the first model's excess error on held-out records that the last model explains.
 pub(crate) fn share_on_held_out(steps: &[Step], floor: &PerOutput) -> Option<f64> {
     let [first, .., last] = steps else {
         return None;
     };
-    // Over the floor of each output, in their mean.
+    // Mean over the outputs, each divided by its floor.
     let mean_square = |step: &Step| -> Option<f64> {
         let errors = step.rmse_test_per_output.as_ref()?.values();
         let squares = errors.zip(floor.values());
@@ -125,7 +125,7 @@ pub(crate) fn share_on_held_out(steps: &[Step], floor: &PerOutput) -> Option<f64
         Some(sum / floor.0.len() as f64)
     };
     let (before, after) = (mean_square(first)?, mean_square(last)?);
-    // An error that is noise has no share to explain.
+    // If the error is noise, there is no share to explain.
     (before > 1.0).then(|| (before - after) / (before - after.min(1.0)))
 }
 
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn a_held_out_error_is_split_into_offset_gain_and_shape() {
-        // Measured: the model's deviations from 5, half as large again, 2 above, and a wave that is neither.
+        // Measured: the model's deviations from 5, times 1.5, plus 2, plus an independent oscillation.
         let model = |k: usize| if k % 4 < 2 { 6.0 } else { 4.0 };
         let wave = |k: usize| if k.is_multiple_of(2) { 0.3 } else { -0.3 };
         let pairs: Vec<(f64, f64)> = (0..400)

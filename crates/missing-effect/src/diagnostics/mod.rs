@@ -1,8 +1,8 @@
-//! What one fitted model shows: its errors, where it fails, and whether its residual is noise.
+//! Diagnostics of one fitted model: its errors, where it fails, and whether its residual is noise.
 //!
-//! In this order: `remains.rs` (tests whether the residual is noise), `locate/` (where it fails: times, levels, frequencies), `held_out.rs` (its error on
-//! other records), `step.rs` (all of these for the report), `unknown/` (the shape of what no effect explains), `assemble.rs` (the
-//! result that holds them). The search and the acceptance tests ask for single ones of these.
+//! In this order: `remains.rs` (tests whether the residual is noise), `locate/` (where it fails: times, levels, frequencies), `held_out.rs`
+//! (its error on other records), `step.rs` (all of these for the report), `unknown/` (the shape of what no effect explains), `assemble.rs`
+//! (the result that holds them). The search and the acceptance tests ask for single ones of these.
 
 pub(crate) mod assemble;
 pub(crate) mod held_out;

@@ -1,4 +1,4 @@
-//! Whether what a model leaves is noise: what an autoregressive noise cannot be.
+//! Tests whether the residual of a model is stationary AR noise that is independent of the input.
 //!
 //! An autoregressive model fits anything, a random walk included: that a residual *can* be whitened says nothing. Noise is
 //! what is independent of the command, has no place in time, no period, and forgets faster than the process does.
@@ -9,8 +9,8 @@
 //! - **a period**: a line of the spectrum that stands out of its neighbours (`spectral_line.rs`).
 //! - **an instant**: windows of 1, 2, 4, ... samples of `w`, whose sums over the root of their length are standard normal.
 //! - **the level**: `w` against functions of what the model read a sample before. A term that is missing from a balance leaves a
-//!   residual that wanders with the level, and is no noise however slow it is. As `w` is white and independent of the past, its
-//!   regression on any past is chi-square, whatever the colour of the regressors.
+//!   residual that drifts with the level, and is no noise however slow it is. As `w` is white and independent of the past, its   regression
+//!   on any past is chi-square, whatever the colour of the regressors.
 //! - **slowness**: the integral of the noise's autocorrelation over positive lags is longer than the slowest time constant
 //!   of the process. Such a noise can stand for anything that the process lacks, so it is no answer.
 //!
@@ -28,25 +28,25 @@ use crate::{
     fit::{node::Node, noise_model::slowness_of},
 };
 
-/// Below this p-value a residual is not noise, in each of the tests, corrected for all that it looked at.
+/// Significance level of each residual test, corrected for the number of its comparisons.
 const NOT_NOISE: f64 = 1e-4;
 
-/// What a residual shows that noise does not; the first that was found.
+/// Structure of a residual that noise does not explain; the first one found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Remains {
     /// The command.
     Input,
     /// A period \[s\].
     Period(f64),
-    /// Something from an instant on, for a while \[s\].
+    /// An abrupt change from an instant on, for a while \[s\].
     Instant(f64, f64),
     /// The level.
     Level,
-    /// A wander: its correlation time and the process's slowest time constant \[s\].
+    /// A drift: its correlation time and the process's slowest time constant \[s\].
     Slow(f64, f64),
 }
 
-/// What a residual shows that noise does not, in which of the fitted records, where it is one of them, and at which output.
+/// Structure of a residual that noise does not explain, with its record, if it is in one of the fitted records, and its output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Left {
     pub what: Remains,
@@ -55,9 +55,8 @@ pub(crate) struct Left {
 }
 
 impl Left {
-    /// The size of the noise above which there is something to explain. A wander is a noise too, in whose metric effects
-    /// are confirmed as in any other; what else remains is in the noise model by mistake, but hardly in what it cannot
-    /// predict. By output.
+    /// The noise level above which there is something to explain. A drift is noise too, and effects are confirmed with it as weighting;
+    /// other unexplained structure is absorbed by the noise model, but hardly enters its innovations. By output.
     pub(crate) fn above(&self, noise: &Noise) -> Vec<f64> {
         let size = |noise: &ArModel| match self.what {
             Remains::Slow(..) => noise.stationary_std(),
@@ -67,7 +66,7 @@ impl Left {
     }
 }
 
-/// What the residual of a model holds that is not noise; `own` is its fit with the colour of its own residual.
+/// Structure in the residual of a model that is not noise; `own` is the model's fit with the noise model of its own residual.
 pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
     let outputs = node.setup.outputs();
     let (p, series) = least_p(node, None, of_command)?;
@@ -119,20 +118,20 @@ pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
         }))
 }
 
-/// p-value of the test that the command itself does not show in a node's residual at an output; of several records the smallest,
-/// corrected for having taken it.
+/// p-value of the test that a model's residual at an output does not depend on the command; of several records the smallest, corrected for
+/// the selection.
 pub(crate) fn input_p(node: &Node, output: usize) -> Result<f64, Error> {
     Ok(least_p(node, Some(output), |u| vec![u.to_vec()])?.0)
 }
 
-/// The same for all signals that are made of a record's commands, and the series that shows it most.
+/// The least p-value over all signals derived from a record's commands, and the series with this value.
 fn least_p(
     node: &Node,
     output: Option<usize>,
     signals: impl Fn(&[f64]) -> Vec<Vec<f64>>,
 ) -> Result<(f64, Option<usize>), Error> {
     let residuals = node.setup.disturbance(&node.fit.x)?;
-    // In a loop the command holds the noise that came back; what moves it from outside is the reference.
+    // In a loop the command contains fed-back noise; the reference is the external signal.
     let in_loop = !node.setup.replays().is_empty();
     let (mut least, mut at, mut count) = (1.0, None, 0.0);
     let outputs = node.setup.outputs();
@@ -153,7 +152,7 @@ fn least_p(
             .par_iter()
             .map(
                 |signal| match prewhitened_input_test(signal, residual, lags) {
-                    // Too few pairs of samples are there: it says nothing.
+                    // Too few pairs of samples: no test is possible.
                     Err(ct_signals::Error::TooFewSamples { .. }) => Ok((Vec::new(), 1.0)),
                     tested => tested,
                 },
@@ -169,7 +168,7 @@ fn least_p(
     Ok(((least * count).min(1.0), at))
 }
 
-/// A period of a residual, or else an instant.
+/// A period of a residual, or otherwise an instant.
 fn place_in_time(
     record: &Record,
     residual: &[f64],

@@ -1,4 +1,4 @@
-//! From a fitted node to what is reported of it.
+//! Report of a fitted model.
 
 use ct_signals::{ArModel, Clock, Record, residual_tests};
 use greybox::{Fit, Noise, Setup, robust, weighted_rms};
@@ -22,7 +22,7 @@ pub(crate) fn of_one(outputs: &[f64]) -> f64 {
     }
 }
 
-/// Standard errors under the colour of the node's own residual, whatever metric it was fitted in.
+/// Standard errors with the noise model of the model's own residual, whatever the weighting of its fit.
 fn std_errors(node: &Node) -> Result<Vec<Option<f64>>, Error> {
     Ok(if node.fit.noise.order() > 0 {
         node.fit.std_errors()
@@ -50,7 +50,7 @@ pub(crate) fn parameters(setup: &Setup, fit: &Fit, std_errors: &[Option<f64>]) -
         .collect()
 }
 
-/// A test; `None` where too few pairs of samples are there for it.
+/// A test result; `None` if there are too few pairs of samples.
 fn testable<T>(test: Result<T, ct_signals::Error>) -> Result<Option<T>, ct_signals::Error> {
     match test {
         Err(ct_signals::Error::TooFewSamples { .. }) => Ok(None),
@@ -58,7 +58,7 @@ fn testable<T>(test: Result<T, ct_signals::Error>) -> Result<Option<T>, ct_signa
     }
 }
 
-/// The residual tests of an output, on the first record or, where that is cut, its longest part.
+/// The residual tests of an output, on the first record or, if that is cut, its longest part.
 fn tests(node: &Node, residuals: &[Vec<f64>], output: usize) -> Result<ResidualTests, Error> {
     let setup = &node.setup;
     let samples_of = |residual: &[f64]| residual.iter().filter(|e| !e.is_nan()).count();
@@ -83,7 +83,7 @@ fn tests(node: &Node, residuals: &[Vec<f64>], output: usize) -> Result<ResidualT
         lags,
     ))?
     .unwrap_or((vec![f64::NAN; lags + 1], f64::NAN));
-    // As many pairs of samples are there as the square of the share of samples.
+    // The share of pairs of samples is the square of the share of samples.
     let bound = 1.96 * (record.len() as f64).sqrt() / samples.max(1) as f64;
     Ok(ResidualTests {
         autocorrelation: residual_tests::autocorrelation(residual, lags),
@@ -96,9 +96,8 @@ fn tests(node: &Node, residuals: &[Vec<f64>], output: usize) -> Result<ResidualT
     })
 }
 
-/// The report of one node; `bic` is its criterion under the colour of its own residual, `judge` the noise
-/// against which its residual is judged; `widen`: the standard errors allow
-/// for the bias of feedback.
+/// Report of one model; `bic` is its criterion with the noise model of its own residual, `judge` the noise for the residual tests; `widen`:
+/// the standard errors allow for the bias of feedback.
 pub(crate) fn report(
     node: &Node,
     bic: f64,

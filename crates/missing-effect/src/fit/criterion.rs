@@ -1,32 +1,31 @@
-//! When one set of effects is better than another: by the criterion (BIC), and by more than chance among all that was tried.
+//! Comparison of two sets of effects: by the criterion (BIC), and by significance over all trials.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::node::Node;
 
-/// An effect is accepted where its criterion falls by more than this ...
+/// An effect is accepted if its criterion falls by more than this ...
 pub(crate) const BIC_MARGIN: f64 = 6.0;
-/// ... and where chance would let so large a fall happen less often than this, counted over all candidates.
+/// ... and if chance would cause such a fall less often than this, over all candidates.
 const FALSE_CLAIM: f64 = 0.003;
-/// What stands in for another lies within this of its criterion.
+/// An alternative to another effect is within this distance of its criterion.
 pub const GROUP_MARGIN: f64 = 6.0;
 
-/// Whether a set of effects lowers the deviance by more than chance would where there is nothing; each in the same metric, or
-/// each in its own.
+/// Whether a set of effects lowers the deviance significantly, both with the same weighting, or each with its own.
 ///
 /// Chi-square, corrected (Bonferroni) for all that the search looked at, with a share of the risk for each effect: one that
 /// has a single start is not made to pay for another with many.
 pub(crate) fn beyond_chance(gained: &Node, lacking: &Node) -> bool {
     let free = |node: &Node| node.setup.free().len();
     let freedom = free(gained).saturating_sub(free(lacking)).max(1);
-    // A noise of its own may have more coefficients, which lower the deviance too.
+    // The noise model of the larger set may have more coefficients, which lower the deviance too.
     let freedom = freedom.max(gained.fit.parameters.saturating_sub(lacking.fit.parameters));
     let fall = lacking.fit.deviance - gained.fit.deviance;
     let chance = ChiSquared::new(freedom as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
     chance_of(gained, lacking, chance)
 }
 
-/// Whether a probability is small enough, corrected for all that the search looked at, to claim what one set has beyond another.
+/// Whether a p-value is small enough, corrected for all trials of the search, to accept the difference between two sets.
 pub(crate) fn chance_of(gained: &Node, lacking: &Node, chance: f64) -> bool {
     let candidates = lacking.setup.structure.candidates().len() as f64;
     let looks: f64 = gained

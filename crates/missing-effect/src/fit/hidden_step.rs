@@ -1,4 +1,4 @@
-//! The step of a coarse sensor under noise: what a model does not explain is a sawtooth of what it reads.
+//! The quantisation step of a coarse sensor with noise: the residual is a sawtooth function of the reading.
 //!
 //! `D round(y/D) - y` turns once from one multiple of `D` to the next. A fit follows a step only while the highest reading
 //! is as many steps as it really is: one more or less is the minimum of another sawtooth. So the steps are looked
@@ -14,27 +14,27 @@ use crate::{
     fit::{node::Node, noise_model::NOISE_ORDER},
 };
 
-/// The effect whose step it is.
+/// The effect with this step.
 pub(crate) const EFFECT: &str = "coarse_quantisation";
 const STEP: &str = "coarse_quantisation.step";
 
-/// The highest reading turns by this part from one step that is looked at to the next.
+/// The phase of the highest reading changes by this share from one tested step to the next.
 const TURN: f64 = 0.25;
-/// Finer steps that are looked at between two, around the best.
+/// Number of finer steps between two, around the best.
 const FINER: usize = 16;
 /// The fewest and the most steps between the lowest and the highest reading.
 const STEPS: (f64, f64) = (2.0, 300.0);
-/// Steps that are looked at times samples, at most. Readings far from zero turn often from one step to the next, and long records
-/// take long: then only coarse steps are looked for.
+/// Largest number of tested steps times samples. Readings far from zero pass many periods from one step to the next, and long records take
+/// long: then only coarse steps are tested.
 const LOOKED_AT: f64 = 3e8;
 
-/// Where the step of a sensor stands in the vector.
+/// Position of a sensor's quantisation step in the parameter vector.
 pub(crate) fn step_of(setup: &Setup) -> Option<usize> {
     setup.names().iter().position(|name| name == STEP)
 }
 
-/// The step of an output's sensor that takes most out of what a node does not explain, the model run on the measured command: there
-/// the level is known best.
+/// The quantisation step of an output that explains most of a model's residual, with the model simulated on the measured command, where the
+/// level is most accurate.
 pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, Error> {
     let outputs = node.setup.outputs();
     let of_output = |series: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
@@ -54,7 +54,7 @@ pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, 
     let (span, reach) = (high - low, low.abs().max(high.abs()));
     let grid = TURN / reach;
     let affordable = STEPS.0 + LOOKED_AT / samples as f64 * grid * span;
-    // A step below the noise is a noise too.
+    // A quantisation step below the noise acts as noise.
     let most = (span / noise.sigma()).min(STEPS.1).min(affordable);
     if !(span > 0.0 && reach.is_finite() && most > STEPS.0) {
         return Ok(None);
@@ -78,7 +78,7 @@ pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, 
     };
     let finer = grid / FINER as f64;
     let best = best_of(near - grid, finer, 2 * FINER + 1);
-    // No coarser than a fit may take it: the start that was picked is known by its value (`Structure::ways`).
+    // The grid is no coarser than a fit needs: the selected start is identified by its value (`Structure::ways`).
     let structure = &node.setup.structure;
     let visited = structure.scales.level[structure.scales.outputs[output].vessel];
     let coarsest = 0.5 * (visited.1 - visited.0);
@@ -88,9 +88,9 @@ pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, 
     }))
 }
 
-/// What is left of a residual beside the sawtooth of a step, which is so many turns for a unit of the level.
+/// Residual without the sawtooth error of a quantisation step, with this number of periods per unit of the level.
 fn without_sawtooth(model: &[f64], residual: &[f64], turns: f64) -> Vec<f64> {
-    // Added and taken off again, it leaves the nearest whole number; `f64::round` is a call for every sample.
+    // Adding and subtracting this number rounds to the nearest integer; `f64::round` would be a call for every sample.
     const WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
     let step = 1.0 / turns;
     model
@@ -100,7 +100,7 @@ fn without_sawtooth(model: &[f64], residual: &[f64], turns: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Sum of squares of what a noise's past does not foretell, from where it has a whole past.
+/// Sum of squares of the innovations of a noise, from the row with a complete past.
 fn innovations(series: &[f64], noise: &ArModel) -> f64 {
     if series.iter().any(|value| value.is_nan()) {
         let whitened = noise.whiten(series);
@@ -145,15 +145,15 @@ mod tests {
             let problem = problem(step, colour, seed as u64);
             let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
             let found = hidden_step(&node, 0).unwrap().unwrap();
-            // Over the range of the readings, of 8 at most, it counts right to less than one. What is below that range is not
-            // seen: at half the noise the whole count may be one off.
+            // Over the range of the readings, at most 8, the number of steps is exact to less than one. Smaller ranges are not detected:
+            // with noise of half a step the number may be wrong by one.
             let counted = |step: f64| 8.0 / step;
             assert!(
                 (counted(found.value) - counted(step)).abs() < 0.75,
                 "{} for {step}",
                 found.value
             );
-            // It is what a fit needs to name it.
+            // A fit needs this frequency to name the step.
             let noise = node.setup.white_noise();
             assert_eq!(singles(&node, &noise)[0].added[0].effect.id, EFFECT);
         }
@@ -164,14 +164,14 @@ mod tests {
         let problem = simulated::tank(|u| u, |_, level| level, 0.0, 7);
         let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
         let found = hidden_step(&node, 0).unwrap().unwrap();
-        // From two to as many as the noise leaves room for, over the range of the readings.
+        // From two steps to as many as the noise permits, over the range of the readings.
         assert!(found.of > 100.0);
         let placed = Placed {
             effect: EffectInfo::find(EFFECT).unwrap(),
             vessel: 0,
         };
         let setup = Parent::new(&node).with(placed).unwrap();
-        // The step itself, begun with and without noise before the rounding.
+        // The step itself, from starts with and without noise before the quantisation.
         assert_eq!(setup.structure.ways(placed), 2.0 + found.of);
     }
 }

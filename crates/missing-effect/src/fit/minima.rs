@@ -1,4 +1,4 @@
-//! Whether a minimum is the lowest: it is held against those that other starts reach.
+//! Tests whether a minimum is the lowest, by comparison with the minima from other starts.
 
 use greybox::{Fit, Noise, Start, fit_onward, keep_best_simulated, starts_around};
 use plants::Placed;
@@ -14,14 +14,13 @@ use crate::{
     },
 };
 
-/// After one rough fit, a second one and a third one, so many times the least cost is out of reach of its minimum.
+/// After a first, second and third rough fit, a minimum is hopeless if the cost exceeds the least cost by this factor.
 const HOPELESS: [f64; 3] = [1.5, 1.15, 1.05];
 
-/// The node's minimum against those that so many starts around it reach.
+/// Compares the minimum with those from this number of starts around it.
 pub(crate) fn around(node: &mut Node, count: usize, noise: &Noise, seed: u64) -> Result<(), Error> {
     let mut starts = starts_around(&node.setup, &node.fit.x, count, seed);
-    // Every line of a spectrum is a minimum of its own, and so is every step of a reading; the strongest was picked: the starts
-    // stay on it.
+    // Every spectral line is a separate minimum, and so is every quantisation step; the strongest was selected, and the starts keep it.
     for picked in [period_of(&node.setup), step_of(&node.setup)]
         .into_iter()
         .flatten()
@@ -33,10 +32,9 @@ pub(crate) fn around(node: &mut Node, count: usize, noise: &Noise, seed: u64) ->
     descend(node, starts, noise)
 }
 
-/// The node's minimum against those that each of these effects of it reaches from its own starts, beside the others as they
-/// are.
+/// Compares the minimum with those that each of these effects reaches from its own starts, the other effects unchanged.
 ///
-/// While a set grows, an effect takes the place that is free. On the measured Cascaded Tanks data that is a leak a little
+/// While a set grows, an effect first explains the remaining error. On the measured Cascaded Tanks data that is a leak a little
 /// below the rim; once the sensor's play and limit are there, one near the bottom lowers the error by an eighth.
 pub(crate) fn begun_again(node: &mut Node, effects: &[Placed], noise: &Noise) -> Result<(), Error> {
     let starts = effects.iter();
@@ -49,7 +47,7 @@ pub(crate) fn begun_again(node: &mut Node, effects: &[Placed], noise: &Noise) ->
     descend(node, starts, noise)
 }
 
-/// Follows the starts down as long as they promise to come as low as the node's minimum.
+/// Continues the starts while they may reach the minimum.
 fn descend(node: &mut Node, starts: Vec<Vec<f64>>, noise: &Noise) -> Result<(), Error> {
     if node.setup.leaves_out("further starts of the final models") {
         return Ok(());
@@ -61,7 +59,7 @@ fn descend(node: &mut Node, starts: Vec<Vec<f64>>, noise: &Noise) -> Result<(), 
             .into_par_iter()
             .filter_map(|start| fit_onward(&node.setup, vec![start], noise, ROUGH).ok())
             .collect();
-        // What is far behind by then ends elsewhere.
+        // Fits far above the least cost end in another minimum.
         let least = rough
             .iter()
             .map(|fit| fit.cost)

@@ -1,34 +1,34 @@
-//! A set of effects with its fit, and the fits of what it is changed to.
+//! A set of effects with its fit, and the fits of its extensions and reductions.
 
 use greybox::{Fit, Noise, Setup, Start, Stopping, fit_from, fit_onward, random_starts};
 use plants::{ParameterInfo, Placed};
 
 use crate::Error;
 
-/// Where the fit of a believed model stops.
+/// Stopping criteria of the fit of a believed model.
 pub(crate) const STOPPING: Stopping = Stopping {
     evaluations: 120,
     cost: 1e-9,
 };
 
-/// A first fit needs no more than this: its rank is sought, not its digits.
+/// Stopping criteria of a first fit, which only has to give a rank.
 pub(crate) const ROUGH: Stopping = Stopping {
     evaluations: 20,
     cost: 1e-3,
 };
-/// Which of many are worth a first fit.
+/// Stopping criteria of a first fit of many candidates.
 pub(crate) const QUICK: Stopping = Stopping {
     evaluations: 5,
     cost: 1e-3,
 };
-/// What a fit is taken to once its structure has a name.
+/// Stopping criteria of a final fit.
 pub(crate) const FINE: Stopping = Stopping {
     evaluations: 80,
     cost: 1e-8,
 };
-/// Random starts of a set without one of its effects, where it cannot be simulated with the parameters that it had.
+/// Random starts of a set without one of its effects, if it cannot be simulated with its present parameters.
 const OTHER_STARTS: usize = 12;
-/// What a valve does that sticks, and the width of its band, as a part of what the command moves over, below which a loop imitates it.
+/// Valve stiction, and the width of its band relative to the range of the command below which feedback resembles it.
 pub(crate) const STICTION: &str = "stiction_backlash";
 const NARROW: f64 = 0.25;
 
@@ -37,7 +37,7 @@ const NARROW: f64 = 0.25;
 pub(crate) struct Node<'a> {
     pub setup: Setup<'a>,
     pub fit: Fit,
-    /// What was added to the base, in order.
+    /// Effects added to the base, in order.
     pub added: Vec<Placed>,
 }
 
@@ -47,7 +47,7 @@ impl Node<'_> {
         other.fit.bic() - self.fit.bic()
     }
 
-    /// The leading parameter of an added effect, its size, and where that stands in the vector.
+    /// The leading parameter of an added effect (its size), and its position in the vector.
     pub fn size_of(&self, placed: Placed) -> Option<(ParameterInfo, usize)> {
         let parameters = self.setup.structure.effect_parameters(placed);
         let leading = parameters.into_iter().next()?;
@@ -55,7 +55,7 @@ impl Node<'_> {
         Some((leading, at))
     }
 
-    /// The added stiction, where its band is narrower than [`NARROW`] of what the command moves over.
+    /// The added stiction, if its band is narrower than [`NARROW`] of the range of the command.
     ///
     /// In a loop that is not simulated, a disturbance comes back through the command with a delay, as if the valve had play: the model
     /// that runs on that command takes such a phase for a narrow band. A band that holds the valve over a wide part of the command's
@@ -71,13 +71,13 @@ impl Node<'_> {
     }
 }
 
-/// Where a parameter of an effect stands in the vector.
+/// Position of an effect's parameter in the vector.
 pub(crate) fn position_of(setup: &Setup, placed: Placed, parameter: &str) -> Option<usize> {
     let name = format!("{}.{parameter}", placed.effect.id);
     setup.names().iter().position(|known| *known == name)
 }
 
-/// The parent's vector in the child's order; what the parent does not have is zero.
+/// The parent's vector in the child's order; additional entries are zero.
 pub(crate) fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
     child
         .names()
@@ -93,7 +93,7 @@ pub(crate) fn transfer(parent: &Node, child: &Setup) -> Vec<f64> {
         .collect()
 }
 
-/// Fits a node's structure anew to the end, from where it is and from the given further starts.
+/// Fits a model's structure again to convergence, from its estimates and from the given further starts.
 pub(crate) fn refine<'a>(
     node: &Node<'a>,
     noise: &Noise,
@@ -118,7 +118,7 @@ pub(crate) fn fitted<'a>(
     })
 }
 
-/// The node without one of its effects, refitted from where it was.
+/// The model without one of its effects, refitted from its estimates.
 pub(crate) fn without<'a>(
     node: &Node<'a>,
     position: usize,
@@ -130,7 +130,7 @@ pub(crate) fn without<'a>(
         .with_structure(node.setup.structure.without(node.added[position].effect))?;
     let start = transfer(node, &setup);
     let fit = match fit_from(&setup, &[start], noise, stopping) {
-        // Some parameters hold beside the effect alone.
+        // Some parameters are valid only together with the effect.
         Err(greybox::Error::Estimation(greybox::NoFit::NoFiniteStart { .. })) => {
             let others = random_starts(&setup, OTHER_STARTS, 1);
             fit_from(&setup, &others, noise, stopping)?
@@ -142,7 +142,7 @@ pub(crate) fn without<'a>(
     Ok(Node { setup, fit, added })
 }
 
-/// The node without its effects that follow the clock alone, refitted from where it was.
+/// The model without its functions of time, refitted from its estimates.
 pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     let mut node = node.clone();
     while let Some(position) = node.added.iter().position(|placed| placed.effect.by_clock) {
@@ -151,14 +151,14 @@ pub(crate) fn without_clock<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'
     Ok(node)
 }
 
-/// By the criterion.
+/// Sorted by the criterion.
 pub(crate) fn best_first(mut nodes: Vec<Node>) -> Vec<Node> {
     nodes.sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     nodes
 }
 
-/// Values of series that follow each other as the outputs of records do, without those whose sample is missing: record by record, in the
-/// order of time, each times the weight of its output.
+/// Values of series in the order of the outputs of records, without missing samples: record by record, in the order of time, each times the
+/// weight of its output.
 pub(crate) fn in_time(setup: &Setup, series: &[Vec<f64>], weights: &[f64]) -> Vec<f64> {
     let (outputs, mut all) = (setup.outputs(), Vec::with_capacity(setup.samples()));
     for (record, series) in setup.records.iter().zip(series.chunks_exact(outputs)) {

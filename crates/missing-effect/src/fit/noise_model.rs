@@ -1,4 +1,4 @@
-//! The noise floor: the colour of the residual of the richest model in play.
+//! The noise floor: the noise model of the residual of the largest accepted model.
 
 use ct_signals::ArModel;
 use greybox::{Noise, Setup, noise_of, prewhitened};
@@ -11,7 +11,7 @@ use crate::{
 /// Largest order of the noise model.
 pub(crate) const NOISE_ORDER: usize = 6;
 
-/// The noise model of a node's residual, without the bias that fitting leaves in it.
+/// The noise model of a model's residual, corrected for the bias that fitting causes.
 pub(crate) fn colour(node: &Node) -> Result<Noise, Error> {
     Ok(noise_of(&node.setup, &node.fit, NOISE_ORDER)?)
 }
@@ -28,7 +28,7 @@ pub(crate) fn longest_memory(setup: &Setup) -> f64 {
     LONGEST_MEMORY * lengths.max().unwrap_or(1) as f64
 }
 
-/// A node fitted with the noise model of its own residual, whose memory is limited.
+/// The model fitted with the noise model of its own residual, with limited memory.
 pub(crate) fn in_own_noise<'a>(node: &Node<'a>) -> Result<Node<'a>, Error> {
     let memory = Some(longest_memory(&node.setup));
     Ok(Node {
@@ -37,14 +37,14 @@ pub(crate) fn in_own_noise<'a>(node: &Node<'a>) -> Result<Node<'a>, Error> {
     })
 }
 
-/// The noise model of residuals as they are, without what the fit has taken from the noise.
+/// The noise model of residuals without correction for the part of the noise that the fit has absorbed.
 pub(crate) fn residual_colour(setup: &Setup, residuals: &[Vec<f64>]) -> Result<Noise, Error> {
     let noise = Noise::fit(residuals, setup.outputs(), NOISE_ORDER);
     Ok(noise.map_err(greybox::Error::from)?)
 }
 
-/// The criterion of a node as it is fitted, its residual whitened by an autoregressive model of its own: that of the fit in
-/// that metric is a little lower.
+/// The criterion of a model with its present parameters, with its residual whitened by an AR model: a fit with this weighting would give a
+/// slightly lower value.
 pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
     let residuals = node.setup.disturbance(&node.fit.x)?;
     let noise = residual_colour(&node.setup, &residuals)?;
@@ -63,14 +63,14 @@ pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
     Ok(deviance + log_det + node.setup.price(noise.order()))
 }
 
-/// The noise's spectrum at frequency zero over its mean: by how much slow parameters are less certain than under
-/// white noise of the same size.
+/// The noise's spectrum at frequency zero over its mean: factor by which slow parameters are less certain than with white noise of the same
+/// variance.
 pub(crate) fn slowness_of(noise: &ArModel) -> f64 {
     let sum: f64 = noise.coefficients().iter().sum();
     ((noise.sigma() / (1.0 - sum)).powi(2) / noise.stationary_std().powi(2)).max(1.0)
 }
 
-/// The same of several outputs together: samples over independent samples.
+/// Samples per independent sample for several outputs together.
 pub(crate) fn slowness(noise: &Noise, samples: &[usize]) -> f64 {
     if let [only] = samples {
         return if *only > 0 {
@@ -86,10 +86,10 @@ pub(crate) fn slowness(noise: &Noise, samples: &[usize]) -> f64 {
     samples.iter().sum::<usize>() as f64 / independent.max(f64::MIN_POSITIVE)
 }
 
-/// Independent samples that a parameter should have for a fit in the noise's metric.
+/// Least number of independent samples per parameter for a prewhitened fit.
 const SAMPLES_PER_PARAMETER: f64 = 10.0;
 
-/// Whether the residual of the richest model wanders so slowly that hardly any independent samples are left.
+/// Whether the residual of the largest model drifts so slowly that hardly any independent samples are left.
 ///
 /// A fit in the metric of such a "noise" looks at fast changes alone and lets the simulation drift off; more often than
 /// not it is structure that the catalogue does not hold. Then effects are still confirmed in that metric, which is the

@@ -1,4 +1,4 @@
-//! The period of a swing: the strongest line of what a model does not explain, and which of many periods show most in it.
+//! The period of an oscillation: the strongest line of the residual, and the largest lines among many periods.
 
 use std::f64::consts::TAU;
 
@@ -13,12 +13,12 @@ use super::{
     series::{series, standardised},
 };
 
-/// The parameter that has as many minima as a spectrum has lines, and how many of its starts are looked at.
+/// The parameter with as many minima as a spectrum has lines, and the number of its starts.
 const PERIOD: &str = "periodic_disturbance.period";
 const PERIODS_SHOWN: usize = 6;
 
-/// Of starts with many periods keeps those whose periods show most in what is not explained without the effect: a plant answers a
-/// swing with a swing of that period, and a Fourier sum costs far less than a simulation.
+/// Among starts with many periods, keeps those with the largest spectral lines in the residual without the effect: a plant responds to an
+/// oscillation with the same period, and a Fourier sum is much cheaper than a simulation.
 pub(crate) fn keep_shown_periods(
     setup: &Setup,
     placed: Placed,
@@ -44,7 +44,8 @@ pub(crate) fn keep_shown_periods(
         return;
     };
     let shown = most_shown(periods, setup.records, noise.whiten(&residuals));
-    // The strongest line stands out of its neighbours, and may yet be lower than what wanders; its choice is paid for.
+    // The strongest line exceeds its neighbours, and may be lower than a drift; its selection is included in the multiple-testing
+    // correction.
     let strongest = setup.structure.scales.period;
     starts.retain(|start| {
         let of = |period: f64| period == start[at];
@@ -52,7 +53,7 @@ pub(crate) fn keep_shown_periods(
     });
 }
 
-/// The periods that show most in whitened residuals, outputs by their noise.
+/// The periods with the largest lines in the whitened residuals, outputs weighted by their noise.
 fn most_shown(periods: Vec<f64>, records: &[Record], whitened: Vec<Vec<f64>>) -> Vec<f64> {
     let outputs = whitened.len() / records.len().max(1);
     let whitened = standardised(whitened, outputs);
@@ -83,13 +84,13 @@ fn power_at(frequency: f64, series: &[(&Record, Vec<f64>)]) -> f64 {
     series.iter().map(of_one).sum()
 }
 
-/// Where the period of a swing stands in the vector.
+/// Position of the period of an oscillation in the vector.
 pub(crate) fn period_of(setup: &Setup) -> Option<usize> {
     setup.names().iter().position(|name| name == PERIOD)
 }
 
-/// The period that shows most in what a node does not explain \[s\].
-// A cell is filled by it: it must not wait for other threads, for the reason that is given at the hidden step.
+/// The period with the largest line in a model's residual \[s\].
+// The value is stored in a cell: the computation must not wait for other threads, for the reason given for the hidden step.
 pub(crate) fn strongest_period(node: &Node) -> Option<f64> {
     let residuals = node.setup.disturbance(&node.fit.x).ok()?;
     let lines = residuals.iter().zip(series(node.setup.records));

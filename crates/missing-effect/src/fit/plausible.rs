@@ -1,42 +1,43 @@
-//! Whether a fitted set of effects is credible: sizes inside their bounds, levels that are physical, and what an effect says of the
-//! readings to be seen in them.
+//! Whether a fitted set of effects is credible: sizes inside their bounds, physical levels, and predicted features of the readings that are
+//! visible in the record.
 
 use ct_signals::Channel;
 use plants::{Outlet, Placed};
 
 use crate::fit::node::{Node, transfer};
 
-/// A level this many times the largest reading is not physical where the height of the tanks is not known, ...
+/// A level above the largest reading by this factor is not physical if the height of the tanks is not known, ...
 const HIGHEST: f64 = 100.0;
-/// ... and one this many times that height where it is: an area that is a little wrong shifts levels that nobody measures.
+/// ... and one this many times that height where the height is known: a small error of an area shifts levels that are not measured.
 const ABOVE_RIM: f64 = 1.5;
 
-/// A sensor at the end of its range: its reading is said to rise beyond from this correlation with the level on, over so many samples.
+/// A sensor at the end of its range: the reading counts as increasing further from this correlation with the level on, over this number of
+/// samples.
 const LIMIT: &str = "sensor_saturation";
 const RISES: f64 = 0.5;
 const BEYOND: usize = 50;
 
-/// A reading that drops back by this part of the step within so many samples drops; ...
+/// A reading drops if it falls back by this share of the step within this number of samples; ...
 const DROPS: &str = "sensor_hysteresis";
 const FALLEN: f64 = 0.7;
 const DURATION: usize = 6;
-/// ... drops of a model are missing from the record where that moves by less than this part of them beside the model without them, and
-/// the noise of such a move is so many times smaller.
+/// ... drops of a model are not in the record if the reading changes by less than this share of them while the model without them does not,
+/// and the noise of such a change is smaller by this factor.
 const SEEN: f64 = 0.5;
 const CLEAR: f64 = 4.0;
 
-/// What is nearer to a bound than this part of a range is at it.
+/// A value closer to a bound than this share of the range is at the bound.
 const EDGE: f64 = 1e-6;
 
 impl Node<'_> {
-    /// The size of every added effect lies inside its plausible range, neither absent nor at the far end, and no level is beyond
-    /// what is physical.
+    /// Whether the size of every added effect is inside its plausible range, neither absent nor at the far end, and every level is
+    /// physical.
     pub fn plausible(&self) -> bool {
         !self.added.iter().any(|placed| self.at_the_edge(*placed)) && self.credible()
     }
 
-    /// No added effect is absent, and no level is beyond what is physical. While much is missing, a size may be driven to its far bound
-    /// by what it stands in for beside itself.
+    /// Whether no added effect is absent, and every level is physical. While other effects are missing, a size may reach its far bound
+    /// because it compensates for them.
     pub fn possible(&self) -> bool {
         let absent = |placed: &Placed| {
             self.size_of(*placed).is_some_and(|(size, at)| {
@@ -46,12 +47,12 @@ impl Node<'_> {
         !self.added.iter().any(absent) && self.credible()
     }
 
-    /// What the effects make of the levels and readings is physical, and is to be seen in the records.
+    /// Whether the effects' consequences for levels and readings are physical and visible in the records.
     fn credible(&self) -> bool {
         self.physical() && !self.reads_beyond_limit() && !self.drops_unseen()
     }
 
-    /// The reading still rises with the level where the model has it at the sensor's limit: then the limit is not the sensor's.
+    /// The reading still rises with the level although the model is at the sensor's limit: then the limit is not real.
     fn reads_beyond_limit(&self) -> bool {
         let structure = &self.setup.structure;
         let Some(placed) = self.added.iter().find(|placed| placed.effect.id == LIMIT) else {
@@ -79,7 +80,7 @@ impl Node<'_> {
         unlimited().is_some_and(|correlation| correlation > RISES)
     }
 
-    /// No level lies above the tank's rim where that is known, or so far above the readings that the model has lost its way.
+    /// Whether no level is above the tank's rim, if it is known, or far above the readings.
     fn physical(&self) -> bool {
         let structure = &self.setup.structure;
         if structure.plant.outlet() != Outlet::Torricelli {
@@ -99,7 +100,7 @@ impl Node<'_> {
         })
     }
 
-    /// The model's reading drops, or rises, by a step at instants at which the record does not.
+    /// The model's reading has a step at instants at which the record has none.
     fn drops_unseen(&self) -> bool {
         let Some(placed) = self.added.iter().find(|placed| placed.effect.id == DROPS) else {
             return false;
@@ -146,7 +147,7 @@ impl Node<'_> {
         unseen().unwrap_or(false)
     }
 
-    /// Of series for each record and output those of the output that an effect is at.
+    /// From the series of each record and output, those of the output at which an effect acts.
     fn of_output(&self, placed: Placed, series: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let own = series.into_iter().skip(placed.vessel);
         own.step_by(self.setup.outputs()).collect()

@@ -1,4 +1,4 @@
-//! What a set may be extended by, and what that promises.
+//! Extensions of a set by one effect, and the predicted reduction of the cost.
 
 use std::sync::OnceLock;
 
@@ -13,22 +13,22 @@ use crate::fit::{
     starts::grid,
 };
 
-/// Damping of the step that a promise takes, against what the data do not determine.
+/// Damping of the step for the predicted reduction, against directions that the data do not determine.
 const PROMISE_DAMPING: f64 = 1e-6;
-/// Starts of a new effect that are followed down, the most promising of its grid.
+/// Number of starts of a new effect that are fitted, those with the largest predicted reduction.
 const FOLLOWED: usize = 2;
 
-/// Starts of an effect beside two others or more.
+/// Distance of starts on the coarser grid for an effect in addition to two or more others.
 const COARSE: usize = 10;
 
-/// Effects of a set that follow the clock alone. Two of them whose signs oppose each other (the outlet opens while the pump
-/// gains) leave a difference that bends as it likes: with a third they fit any slow course of time, whatever made it.
+/// Largest number of functions of time in a set. Two of them with opposite signs (the outlet opens while the pump gains) have a flexible
+/// difference: with a third one they fit any slow disturbance.
 const BY_CLOCK: usize = 1;
 
-/// The cost after one step from a start, as the linearised model there predicts it.
+/// The cost after one step from a start, as its linearised model predicts.
 ///
-/// The step is hardly damped: an effect that the other parameters nearly imitate takes long steps in both, and a damped one would
-/// leave the start's own error in the promise.
+/// The step has little damping: for an effect that is nearly collinear with other parameters, both take
+/// long steps, and damping would leave the error of the start in the prediction.
 fn promise(setup: &Setup, x: &[f64], triangle: &Triangle) -> f64 {
     let free: Vec<usize> = (0..setup.free().len()).collect();
     let scale: Vec<f64> = free.iter().map(|&j| triangle.column_norm(j)).collect();
@@ -45,7 +45,7 @@ fn promise(setup: &Setup, x: &[f64], triangle: &Triangle) -> f64 {
     triangle.predicted(&step)
 }
 
-/// One effect more, at its most promising starts.
+/// One more effect, at its best starts by predicted reduction.
 #[derive(Clone)]
 pub(crate) struct Proposal<'a> {
     pub setup: Setup<'a>,
@@ -54,7 +54,7 @@ pub(crate) struct Proposal<'a> {
     pub promise: f64,
 }
 
-/// A node that is extended, and the period that shows most in what it does not explain, once it was asked for.
+/// A model that is extended, and the dominant period of its residual, computed on demand.
 pub(crate) struct Parent<'n, 'a> {
     pub node: &'n Node<'a>,
     period: OnceLock<Option<f64>>,
@@ -78,8 +78,8 @@ impl<'n, 'a> Parent<'n, 'a> {
         if placed.effect.id == hidden_step::EFFECT
             && structure.scales.outputs[output].reading_step == 0.0
         {
-            // One effect asks for it. It is looked for by all threads, and must not be kept in a cell: a thread that waits for the
-            // others may take up the next proposal, which would ask the cell that it is filling.
+            // Only one effect needs this step. All threads compute it, and it must not be stored in a cell: a thread that waits for the
+            // others may start the next proposal, which would read the cell that is being filled.
             let step = hidden_step(self.node, output).ok().flatten();
             structure.scales.outputs[output].hidden_step = step;
         }
@@ -111,7 +111,7 @@ pub(crate) fn propose<'a>(
     })
 }
 
-/// The most promising starts of a new effect, the other parameters being where they are in `from`, and the best one's promise.
+/// The best starts of a new effect by predicted reduction, with the other parameters from `from`, and the largest predicted reduction.
 pub(crate) fn promising(
     from: &Node,
     setup: &Setup,
@@ -120,7 +120,7 @@ pub(crate) fn promising(
 ) -> Option<(f64, Vec<Start>)> {
     let mut starts = grid(from, setup, placed);
     if from.added.len() > 1 {
-        // Beside a pair, what is the third is looked for on a coarser grid.
+        // For pairs, a third effect is searched on a coarser grid.
         starts = every_so_many(starts, COARSE);
     }
     keep_shown_periods(setup, placed, &mut starts, noise);
@@ -142,7 +142,7 @@ pub(crate) fn promising(
     Some((promise, starts))
 }
 
-/// At most so many of a list, evenly over it.
+/// A limited number of items of a list, evenly spaced.
 fn every_so_many(starts: Vec<Vec<f64>>, most: usize) -> Vec<Vec<f64>> {
     let step = starts.len().div_ceil(most);
     starts.into_iter().step_by(step.max(1)).collect()
@@ -162,12 +162,12 @@ pub(crate) fn realise<'a>(
     Some(widened(node, noise, stopping))
 }
 
-/// The node with the range of its newest size widened and fitted again, where that ended at the bound and a larger size fits better.
+/// The model with a wider range of its newest size, fitted again, if the size ended at the bound and a larger size fits better.
 fn widened<'a>(node: Node<'a>, noise: &Noise, stopping: Stopping) -> Node<'a> {
     let again = || {
         let placed = *node.added.last()?;
         let (size, at) = node.size_of(placed)?;
-        // At the absent value there is nothing to widen.
+        // At the absent value no widening is needed.
         let absent = (node.fit.x[at] - size.absent).abs() <= 1e-6 * (size.upper - size.lower);
         if absent || !node.at_the_edge(placed) || node.setup.out_of_time() {
             return None;
@@ -184,13 +184,13 @@ fn widened<'a>(node: Node<'a>, noise: &Noise, stopping: Stopping) -> Node<'a> {
     again().unwrap_or(node)
 }
 
-/// All single extensions of a node, refitted, best first.
+/// All extensions of a set by one effect, refitted, best first.
 pub(crate) fn singles<'a>(parent: &Node<'a>, noise: &Noise) -> Vec<Node<'a>> {
     let proposals = proposals(parent, noise);
     best_first(realise_all(proposals, noise, ROUGH))
 }
 
-/// All extensions of a node by one effect, not fitted, the most promising first.
+/// All extensions of a set by one effect, not fitted, with the largest predicted reduction first.
 pub(crate) fn proposals<'a>(parent: &Node<'a>, noise: &Noise) -> Vec<Proposal<'a>> {
     let from = Parent::new(parent);
     let mut proposals: Vec<Proposal> = candidates(parent)
@@ -212,7 +212,7 @@ pub(crate) fn realise_all<'a>(
         .collect()
 }
 
-/// What may be added to a set.
+/// Effects that may be added to a set.
 pub(crate) fn candidates(parent: &Node) -> Vec<Placed> {
     let mut candidates = parent.setup.structure.candidates();
     let on = parent.setup.structure.effects().iter();
@@ -222,7 +222,7 @@ pub(crate) fn candidates(parent: &Node) -> Vec<Placed> {
     candidates
 }
 
-/// Whether some effect more makes a promise that is `worth` it.
+/// Whether some further effect has a predicted reduction that is `worth` it.
 pub(crate) fn any_promise(
     parent: &Node,
     noise: &Noise,
@@ -235,8 +235,7 @@ pub(crate) fn any_promise(
     })
 }
 
-/// The node with one given effect more, fitted so far; `known` is a fit of a larger set, whose values serve as a
-/// further start.
+/// The model with one given additional effect, fitted; `known` is a fit of a larger set, whose values are a further start.
 pub(crate) fn place<'a>(
     parent: &Node<'a>,
     placed: Placed,
@@ -246,7 +245,7 @@ pub(crate) fn place<'a>(
 ) -> Option<Node<'a>> {
     let from = Parent::new(parent);
     let proposal = propose(&from, placed, noise).or_else(|| {
-        // Out of time the larger set's values are the only start.
+        // If the time is over, the larger set's values are the only start.
         let setup = from.with(placed)?;
         let mut added = parent.added.clone();
         added.push(placed);
@@ -259,7 +258,7 @@ pub(crate) fn place<'a>(
     });
     let mut proposal = proposal?;
     let start = transfer(known, &proposal.setup);
-    // First, since out of time one start is followed.
+    // First in the list, because only one start is used if the time is over.
     proposal.starts.insert(0, start.into());
     realise(proposal, noise, stopping)
 }

@@ -2,15 +2,15 @@
 
 use ct_signals::{Channel, Record};
 
-/// Every output with the record that it is of.
+/// Every output with its record.
 pub(crate) fn series(records: &[Record]) -> impl Iterator<Item = (&Record, &Channel)> {
     records
         .iter()
         .flat_map(|record| record.outputs.iter().map(move |output| (record, output)))
 }
 
-/// Series in units of their root mean square, which is that of all series of an output together: outputs then count by their noise. An
-/// output that is nothing but zeros stays as it is.
+/// Series divided by the root mean square over all series of an output: outputs then have weights by their noise. An output of zeros does
+/// not change.
 pub(crate) fn standardised(mut series: Vec<Vec<f64>>, outputs: usize) -> Vec<Vec<f64>> {
     for output in 0..outputs {
         let own = || series.iter().skip(output).step_by(outputs);

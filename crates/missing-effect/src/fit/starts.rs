@@ -1,19 +1,19 @@
-//! Where the fit of a set with one effect more begins: the grid of the effect's own starts, beside other values of the plant where these matter.
+//! Starts of a fit with one more effect: the grid of the effect's starts, combined with other values of the plant if these matter.
 
 use greybox::{Setup, with_other_speeds};
 use plants::{Place, Placed, Plant, Unit};
 
 use super::node::{Node, position_of, transfer};
 
-/// Effects that the believed model of two tanks imitates by too large a throughput: tanks that push on each other, and what water
-/// leaves the upper tank by beside its outlet.
+/// Effects that the believed model of two tanks compensates for by too large a flow: coupled tanks, and additional outflow from the upper
+/// tank.
 const COUPLED: &str = "coupled_tank";
 const LEAVES: [&str; 2] = ["overflow", "leak_at_height"];
 
-/// A child's starts: the vector of a node, with the new effect's parameters on the grid of its starts.
+/// Starts of an extended model: the vector of the model, with the new effect's parameters on the grid of its starts.
 ///
-/// Parameters that the plant alone does not tell apart lie in one order or the other by chance. An effect in a vessel tells
-/// them apart, and from the wrong order no fit comes to the right one.
+/// Parameters that the plant alone does not tell apart lie in one order or the other by chance. An effect in a vessel distinguishes them,
+/// and from the wrong order no fit comes to the right one.
 pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     let mut begun = vec![transfer(from, child)];
     let less = with_less_throughput(&begun[0], child, placed);
@@ -63,11 +63,11 @@ pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> 
         .collect()
 }
 
-/// Parts of the throughput, where a fit may have taken it several times too high.
+/// Fractions of the throughput, because a fit may have overestimated it several times.
 const LESS_THROUGHPUT: [f64; 2] = [0.4, 0.2];
 
-/// Two tanks with a part of their throughput, and what the upper tank's levels are multiplied by: the lower level stays, the upper tank is
-/// as much lower.
+/// Two tanks with a fraction of their throughput, and the factor of the upper tank's levels: the lower level does not change, the upper
+/// level falls accordingly.
 ///
 /// Two tanks that push on each other have time constants far apart, and a tank that runs over passes on less the fuller it is. The model
 /// without these imitates that by a high upper tank above a quick lower one, with several times the throughput, and from there a fit ends

@@ -7,17 +7,17 @@ use serde::{Deserialize, Serialize};
 pub struct ControlLoop {
     /// The loop was simulated from its reference; otherwise the model ran on the measured command.
     pub simulated: bool,
-    /// p-value of the test that the noise does not show in the command; `None` where a controller is known.
+    /// p-value of the hypothesis that the command does not depend on the noise; `None` if a controller is known.
     pub feedback_p: Option<f64>,
-    /// Measured command less the one that the controller gives on the measured reading, root mean square, in the input's
-    /// unit; `None` where that was not looked at.
+    /// Measured command minus the controller's output for the measured reading, root mean square, in the input's unit; `None` if not
+    /// computed.
     pub mismatch: Option<f64>,
-    /// What the user should know of it, in words.
+    /// Notes on the loop for the user, in words.
     pub said: Vec<String>,
 }
 
 impl ControlLoop {
-    /// A loop whose model ran on the measured command, and what that means.
+    /// A loop whose model ran on the measured command, with the consequences.
     pub(crate) fn measured(feedback_p: Option<f64>, mismatch: Option<f64>, said: String) -> Self {
         Self {
             simulated: false,
@@ -27,7 +27,7 @@ impl ControlLoop {
         }
     }
 
-    /// Standard errors have to allow for what feedback does.
+    /// Standard errors have to include the bias from feedback.
     pub(crate) fn widens(known: Option<&Self>) -> bool {
         known.is_some_and(|known| !known.simulated)
     }

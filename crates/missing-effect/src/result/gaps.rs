@@ -1,4 +1,4 @@
-//! What was done about gaps in records.
+//! Handling of gaps in records.
 
 use ct_signals::Gaps;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// An input is held through a gap of at most this part of the fastest time constant.
 pub const LONGEST_HOLD: f64 = 0.1;
 
-/// What was done about gaps in records.
+/// Handling of gaps in records.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MendedGaps {
     /// Rows and places.

@@ -1,5 +1,4 @@
-//! The result of a diagnosis: plain structs, written as JSON as they stand; everything that is
-//! printed or plotted is derived from them.
+//! The result of a diagnosis: plain structs, written to JSON unchanged; all printed and plotted results are derived from them.
 
 mod control_loop;
 mod gaps;
@@ -34,46 +33,46 @@ pub(crate) use self::{
     unknown::SHAPES,
 };
 
-/// How times are said where no calendar is known.
+/// Format of times without a calendar.
 fn plain_clock() -> Clock {
     Clock::of([])
 }
 
-/// What was spent, and what the limit on the time left out.
+/// Time spent, and steps that the time limit left out.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Effort {
     /// Limit on the search \[s\]; `None`: no limit.
     pub limit: Option<f64>,
     /// Steps of the search that were cut short or left out; empty where all were done.
     pub left_out: Vec<String>,
-    /// The user ended the search, and this is the best so far.
+    /// The user ended the search, and this is the best result so far.
     pub interrupted: bool,
 }
 
-/// What a diagnosis found. Read again from JSON it has all that is written there; records, simulated series and the clock are not.
+/// Result of a diagnosis. A result that is read from JSON has everything except records, simulated series and the clock.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Version of this layout.
     pub schema: u32,
-    /// The finding; after a comparison, which searches nothing, `Unexplained` where the model lacks something.
+    /// The verdict; after a comparison, which searches nothing, `Unexplained` if the model is incomplete.
     pub verdict: Verdict,
-    /// How the times of the records are said.
+    /// Format of the times of the records.
     #[serde(skip, default = "plain_clock")]
     pub clock: Clock,
-    /// What was done about rows and samples of inputs that are missing; `None` where none are.
+    /// Handling of missing rows and samples of inputs; `None` if there are none.
     pub gaps: Option<MendedGaps>,
     /// The effects that were added, in order.
     pub effects: Vec<String>,
-    /// For each of them itself, then all that cannot be told apart from it on these data, best first.
+    /// For each added effect: the effect and all effects that these data cannot distinguish from it, best first.
     pub groups: Vec<Vec<String>>,
-    /// For each of them whether it is in doubt: its size ends at the edge of what is plausible, so that it describes the data
-    /// rather than explains them.
+    /// For each added effect whether it is uncertain: its size is at a bound of its plausible range, so that it may describe the data
+    /// without being the cause.
     pub in_doubt: Vec<bool>,
-    /// For each of them the places where it may act, most likely first; one where there is no choice.
+    /// For each added effect the places where it may act, most likely first; one place if there is no choice.
     pub places: Vec<Vec<PlaceScore>>,
     /// The acceptance test; `None` after a comparison, which searches nothing, and where the model is adequate.
     pub acceptance: Option<Acceptance>,
-    /// What the last model leaves is more than noise: something is missing still, or a disturbance acts.
+    /// The residual of the last model is more than noise: an effect is missing, or a disturbance acts.
     pub residual_unexplained: bool,
     /// The single effects, best first, at the first step; `none` first when the model is adequate.
     pub ranked: Vec<String>,
@@ -90,13 +89,13 @@ pub struct Diagnosis {
     pub noise: Vec<NoiseFloor>,
     /// The single effects under both weightings.
     pub rankings: Rankings,
-    /// The limit on the time, and what it left out.
+    /// The time limit, and the steps that were left out.
     pub effort: Effort,
     /// The scores of the single effects at the first step, best first.
     pub scores: Vec<Score>,
-    /// What is missing where the catalogue does not explain it.
+    /// The unexplained error, if the catalogue does not explain it.
     pub unknown: Option<Unknown>,
-    /// The loop that the records come from, where there is one.
+    /// The control loop of the records, if there is one.
     pub control_loop: Option<ControlLoop>,
     /// The findings in words.
     pub sentences: Vec<String>,
@@ -122,7 +121,7 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// The domain of the model, which says what things are called.
+    /// Physical domain of the model, which determines the words.
     #[must_use]
     pub fn domain(&self) -> Domain {
         domain_of(&self.plant, &self.output_unit)
@@ -134,7 +133,7 @@ impl Diagnosis {
         self.output_units.get(output).unwrap_or(&self.output_unit)
     }
 
-    /// Adds what is known of the loop, and what there is to say of it.
+    /// Adds the description of the loop, and remarks on it.
     pub(crate) fn speak_of_the_loop(&mut self, known: Option<ControlLoop>) {
         if let Some(known) = &known {
             self.sentences.extend_from_slice(&known.said);

@@ -23,8 +23,7 @@ pub struct NoiseFloor {
 }
 
 impl NoiseFloor {
-    /// The noise that a residual is judged against: that of the floor's level and, where that is the noise's own, of its
-    /// colour.
+    /// Noise model for residual tests: the level of the noise floor and, if the floor is that of the noise, its spectrum.
     fn model(&self) -> Result<ArModel, ct_signals::Error> {
         if self.level > self.innovation {
             ArModel::from_coefficients(&self.coefficients, self.innovation)
@@ -38,13 +37,13 @@ impl NoiseFloor {
 #[derive(Debug, Clone)]
 pub(crate) struct Floors(pub Vec<NoiseFloor>);
 impl Floors {
-    /// The noise that residuals are judged against.
+    /// Noise model for residual tests.
     pub fn noise(&self) -> Result<Noise, ct_signals::Error> {
         let models: Result<_, _> = self.0.iter().map(NoiseFloor::model).collect();
         Ok(Noise::of(models?))
     }
 
-    /// The floors, which no model that was fitted lies below: what it leaves holds the noise.
+    /// Limits the noise floors by the errors of the fitted models: a model's error contains the noise.
     pub fn at_most(mut self, rmse: &[f64]) -> Self {
         for (floor, rmse) in self.0.iter_mut().zip(rmse) {
             floor.level = floor.level.min(*rmse);
@@ -53,12 +52,14 @@ impl Floors {
         self
     }
 
-    /// The floors where the residual is not noise alone: what a model lacks is in the residual too, but hardly in what
-    /// cannot be predicted from the residual's own past.
+    /// The noise floors if the residual is not noise alone: the residual contains the model error too, but its innovations hardly do.
     pub fn of_what_is_new(mut self) -> Self {
         for floor in &mut self.0 {
             floor.level = floor.innovation;
-            floor.source = format!("what the past of {} does not predict", floor.source);
+            floor.source = format!(
+                "innovation of {}: the part that its past does not predict",
+                floor.source
+            );
         }
         self
     }

@@ -1,4 +1,4 @@
-//! A fitted parameter with its standard error and what was known of it before.
+//! A fitted parameter with its standard error and its prior.
 
 use greybox::PriorValue;
 use serde::{Deserialize, Serialize};
@@ -8,30 +8,30 @@ use crate::numbers::value_and_error;
 /// A fitted parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Its name, `alpha` or `overflow.rim`; initial states are `level(0)` and the like.
+    /// Name of the parameter, `alpha` or `overflow.rim`; initial states are `level(0)` and the like.
     pub name: String,
     /// The estimate, in `unit`.
     #[serde(deserialize_with = "crate::result::number")]
     pub value: f64,
-    /// Its standard error, in `unit`; `None` where the data do not determine it or it sits at a bound.
+    /// Standard error, in `unit`; `None` if the data do not determine the value or it is at a bound.
     pub std_error: Option<f64>,
     /// Unit, for example `cm^2.5/s`.
     pub unit: String,
-    /// What is known of it beside the records, where the model says so; the estimate has it in it.
+    /// Prior of the parameter, if the model file has one; the estimate includes it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorValue>,
 }
 
-/// Records that are further from a prior than so many standard errors of the two together disagree with it.
+/// A record disagrees with a prior if their distance exceeds this number of standard errors of both together.
 const DISAGREES: f64 = 3.0;
 
 impl Parameter {
-    /// Its prior in words, and how far it is from there where the two disagree.
+    /// The prior in words, and the distance of the estimate if the two disagree.
     #[must_use]
     pub fn prior_words(&self) -> Option<String> {
         let prior = self.prior?;
         let (value, error) = value_and_error(prior.value, Some(prior.std_error));
-        // The estimate has the prior in it: their difference is the less uncertain the better the prior is beside the records.
+        // The estimate includes the prior: the more precise the prior relative to the records, the less uncertain is their difference.
         let own = self.std_error.map_or(0.0, |error| error * error);
         let variance = prior.std_error * prior.std_error - own;
         let scale = if variance > 0.0 {

@@ -1,8 +1,8 @@
-//! Numbers that may not be finite: JSON writes them as `null`, or leaves them out.
+//! Numbers that may not be finite: JSON has `null` for them, or omits them.
 
 use serde::{Deserialize, Deserializer};
 
-/// There is no such number.
+/// Whether the number is missing.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
 pub(crate) fn none(value: &f64) -> bool {
     value.is_nan()
@@ -13,7 +13,7 @@ pub(crate) fn number<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error
     Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
-/// The same of several.
+/// Reads several numbers, some of them missing.
 pub(crate) fn numbers<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
     let all = Vec::<Option<f64>>::deserialize(from)?;
     Ok(all.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect())

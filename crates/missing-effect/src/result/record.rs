@@ -1,14 +1,14 @@
-//! A record as the report shows it.
+//! A record for the report.
 
 use ct_signals::Record;
 use serde::{Deserialize, Serialize};
 
-/// A record as the report shows it.
+/// A record for the report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Shown {
     /// Name.
     pub name: String,
-    /// It took no part in any fit or choice.
+    /// Whether the record was held out: not used for fits or selection.
     pub held_out: bool,
     /// Sampling instants \[s\].
     #[serde(deserialize_with = "crate::result::numbers")]
@@ -19,20 +19,20 @@ pub struct Shown {
     pub outputs: Vec<Vec<f64>>,
 }
 
-/// An input of a record as the report shows it.
+/// An input of a record for the report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShownInput {
-    /// How it is called: `input`, `input 2`, or its own name.
+    /// Name of the signal: `input`, `input 2`, or its own name.
     pub name: String,
-    /// Its unit; empty where none is known.
+    /// Unit of the signal; empty if unknown.
     pub unit: String,
-    /// Its samples \[unit\].
+    /// Samples of the signal \[unit\].
     #[serde(deserialize_with = "crate::result::numbers")]
     pub values: Vec<f64>,
 }
 
 impl Shown {
-    /// A record; `held_out`: it takes no part in any fit or choice.
+    /// A record; `held_out`: not used for fits or selection.
     #[must_use]
     pub fn of(record: &Record, held_out: bool) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl Shown {
         }
     }
 
-    /// Readings that are there, of all outputs.
+    /// Number of present readings of all outputs.
     #[must_use]
     pub fn samples(&self) -> usize {
         let readings = self.outputs.iter().flatten();

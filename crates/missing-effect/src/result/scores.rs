@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Parameter, PerOutput};
 
-/// One candidate of the catalogue at the first step.
+/// One candidate of the catalogue in the first step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Score {
     /// The effect.
@@ -21,21 +21,20 @@ pub struct Score {
     )]
     #[serde(deserialize_with = "crate::result::number")]
     pub rmse: f64,
-    /// The same of all outputs, each divided by the noise floor of its output.
+    /// Error of all outputs together, each divided by the noise floor of its output.
     #[serde(deserialize_with = "crate::result::number")]
     pub weighted_rmse: f64,
-    /// `|p|/|j|`: the part of the effect's signature that the fitted parameters cannot imitate.
+    /// `|p|/|j|`: the share of the effect's signature that the fitted parameters cannot compensate for.
     #[serde(deserialize_with = "crate::result::number")]
     pub visibility: f64,
     /// The size that was found: the effect's leading parameter.
     pub size: Option<Parameter>,
-    /// The smallest size that these data would show, in the unit of `size`; `None` where the effect has no signature while it is absent, or
-    /// the fitted parameters imitate all of it.
+    /// Minimum detectable size in the unit of `size`; `None` if the effect has no signature at its absent value, or if the fitted
+    /// parameters compensate for all of it.
     pub smallest_visible: Option<f64>,
 }
 
-/// The acceptance test of the effects that are reported or, where none is, of the best that were refused: one test for all
-/// verdicts.
+/// Acceptance test of the reported effects or, if there is none, of the best rejected ones: the same test for all verdicts.
 ///
 /// An effect is the answer (`effect`, `undecided`) where it leaves noise, or explains `required` of the excess error; it is a
 /// part of the answer (`partial`) where it explains `required_partial`; else nothing explains the record.
@@ -46,26 +45,26 @@ pub struct Acceptance {
     /// Part of the excess error that they explain on the fitted records: the fall of the mean squared simulation error over
     /// its excess above `floor` squared, at most 1; of several outputs errors are divided by `floor` first.
     pub share: Option<f64>,
-    /// The same on the held-out records; it takes no part in the verdict.
+    /// Share on the held-out records; it does not affect the verdict.
     pub share_test: Option<f64>,
-    /// Least `share` of an answer that leaves more than noise.
+    /// Least `share` of a set whose residual is more than noise.
     #[serde(deserialize_with = "crate::result::number")]
     pub required: f64,
-    /// Least `share` of a partial answer.
+    /// Least `share` of a partial explanation.
     #[serde(deserialize_with = "crate::result::number")]
     pub required_partial: f64,
-    /// Standard deviation of the noise that is no excess, by output \[output unit\].
+    /// Standard deviation of the noise that is not excess error, by output \[output unit\].
     pub floor: PerOutput,
-    /// Fall of the criterion (BIC), each model under the noise model of its own residual.
+    /// Fall of the criterion (BIC), each model with the noise model of its own residual.
     pub bic_fall: Option<f64>,
-    /// What it has to exceed.
+    /// Least fall for acceptance.
     #[serde(deserialize_with = "crate::result::number")]
     pub required_bic_fall: f64,
-    /// Why the effects were refused, or are a part of the answer only; empty where they are the answer.
+    /// Reasons why the effects were rejected, or explain the data only in part; empty if they are accepted.
     pub reasons: Vec<String>,
 }
 
-/// Where an effect may act, and how likely each place is.
+/// A place where an effect may act, and its likelihood.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlaceScore {
     /// The vessel or pump.
@@ -78,10 +77,10 @@ pub struct PlaceScore {
 /// The single effects ranked under two weightings of the residual.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rankings {
-    /// By the simulation error (white noise), best first.
+    /// Ranking by the simulation error (white noise), best first.
     pub white: Vec<String>,
     /// Prewhitened by the noise model (GLS), best first; empty where the noise is white.
     pub prewhitened: Vec<String>,
-    /// The best effects differ beyond what data of this kind tell apart.
+    /// The best effects of the two rankings differ by more than the margin of a group.
     pub disagree: bool,
 }

@@ -1,4 +1,4 @@
-//! One model on the way from the base to the last set of effects: its errors, its parameters, its residual tests and where it fails.
+//! One of the models from the base to the last set of effects: its errors, its parameters, its residual tests and where it fails.
 
 use serde::{Deserialize, Serialize};
 
@@ -27,10 +27,10 @@ pub struct ResidualTests {
     pub input_p: f64,
 }
 
-/// The residual in one bin of something: a time window, a range of level, of flow, ...
+/// The residual in one bin: a time window, a range of level, of flow, ...
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Bin {
-    /// Position of the record that a window lies in, fitted ones first; `None` where all fitted records are counted.
+    /// Position of the record of a window, fitted ones first; `None` for all fitted records together.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub record: Option<usize>,
     /// Lower edge.
@@ -47,28 +47,28 @@ pub struct Bin {
     /// Root mean square of the residual, in the output's unit.
     #[serde(deserialize_with = "crate::result::number")]
     pub rms: f64,
-    /// It fails: its mean square is clearly above what the noise would show there.
+    /// Whether the model fails in the bin: its mean square is clearly above the expected one for noise.
     pub fails: bool,
 }
 
-/// Where a model fails, in all records that it was fitted to.
+/// Regions where a model fails, in all fitted records.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Failures {
-    /// By time \[s\], record by record.
+    /// Bins by time \[s\], record by record.
     pub by_time: Vec<Bin>,
-    /// By the model's level, in the output's unit.
+    /// Bins by the model's level, in the output's unit.
     pub by_level: Vec<Bin>,
-    /// By the command to the actuator (the flow into the process), in the input's unit.
+    /// Bins by the command to the actuator (the flow into the process), in the input's unit.
     pub by_flow: Vec<Bin>,
-    /// By direction of change of the model's level: falling, steady, rising (the edges are rates per second).
+    /// Bins by direction of change of the model's level: falling, steady, rising (the edges are rates per second).
     pub by_direction: Vec<Bin>,
-    /// By frequency \[Hz\]: the root mean square of the residual in octave bands.
+    /// Bins by frequency \[Hz\]: the root mean square of the residual in octave bands.
     pub by_frequency: Vec<Bin>,
-    /// The same in words, the worst first.
+    /// Sentences about the failures, the worst first.
     pub sentences: Vec<String>,
 }
 
-/// One model on the way: the base, or the base and the effects added so far.
+/// One of the reported models: the base, or the base and the effects added so far.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// The effect that this step added; `None` for the base.
@@ -82,7 +82,7 @@ pub struct Step {
     )]
     #[serde(deserialize_with = "crate::result::number")]
     pub rmse: f64,
-    /// The same on the held-out record, whose first five samples set its initial states and are not scored.
+    /// Simulation error on the held-out record, whose first five samples determine its initial states and are not scored.
     pub rmse_test: Option<f64>,
     /// `rmse` of each output by its name.
     pub rmse_per_output: PerOutput,
@@ -91,25 +91,25 @@ pub struct Step {
     /// Root mean square of the simulation errors of all outputs, each divided by the noise floor of its output: one is the noise.
     #[serde(deserialize_with = "crate::result::number")]
     pub weighted_rmse: f64,
-    /// The same on the held-out record.
+    /// Weighted error on the held-out record.
     pub weighted_rmse_test: Option<f64>,
-    /// Bayesian information criterion with this model's own noise colour; smaller is better.
+    /// Bayesian information criterion with the noise model of this model's residual; smaller is better.
     #[serde(deserialize_with = "crate::result::number")]
     pub bic: f64,
     /// Parameters in chain order, initial states last.
     pub parameters: Vec<Parameter>,
-    /// How many starts were tried.
+    /// Number of starts.
     pub starts: usize,
-    /// How many of them ended in the best minimum.
+    /// Number of starts that ended in the best minimum.
     pub starts_agree: usize,
-    /// What it shows at each output, in order.
+    /// Results at each output, in order.
     pub outputs: Vec<OutputStep>,
     /// The model's simulated outputs, one series per fitted record and, within it, output, then those of the held-out records.
     #[serde(skip)]
     pub simulated: Vec<Vec<f64>>,
 }
 
-/// What one model shows at one output.
+/// Results of one model at one output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutputStep {
     /// Its name.
@@ -117,27 +117,27 @@ pub struct OutputStep {
     /// Root mean square of the simulation error on the fitted records, in the output's unit.
     #[serde(deserialize_with = "crate::result::number")]
     pub rmse: f64,
-    /// The same on the held-out records.
+    /// Simulation error on the held-out records.
     pub rmse_test: Option<f64>,
     /// The parts of `rmse_test`; `None` without held-out records.
     pub held_out_error: Option<HeldOutError>,
     /// Residual tests.
     pub tests: ResidualTests,
-    /// Where it fails.
+    /// Regions where the model fails.
     pub failures: Failures,
 }
 
-/// The mean squared error on held-out records, split into what an offset, a gain and neither of them explains, as root mean
-/// squares \[output unit\].
+/// The mean squared error on held-out records, split into the parts of an offset, a gain and the rest, as root mean squares \[output
+/// unit\].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOutError {
     /// Mean of measured minus model, record by record.
     #[serde(deserialize_with = "crate::result::number")]
     pub offset: f64,
-    /// What a factor on the model's deviations from its mean explains beside the offset.
+    /// Part of the error that a factor on the model's deviations from its mean explains in addition to the offset.
     #[serde(deserialize_with = "crate::result::number")]
     pub gain: f64,
-    /// What is left: the shape.
+    /// The rest of the error: the shape.
     #[serde(deserialize_with = "crate::result::number")]
     pub shape: f64,
 }

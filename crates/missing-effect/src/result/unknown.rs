@@ -1,9 +1,9 @@
-//! What is missing where the catalogue does not explain it.
+//! The unexplained error, if the catalogue does not explain it.
 
 use plants::{EffectInfo, Variable};
 use serde::{Deserialize, Serialize};
 
-/// A name that the program has: of a type of its own, as serde would borrow a plain reference from what is read.
+/// A name in the program: a separate type, because serde would borrow a plain reference from the input.
 pub(crate) type Name = &'static str;
 
 /// The names of simple shapes.
@@ -18,7 +18,7 @@ pub(crate) const SHAPES: [Name; 8] = [
     "swing",
 ];
 
-/// How likely the missing term acts at a place.
+/// Likelihood of a place of the missing term.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlaceLikelihood {
     /// `actuator`, `vessel` (`upper` or `lower` of two) or `sensor` (`sensor upper` of several).
@@ -28,7 +28,7 @@ pub struct PlaceLikelihood {
     pub below_best: f64,
 }
 
-/// How much of the missing term a variable predicts.
+/// Share of the missing term that a variable predicts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Share {
     /// The place.
@@ -36,10 +36,10 @@ pub struct Share {
     /// `level`, `rate` or `input`.
     #[serde(deserialize_with = "variable_name")]
     pub variable: Name,
-    /// Share of the fall of the squared error that is reached on parts of the data that were not fitted; one is all of it.
+    /// Share of the fall of the squared error that is reached on parts of the data that were not fitted; 1 means all of it.
     #[serde(deserialize_with = "crate::result::number")]
     pub share: f64,
-    /// Its standard error, from the scatter between the parts.
+    /// Standard error of the share, from its variation between the parts.
     #[serde(deserialize_with = "crate::result::number")]
     pub std_error: f64,
 }
@@ -60,13 +60,13 @@ fn variable_name<'de, D: serde::Deserializer<'de>>(from: D) -> Result<&'static s
     known.ok_or_else(|| serde::de::Error::custom(format_args!("no variable is called `{name}`")))
 }
 
-/// A stretch of time in which the missing term is clearly not zero.
+/// An interval in which the missing term differs clearly from zero.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Window {
-    /// Its beginning, in the record's time \[s\].
+    /// Begin in the record's time \[s\].
     #[serde(deserialize_with = "crate::result::number")]
     pub from: f64,
-    /// Its end \[s\].
+    /// End \[s\].
     #[serde(deserialize_with = "crate::result::number")]
     pub to: f64,
     /// Mean of the missing term in it, in the term's unit.
@@ -74,38 +74,38 @@ pub struct Window {
     pub mean: f64,
 }
 
-/// What is missing where the catalogue does not explain it.
+/// The unexplained error, if the catalogue does not explain it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unknown {
-    /// Where it acts: `actuator`, `vessel` (of several by its name, `upper` or `T1`) or `sensor`.
+    /// Place of the term: `actuator`, `vessel` (of several by its name, `upper` or `T1`) or `sensor`.
     pub place: String,
     /// Unit of the term: of the command, of a flow, or of the reading.
     pub unit: String,
     /// Every place, the most likely first.
     pub places: Vec<PlaceLikelihood>,
-    /// The first record's time, in its own count \[s\].
+    /// The first record's time, by its own clock \[s\].
     #[serde(deserialize_with = "crate::result::numbers")]
     pub time: Vec<f64>,
-    /// The missing term beside the fitted model.
+    /// The missing term in addition to the fitted model.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub value: Vec<f64>,
-    /// Its standard error.
+    /// Standard errors.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub std_error: Vec<f64>,
     /// The random walk's standard deviation after one second, in the term's unit.
     #[serde(deserialize_with = "crate::result::number")]
     pub intensity: f64,
-    /// Standard deviation of the measurement noise beside it, in the output's unit; of several outputs relative to the weighted mean.
+    /// Standard deviation of the measurement noise, in the output's unit; with several outputs relative to the weighted mean.
     #[serde(deserialize_with = "crate::result::number")]
     pub noise: f64,
-    /// Where it is clearly not zero, the strongest first.
+    /// Windows in which the term differs clearly from zero, the strongest first.
     pub windows: Vec<Window>,
-    /// Root mean square of the residual that it leaves, in the output's unit.
+    /// Root mean square of the residual after subtraction of the term, in the output's unit.
     #[serde(deserialize_with = "crate::result::number")]
     pub rmse: f64,
     /// Every variable, the best first.
     pub shares: Vec<Share>,
-    /// What it depends on: `level`, `rate`, `input`, or `time` where none of them predicts it.
+    /// Variable of the term: `level`, `rate`, `input`, or `time` if none of these predicts it.
     #[serde(deserialize_with = "variable_name")]
     pub variable: Name,
     /// Unit of the variable.
@@ -113,13 +113,13 @@ pub struct Unknown {
     /// Knots of the shape, in the variable's unit; time since the record began.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub knots: Vec<f64>,
-    /// The shape at the knots, without what the plant's own parameters imitate.
+    /// The function at the knots, without the part that the plant's own parameters explain.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub ordinates: Vec<f64>,
     /// Standard errors of the ordinates.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub ordinate_errors: Vec<f64>,
-    /// The nearest simple shape, where one comes near.
+    /// The closest simple function, if one is close.
     pub primitive: Option<Primitive>,
 }
 
@@ -129,9 +129,9 @@ pub struct Primitive {
     /// `constant`, `line`, `square root`, `parabola`, `threshold`, `end of a range`, `step` or `swing`.
     #[serde(deserialize_with = "family_name")]
     pub name: Name,
-    /// Where a threshold or a step lies, or the period of a swing, in the variable's unit.
+    /// Location of a threshold or a step, or the period of an oscillation, in the variable's unit.
     pub at: Option<f64>,
-    /// Effects of the catalogue that leave such a shape.
+    /// Effects of the catalogue with such a shape.
     #[serde(deserialize_with = "effect_names")]
     pub effects: Vec<&'static str>,
 }

@@ -1,4 +1,4 @@
-//! Confirmation: which effects of a set stay when the noise may explain what they explain.
+//! Backward elimination: removes effects of a set that the noise explains as well.
 
 use greybox::Noise;
 use rayon::prelude::*;
@@ -12,15 +12,16 @@ use crate::{
     search::exchange::{NEAR, exchanges},
 };
 
-/// Of the exchanges that come near so many are followed, the best; ...
+/// Number of the best swap steps that are refitted; ...
 const EXCHANGES: usize = 6;
-/// ... one of as many effects is taken where the criterion falls by this.
+/// ... a swap to the same number of effects is accepted if the criterion falls by this.
 const CLEARLY: f64 = 1.0;
 
-/// Takes out, one by one, what the noise explains as well, first what is worth least.
+/// Removes, one by one, effects that the noise explains as well, the least significant first.
 pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     loop {
-        // Each has its own share of the risk: that the one which is worth least is beyond chance says nothing of the others.
+        // Each effect is tested with a share of the significance level: a significant weakest effect does not imply that the others are
+        // significant.
         let lacking = each_lacking(&node, noise)?.into_iter();
         let doubtful = lacking.filter(|lacking| {
             node.gain_over(lacking) <= BIC_MARGIN || !beyond_chance(&node, lacking)
@@ -32,13 +33,13 @@ pub(crate) fn confirm<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>,
     }
 }
 
-/// Exchanges effects for others while that makes another one superfluous, or the whole better.
+/// Swaps effects for others while this makes another effect superfluous, or lowers the criterion.
 ///
-/// Of sets that take the same out of a residual the search follows one, and a stand-in that is nearly right calls for a
-/// further effect that mends it: on the emulated rig of a closed loop a raised outlet stood for the pump's dead zone, and a bent
-/// pump for the difference. With the dead zone in its place the bend is not needed.
+/// Among sets that explain the same part of a residual the search extends one, and a nearly right effect needs a further effect as a
+/// correction: on the emulated rig of a closed loop a raised outlet replaced the pump's dead zone, and a nonlinear pump the difference.
+/// With the dead zone the nonlinearity is not needed.
 pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
-    // Every round ends with fewer effects, or with a lower criterion of as many.
+    // Every round ends with fewer effects, or with a lower criterion for the same number.
     while node.added.len() > 1 {
         let mut others: Vec<Node<'a>> = (0..node.added.len())
             .into_par_iter()
@@ -77,7 +78,7 @@ pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>,
     Ok(node)
 }
 
-/// The node without the effect whose loss costs least; `None` where it has none.
+/// The model without the effect whose removal costs least; `None` without effects.
 pub(crate) fn least_useful<'a>(node: &Node<'a>, noise: &Noise) -> Result<Option<Node<'a>>, Error> {
     Ok(least_bic(each_lacking(node, noise)?.into_iter()))
 }

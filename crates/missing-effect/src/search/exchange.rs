@@ -1,4 +1,4 @@
-//! Sets in which one effect stands in the place of another.
+//! Swap steps: sets in which one effect replaces another.
 
 use greybox::Noise;
 use plants::{Placed, Unit};
@@ -12,17 +12,17 @@ use crate::{
     },
 };
 
-/// A rough fit this near in the criterion may come within a group's margin.
+/// A rough fit within this distance of the criterion may come within a group's margin.
 pub(crate) const NEAR: f64 = 25.0;
-/// Stand-ins that are refitted for each effect: so many that a promise favours, and so many that a few steps favour.
+/// Number of alternatives that are refitted for each effect: this many by predicted reduction, and this many after a few iterations.
 const EXCHANGED: usize = 12;
-/// In a set of more than so many effects half as many, and a few steps for so many: a fit costs several times as much.
+/// In larger sets half as many alternatives are refitted, and fewer for a few iterations, because a fit takes several times as long.
 const LARGE: usize = 2;
 const QUICKLY: usize = 16;
-/// What is behind by more than this part of an effect's own gain after a few steps does not catch up.
+/// A swap that is worse by more than this share of an effect's own gain after a few steps is dropped.
 const OUT_OF_REACH: f64 = 0.5;
 
-/// The node with one of its effects exchanged for each other candidate, refitted, best first.
+/// Swap steps: the set with one of its effects replaced by each other candidate, refitted, best first.
 ///
 /// `singles`: what [`singles`](crate::fit::proposal::singles) gives in the same metric. It holds the exchanges of an only effect.
 pub(crate) fn exchanges<'a>(
@@ -53,7 +53,7 @@ pub(crate) fn exchanges<'a>(
             near.then(|| fitted(&begun, noise, ROUGH, carried.as_slice()).ok())?
         })
         .map(|rough| {
-            // Who comes near is fitted to the end: a group's edge is finer than a rough fit.
+            // Alternatives near the margin are fitted to convergence: the margin is finer than the accuracy of a rough fit.
             if rough.fit.bic() - node.fit.bic() < NEAR {
                 refine(&rough, noise, &[]).unwrap_or(rough)
             } else {
@@ -64,7 +64,7 @@ pub(crate) fn exchanges<'a>(
     Ok(best_first(nodes))
 }
 
-/// A start of a stand-in whose size is of the same kind as that of the effect it stands for: the same size.
+/// A start of an alternative whose size is of the same kind as that of the effect that it replaces: the same size.
 ///
 /// What a lag of the pump is to the sensor's, a time constant that the data determine: from a grid of starts, with two more in
 /// the tanks to get out of its way, a fit creeps towards it.
@@ -77,7 +77,7 @@ fn carried(node: &Node, own: Placed, stand_in: &Node) -> Option<Vec<f64>> {
     }
     let mut x = transfer(node, &stand_in.setup);
     x[into] = node.fit.x[at].clamp(to.lower, to.upper);
-    // What else the stand-in has is where it is.
+    // The other parameters of the alternative keep their values.
     for (name, (value, fitted)) in stand_in
         .setup
         .names()
@@ -91,7 +91,7 @@ fn carried(node: &Node, own: Placed, stand_in: &Node) -> Option<Vec<f64>> {
     Some(x)
 }
 
-/// First fits of what may stand in the place of an effect; `lacking` is the node without it.
+/// First fits of the candidates that may replace an effect; `lacking` is the node without it.
 fn begin_exchanges<'a>(
     lacking: &Node<'a>,
     node: &Node<'a>,
@@ -105,8 +105,8 @@ fn begin_exchanges<'a>(
         .filter_map(|placed| {
             let mut proposal = propose(&from, placed, noise)?;
             proposal.starts.truncate(1);
-            // The model that lacks the effect has bent the other parameters to imitate it, and may have lost its way back.
-            // Beside a true stand-in they are where they are beside the effect itself.
+            // In the model without the effect, the other parameters have changed to compensate for it, and a fit from there may miss the
+            // minimum. With an equivalent alternative, the parameters have nearly the values that they have with the effect.
             if let Some((promise, starts)) = promising(node, &proposal.setup, placed, noise) {
                 proposal.starts.extend(starts.into_iter().take(1));
                 proposal.promise = proposal.promise.min(promise);
@@ -121,8 +121,8 @@ fn begin_exchanges<'a>(
         proposals.truncate(QUICKLY);
         EXCHANGED / 2
     };
-    // A promise is that of a straight line: where a time constant or a threshold bends it, only a few steps show what it is
-    // worth. A few steps are too few where parameters nearly imitate each other, and there the promise holds.
+    // The predicted reduction is linear: with nonlinear parameters such as a time constant or a threshold, only a few iterations show the
+    // actual reduction. If parameters are nearly collinear, a few iterations are too few, and the predicted reduction is used.
     let mut begun: Vec<(usize, Node)> = proposals
         .into_par_iter()
         .enumerate()

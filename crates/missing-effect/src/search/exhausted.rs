@@ -1,4 +1,4 @@
-//! Whether a set of effects leaves nothing to explain: then larger sets need no search.
+//! Whether the residual of a set is noise: then larger sets need no search.
 
 use greybox::{Setup, coloured};
 
@@ -13,18 +13,19 @@ use crate::{
     },
 };
 
-/// What is left to explain beside a set.
+/// Structure of the residual of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rest {
-    /// More than noise, or an effect more promises what it would cost.
+    /// More than noise, or a further effect has a predicted reduction above its penalty.
     Structure,
-    /// What looks like coloured noise; a noise model may have taken up an effect.
+    /// Coloured noise; the noise model may have absorbed an effect.
     Coloured,
-    /// Noise that hides no effect: it is white, or was searched before.
+    /// Noise that hides no effect: it is white, or this noise model was already used for a search.
     Noise,
 }
 
-/// What a set leaves: noise, where in the metric of that noise no effect more promises what it would cost.
+/// Residual of a set: noise, if no further effect has a predicted reduction above its penalty, with the noise model of the set's own
+/// residual.
 ///
 /// The colour is that of the set's own residual, so that a coloured noise does not keep the search going. A set beside this
 /// one, which leaves as little, is found where this one's effects are exchanged.

@@ -1,4 +1,4 @@
-//! The search: a set of effects, and the noise in whose metric it is confirmed.
+//! The search: a set of effects, and the noise model for its confirmation.
 
 use greybox::Noise;
 use rayon::prelude::*;
@@ -19,46 +19,46 @@ use crate::{
     },
 };
 
-/// Sets grown side by side, and refits of a size.
+/// Number of sets that are extended in parallel, and of refits per size.
 const BEAM: usize = 3;
 const REFITS: usize = 12;
-/// Sets are grown side by side up to so many effects, ...
+/// Sets are extended in parallel up to this number of effects, ...
 const SIDE_BY_SIDE: usize = 3;
-/// ... and one by one to so many where they pay.
+/// ... and one by one up to this number while the criterion falls.
 const RICHEST: usize = 6;
-/// In the metric of a noise that wanders they are grown to so many.
+/// With a drifting noise model, sets are grown up to this number.
 const WANDERING: usize = 2;
 
-/// What the search found.
+/// Result of the search.
 pub(crate) struct Found<'a> {
-    /// The richest model in play, by simulation error; its residual gives the noise.
+    /// The largest accepted model by simulation error; its residual gives the noise model.
     pub richest: Node<'a>,
     /// The noise model in whose weighting effects are confirmed; its memory is limited.
     pub noise: Noise,
-    /// The memory of the residual's own noise model was longer, so that it may hold slow physics.
+    /// The residual's own noise model has a longer memory, so it may contain slow physics.
     pub limited: bool,
-    /// The base, and what is confirmed, in the metric of the noise.
+    /// The base, and the confirmed set, with the noise weighting.
     pub base: Node<'a>,
     pub confirmed: Node<'a>,
     /// The sets that were grown by simulation error.
     pub grown: Grown<'a>,
-    /// Those that were grown in the weighting of the noise, where it is not white.
+    /// Sets that were grown with the noise model as weighting, if the noise is not white.
     pub prewhitened: Option<Grown<'a>>,
-    /// Whether the noise wanders.
+    /// Whether the noise drifts.
     pub wandering: bool,
-    /// Whether it does and something is confirmed: then models are compared and shown by their simulation error.
+    /// Whether the noise is not white and effects are confirmed: then models are compared and shown by their simulation error.
     pub by_simulation: bool,
 }
 
 impl<'a> Found<'a> {
-    /// All sets that were grown, in either weighting.
+    /// All sets that were grown, with either weighting.
     pub fn sets(&self) -> Vec<&Node<'a>> {
         let grown = std::iter::once(&self.grown).chain(&self.prewhitened);
         grown.flat_map(|grown| &grown.sizes).flatten().collect()
     }
 }
 
-/// Searches sets of effects of at most `most`, or more where the noise needs them.
+/// Searches sets of at most `most` effects, or more if the noise model requires it.
 pub(crate) fn find<'a>(
     base: &Node<'a>,
     most: usize,
@@ -67,16 +67,16 @@ pub(crate) fn find<'a>(
     let breadth = Breadth {
         beam: BEAM,
         refits: REFITS,
-        // What may be added does not bound what is tried: only the richest model shows what is noise.
+        // The permitted number of effects does not limit the trials: only the largest model shows the noise.
         most: most.max(RICHEST),
     };
     let pays = |before: &Node, after: &[Node]| {
         let best = after.first();
         best.is_some_and(|best| best.gain_over(before) > BIC_MARGIN)
     };
-    // While the colour is not known, a coloured noise would pay for one effect after the other: what counts is what remains of
-    // the gain where each model has the colour of its own residual. Any set of a size may show it: the one with the least
-    // simulation error may be rough from sample to sample.
+    // While the noise model is not known, coloured noise would justify one effect after the other. Therefore the gain is computed with a
+    // noise model of each model's own residual. Any set of a size may show the gain: the set with the least simulation error may be rough
+    // from sample to sample.
     let pays_in_colour = |before: &Node, after: &[Node]| {
         let least = || {
             let all = after.par_iter().map(bic_in_colour);
@@ -110,7 +110,7 @@ pub(crate) fn find<'a>(
     let noise = whole.with_memory_at_most(longest_memory(&base.setup));
     let limited = noise != whole;
 
-    // Confirm in the metric of the noise.
+    // Confirm weighted by the noise model.
     tell("confirming", 0, 3);
     let (base, confirmed) = rayon::join(
         || refine(base, &noise, &[]),
@@ -120,15 +120,10 @@ pub(crate) fn find<'a>(
     let wandering = wanders(&richest, &noise);
     let by_simulation = wandering && !confirmed.added.is_empty();
     let mut prewhitened = None;
-    if noise.order() > 0
-        && !base
-            .setup
-            .leaves_out("the search in the weighting of the noise")
-    {
-        // The noise's colour is known now: the search is repeated in its metric. Where the residual wanders this is no less
-        // called for: to the simulation error a slow noise looks like many effects, and the true one may not be among the
-        // sets that were grown there. But then such a metric may let the simulation drift off, which is not taken; and of many
-        // effects it tells little.
+    if noise.order() > 0 && !base.setup.leaves_out("the prewhitened search") {
+        // The noise model is known now: the search is repeated with this weighting. A drifting residual needs this too: for the simulation
+        // error a slow noise looks like many effects, and the true one may not be among the grown sets. But with such a weighting the
+        // simulation may drift, and such sets are not accepted; and it contains little information about many effects.
         let breadth = Breadth {
             most: if by_simulation {
                 WANDERING
@@ -142,7 +137,7 @@ pub(crate) fn find<'a>(
             &noise,
             breadth,
             pays,
-            // It was exhausted in this colour, which is that of its own residual, and its pairs were looked at there.
+            // The search with this noise model (that of the set's own residual) has converged, including its pairs.
             |node| {
                 if grown.exhausted_by(node) {
                     Ok(Rest::Noise)
@@ -177,7 +172,7 @@ pub(crate) fn find<'a>(
     })
 }
 
-/// The best of all sizes: a larger set must pay for itself against every smaller one.
+/// The best of all sizes: a larger set must lower the criterion compared with every smaller one.
 fn chosen<'a>(sizes: &[Vec<Node<'a>>], base: &Node<'a>) -> Node<'a> {
     sizes
         .iter()
@@ -198,7 +193,7 @@ fn drifts_off(before: &Node, after: &Node) -> Result<bool, Error> {
     Ok(refine(before, &white, &[])?.gain_over(&refine(after, &white, &[])?) > BIC_MARGIN)
 }
 
-/// The best set of at most so many effects: of a set that is too large, or of those that were grown.
+/// The best set with at most this number of effects: a reduction of a set that is too large, or one of the grown sets.
 pub(crate) fn shortened<'a>(
     mut node: Node<'a>,
     sizes: &[Vec<Node<'a>>],

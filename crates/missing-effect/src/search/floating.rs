@@ -1,4 +1,4 @@
-//! Sets of many effects: one effect at a time, from several small sets, and exchanges within the best (floating search).
+//! Sets of many effects: one effect at a time, from several small sets, and swaps within the best (floating search).
 //!
 //! **Reference**: P. Pudil, J. Novovicova, J. Kittler, Floating search methods in feature selection, Pattern Recognition Letters 15 (1994)
 //! 1119-1125.
@@ -17,17 +17,17 @@ use crate::{
     search::growth::{Grown, PAIR, by_clock, extensions},
 };
 
-/// Sets of two effects, and of three, from each of which one is grown.
+/// Number of sets of two effects, and of three, each of which is extended.
 const SEEDS: usize = 3;
-/// Effects that are refitted for each more, the most promising.
+/// Number of effects that are refitted for each extension, those with the largest predicted reduction.
 const FOLLOWED: usize = 10;
 
-/// Larger sets, grown one effect at a time from each of the best small ones, the best of them improved by exchanges.
+/// Larger sets, grown one effect at a time from each of the best small ones, the best of them improved by swaps.
 ///
-/// Of small sets that take nearly the same out of a residual, the one that is right is not the best as long as much is missing: each is
-/// followed for itself. On the measured Cascaded Tanks data a leak of the lower tank stands for the pump's dead zone, until the end of
-/// the sensor's range is in the set. As long as much is missing a size may also be driven to a bound: what is left of a set without such
-/// effects is extended and exchanged again, within all bounds.
+/// Among small sets that explain nearly the same part of a residual, the right one need not be the best while other effects are missing:
+/// each set is extended separately. On the measured Cascaded Tanks data a leak of the lower tank replaces the pump's dead zone, until the
+/// end of the sensor's range is in the set. While effects are missing, a size may also reach a bound: the set without such effects is
+/// extended and improved by swaps again, within all bounds.
 pub(crate) fn follow<'a>(
     base: &Node<'a>,
     grown: &mut Grown<'a>,
@@ -68,7 +68,7 @@ pub(crate) fn follow<'a>(
     Ok(())
 }
 
-/// A set, fitted to the end, without the effects whose sizes end at a bound.
+/// A converged set without the effects whose sizes end at a bound.
 fn within_bounds<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> {
     let mut node = refine(node, noise, &[])?;
     let at_the_edge = |node: &Node| node.added.iter().position(|on| node.at_the_edge(*on));
@@ -78,7 +78,7 @@ fn within_bounds<'a>(node: &Node<'a>, noise: &Noise) -> Result<Node<'a>, Error> 
     Ok(node)
 }
 
-/// What sets are grown from, and which are accepted.
+/// Start sets of the search, and the accepted ones.
 #[derive(Clone, Copy)]
 struct Floating<'n, 'a> {
     base: &'n Node<'a>,
@@ -89,7 +89,7 @@ struct Floating<'n, 'a> {
 }
 
 impl<'a> Floating<'_, 'a> {
-    /// A set with one effect more, and one more, as long as the criterion falls.
+    /// A set extended by one effect at a time, as long as the criterion falls.
     fn one_at_a_time(&self, mut node: Node<'a>) -> Result<Node<'a>, Error> {
         while node.added.len() < self.most && !node.setup.leaves_out("larger sets of effects") {
             match better_than(&node, self.extended(&node, None)?) {
@@ -100,7 +100,7 @@ impl<'a> Floating<'_, 'a> {
         Ok(node)
     }
 
-    /// Exchanges an effect of a set for another, and goes on one at a time, as long as the criterion falls.
+    /// Swaps one effect of a set for another, one at a time, as long as the criterion falls.
     fn exchanged(&self, mut node: Node<'a>) -> Result<Node<'a>, Error> {
         while !node.setup.leaves_out("exchanges within sets of effects") {
             let others = (0..node.added.len())
@@ -118,7 +118,7 @@ impl<'a> Floating<'_, 'a> {
         Ok(node)
     }
 
-    /// A set with one effect more, each of the most promising that does not follow time alone, but not the one that was taken out.
+    /// A set with one more effect, each of the best that are no functions of time, except the one that was removed.
     fn extended(&self, node: &Node<'a>, taken_out: Option<Placed>) -> Result<Vec<Node<'a>>, Error> {
         let mut proposals = extensions(self.base, std::slice::from_ref(node), 1, self.noise)?;
         proposals.retain(|proposal| {
@@ -132,7 +132,7 @@ impl<'a> Floating<'_, 'a> {
     }
 }
 
-/// The best of the sets, where its criterion lies clearly below a node's.
+/// The best of the sets, if its criterion is clearly below that of the model.
 fn better_than<'a>(node: &Node, sets: Vec<Node<'a>>) -> Option<Node<'a>> {
     let best = best_first(sets).into_iter().next();
     best.filter(|best| best.gain_over(node) > BIC_MARGIN)

@@ -1,4 +1,4 @@
-//! The joint search: effects interact, so sets of effects are grown side by side, not one after the other.
+//! The joint search: effects interact, so several sets of effects are extended in parallel, and not one after the other.
 //!
 //! On the measured Cascaded Tanks data a pump dead zone alone lowers the error from 0.67 to 0.60 V and an overflow
 //! alone to 0.52 V, both together to 0.33 V: a search that stops at the first effect that does not pay misses such pairs.
@@ -16,24 +16,24 @@ use crate::{
     search::{exhausted::Rest, pairs::joint_pairs},
 };
 
-/// Sets are one where what they explain differs by less than this part of it.
+/// Sets are equivalent if their explained parts differ by less than this share.
 const SAME_TAKEN: f64 = 0.15;
 
-/// How wide to search.
+/// Breadth of the search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Breadth {
     /// Sets that are grown from one size to the next.
     pub beam: usize,
-    /// Sets of one size that are refitted, the most promising first.
+    /// Number of sets of one size that are refitted, with the largest predicted reduction first.
     pub refits: usize,
     /// Largest number of effects.
     pub most: usize,
 }
 
-/// Up to so many effects a set may hold one that follows time alone and be extended.
+/// Largest size of a set that contains a function of time and may be extended.
 pub(crate) const PAIR: usize = 2;
 
-/// Pairs that are refitted for their joint score, beside those that grow from the best single effects.
+/// Number of pairs that are refitted because of their joint score, in addition to extensions of the best single effects.
 const JOINT_PAIRS: usize = 12;
 
 fn key(added: &[Placed]) -> Vec<(&'static str, usize)> {
@@ -45,10 +45,10 @@ fn key(added: &[Placed]) -> Vec<(&'static str, usize)> {
     key
 }
 
-/// The best sets that say different things, best first.
+/// The best distinct sets, best first.
 ///
-/// Two sets that take nearly the same out of the base's residual are one under two names (a dead zone and a leak, say), and
-/// what is added to the one makes what is added to the other. Grown side by side they would fill the beam.
+/// Two sets that explain nearly the same part of the base's residual are equivalent (a dead zone and a leak,
+/// say), and so are their extensions. Extended separately, equivalent sets would fill the beam.
 fn distinct<'n, 'a>(
     base: &Node<'a>,
     nodes: &'n [Node<'a>],
@@ -89,28 +89,28 @@ fn squares(values: impl Iterator<Item = f64>) -> f64 {
 pub(crate) struct Grown<'a> {
     /// The best sets of every size, from the base on, best first within a size.
     pub sizes: Vec<Vec<Node<'a>>>,
-    /// All single effects that were refitted, and those that were not promising enough for it.
+    /// All single effects that were refitted, and those whose predicted reduction was too small.
     refitted: Vec<Node<'a>>,
     unpromising: Vec<Proposal<'a>>,
-    /// The set that was exhausted, where the growth ended so.
+    /// The set at which the search converged, if it ended so.
     exhausted: Option<Vec<Placed>>,
-    /// The last size was worth it.
+    /// Whether the last size lowered the criterion enough.
     paid: bool,
 }
 
 impl<'a> Grown<'a> {
-    /// Whether the growth ended because this set was exhausted.
+    /// Whether the growth ended because the search converged at this set.
     pub fn exhausted_by(&self, node: &Node) -> bool {
         let same = |set: &Vec<Placed>| key(set) == key(&node.added);
         self.exhausted.as_ref().is_some_and(same)
     }
 
-    /// Whether sets of so many effects were grown, and still paid.
+    /// Whether sets of this number of effects were grown, and still lowered the criterion enough.
     pub fn goes_on(&self, size: usize) -> bool {
         self.sizes.len() > size && self.exhausted.is_none() && self.paid
     }
 
-    /// Takes in a set that was found otherwise.
+    /// Adds a set from another search.
     pub fn take_in(&mut self, node: Node<'a>) {
         let size = node.added.len();
         while self.sizes.len() <= size {
@@ -120,7 +120,7 @@ impl<'a> Grown<'a> {
         self.sizes[size].sort_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic()));
     }
 
-    /// What [`singles`](crate::fit::proposal::singles) gives for the base in the metric in which it was grown.
+    /// Result of [`singles`](crate::fit::proposal::singles) for the base, with the weighting of the search.
     pub fn singles(&self, noise: &Noise) -> Vec<Node<'a>> {
         let mut nodes = self.refitted.clone();
         nodes.extend(realise_all(self.unpromising.clone(), noise, ROUGH));
@@ -133,10 +133,10 @@ impl<'a> Grown<'a> {
     }
 }
 
-/// Grows sets of effects from a base.
+/// Forward search: grows sets of effects from a base.
 ///
-/// The growth ends after two sizes that are not `worth` it beside the best set so far, and at once where the best set leaves noise. Where
-/// an only effect leaves coloured noise, which may hold a second one, it goes on if some pair is worth it.
+/// The search ends after two sizes that are not `worth` it compared with the best set so far, and at once if the residual of the best set
+/// is noise. If a single effect leaves coloured noise, which may contain a second effect, the search continues if some pair is `worth` it.
 pub(crate) fn grow<'a>(
     base: &Node<'a>,
     noise: &Noise,
@@ -177,7 +177,7 @@ pub(crate) fn grow<'a>(
                 break;
             }
         }
-        // The first sizes are searched wider: a pair may pay where neither of its effects does.
+        // The search is wider for the first sizes: a pair may lower the criterion although neither of its effects does.
         let factor = if size <= 2 { 2 } else { 1 };
         let mut proposals = if size == 1 {
             proposals(base, noise)
@@ -218,7 +218,7 @@ pub(crate) fn grow<'a>(
             grown.exhausted = may_end;
             break;
         }
-        // A pair is looked at even where no single effect pays; after two sizes that do not pay there is no more.
+        // Pairs are tried even if no single effect lowers the criterion enough; after two sizes without success the search ends.
         idle = if pays { 0 } else { idle + 1 };
         sizes.push(nodes);
         grown.paid = idle == 0;
@@ -235,14 +235,14 @@ pub(crate) fn by_clock(node: &Node) -> bool {
     node.added.iter().any(|placed| placed.effect.by_clock)
 }
 
-/// The sets of one size extended by one effect, each set once, the most promising first.
+/// The sets of one size extended by one effect, without duplicates, with the largest predicted reduction first.
 pub(crate) fn extensions<'a>(
     base: &Node<'a>,
     parents: &[Node<'a>],
     width: usize,
     noise: &Noise,
 ) -> Result<Vec<Proposal<'a>>, Error> {
-    // What follows time alone bends to whatever is missing: it is added last.
+    // Functions of time fit any missing effect: they are added last.
     let timeless = |node: &&Node| node.added.len() < PAIR || !by_clock(node);
     let parents: Vec<Node<'a>> = parents.iter().filter(timeless).cloned().collect();
     let parents: Vec<Parent> = distinct(base, &parents, width)?

@@ -1,8 +1,8 @@
-//! The search of sets of effects, and which of their effects stay under the noise model of what the best set leaves.
+//! The search of sets of effects, and the confirmation of their effects with the noise model of the best set's residual.
 //!
 //! `find.rs` calls, in this order: `growth.rs` (sets grown from one size to the next) with `pairs.rs` (joint scores of all pairs) and
-//! `exhausted.rs` (whether a set leaves anything to explain), `floating.rs` (larger sets), `confirm.rs` (backward elimination) with `exchange.rs` (one
-//! effect in another's place). `scores.rs` and `rankings.rs` report the single effects.
+//! `exhausted.rs` (whether a set leaves anything to explain), `floating.rs` (larger sets), `confirm.rs` (backward elimination) with
+//! `exchange.rs` (one effect in another's place). `scores.rs` and `rankings.rs` report the single effects.
 
 pub(crate) mod confirm;
 pub(crate) mod exchange;

@@ -21,22 +21,22 @@ use crate::fit::{
     proposal::Proposal,
 };
 
-/// Points at which a candidate is linearised, at most.
+/// Largest number of points of linearisation of a candidate.
 const POINTS: usize = 3;
-/// Of sets of so many samples times columns, the inner products are not taken.
+/// For sets with more samples times columns than this, the inner products are not computed.
 const LARGEST: usize = 40_000_000;
-/// Ridge of the normal equations, against columns that imitate each other.
+/// Ridge of the normal equations, against collinear columns.
 const RIDGE: f64 = 1e-9;
 
 /// A candidate at a point.
 struct Linearised<'a> {
     placed: Placed,
-    /// The effect's parameters there, and the vector whole.
+    /// The effect's parameters at the point, and the complete vector.
     x: Vec<f64>,
     setup: Setup<'a>,
-    /// Whitened: the effect's columns, then what the effect changes in the residual.
+    /// Whitened: the effect's columns, then the effect's change of the residual.
     columns: Vec<Vec<f64>>,
-    /// How far each of the effect's parameters may move, down and up.
+    /// Range of each parameter of the effect, down and up.
     room: Vec<(f64, f64)>,
 }
 
@@ -49,7 +49,7 @@ pub(crate) fn joint_pairs<'a>(
     count: usize,
     taken: impl Fn(&[Placed]) -> bool,
 ) -> Vec<Proposal<'a>> {
-    // Outputs count against each other as beside the base.
+    // Outputs have the weights of the base.
     let metric = (noise, &base.fit.weights[..], base.fit.prior_weight());
     let Some((own, residual)) = whitened(&base.setup, &base.fit.x, metric, |_| true) else {
         return Vec::new();
@@ -123,7 +123,7 @@ pub(crate) fn joint_pairs<'a>(
     proposals
 }
 
-/// Whitened columns of a setup's rows that are wanted, and the residual; `None` where the simulation is not finite.
+/// Whitened columns of the selected rows of a setup, and the residual; `None` if the simulation is not finite.
 fn whitened(
     setup: &Setup,
     x: &[f64],
@@ -194,7 +194,7 @@ fn inner_products(columns: &[&[f64]]) -> DMatrix<f64> {
     DMatrix::from_fn(n, n, |i, j| if j <= i { rows[i][j] } else { rows[j][i] })
 }
 
-/// The cost of a pair as it is predicted; `own` columns of the base come first, the base's residual last.
+/// The predicted cost of a pair; the base has `own` columns, which come first, and the base's residual is last.
 fn predicted(gram: &DMatrix<f64>, own: usize, pair: [(usize, &Linearised); 2]) -> Option<f64> {
     let last = gram.ncols() - 1;
     // The target is r_0 + d_i + d_j.
@@ -233,7 +233,7 @@ fn predicted(gram: &DMatrix<f64>, own: usize, pair: [(usize, &Linearised); 2]) -
     cost.is_finite().then_some(cost)
 }
 
-/// The pair's proposal: each effect where it was linearised, the other parameters as beside either of them.
+/// The pair's proposal: each effect at its point of linearisation, the other parameters as with either of them.
 fn joined<'a>(
     base: &Node<'a>,
     first: &Linearised<'a>,
@@ -242,7 +242,7 @@ fn joined<'a>(
     promise: f64,
 ) -> Option<Proposal<'a>> {
     let mut structure = first.setup.structure.with(second.placed).ok()?;
-    // What was picked from the residual for the one is a start of the other's too.
+    // A start that was selected from the residual for one effect is a start for the other one too.
     let picked = &second.setup.structure.scales;
     if structure.scales.period == 0.0 {
         structure.scales.period = picked.period;

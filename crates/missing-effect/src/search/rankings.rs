@@ -6,7 +6,7 @@ use crate::{
     search::find::Found,
 };
 
-/// The single effects under both weightings, those that were promising enough for a refit.
+/// The single effects under both weightings, those with a sufficient predicted reduction for a refit.
 pub(crate) fn rankings(found: &Found, base: &Node) -> Rankings {
     let first_of_each = |nodes: &[Node]| {
         let mut ranked: Vec<String> = Vec::new();
@@ -25,7 +25,7 @@ pub(crate) fn rankings(found: &Found, base: &Node) -> Rankings {
         };
     };
     let prewhitened = grown.promising_singles();
-    // A best effect of the one weighting that is far behind in the other, or does not pay there.
+    // A best effect of one weighting that is far from the best of the other weighting, or does not lower its criterion enough.
     let behind = |best: &[Node], others: &[Node], base: &Node| {
         let (Some(best), Some(first)) = (best.first(), others.first()) else {
             return false;

@@ -1,4 +1,4 @@
-//! What each single effect of the catalogue does to the believed model, and what the data would show of it.
+//! Results of adding each single effect of the catalogue to the believed model, and minimum detectable sizes.
 
 use ct_signals::ArModel;
 use greybox::Noise;
@@ -10,13 +10,13 @@ use crate::{
     fit::node::Node,
 };
 
-/// Shown at 1 % false alarm with 90 % power, in standard errors.
+/// Minimum detectable size with a false alarm rate of 1 % and a power of 90 %, in standard errors.
 const VISIBLE: f64 = 2.576 + 1.282;
-/// An effect whose signature is left with less than this part by the fitted parameters is not visible at all.
+/// An effect is not detectable if less than this share of its signature is independent of the fitted parameters.
 const ABSORBED: f64 = 1e-6;
 
-/// The scores, in the order of `single`; `noise` is the metric in which both were fitted, `floors` the standard
-/// deviations of the outputs' noise \[output unit\].
+/// The scores, in the order of `single`; `noise` is the weighting of both fits, `floors` the standard deviations of the outputs' noise
+/// \[output unit\].
 pub(crate) fn scores(base: &Node, single: &[Node], noise: &Noise, floors: &[f64]) -> Vec<Score> {
     single
         .par_iter()
@@ -43,8 +43,8 @@ pub(crate) fn scores(base: &Node, single: &[Node], noise: &Noise, floors: &[f64]
         .collect()
 }
 
-/// How many times larger an effect has to be to be seen in this noise than in white noise of the same size: the median
-/// over the effects that have a signature where they are absent. `None` where the noise is white.
+/// Ratio of the minimum detectable sizes in this noise and in white noise of the same variance: the median over the effects that have a
+/// signature at their absent value. `None` for white noise.
 pub(crate) fn price_of_colour(base: &Node, single: &[Node], noise: &Noise) -> Option<f64> {
     if noise.order() == 0 {
         return None;
@@ -64,8 +64,8 @@ pub(crate) fn price_of_colour(base: &Node, single: &[Node], noise: &Noise) -> Op
     ratios.get(ratios.len() / 2).copied()
 }
 
-/// The length of the signature of an effect at its absent value, beside what the base's own parameters can imitate and as
-/// a whole, in standard deviations of the innovations (`scales`, of each output); `None` where it has no derivative there.
+/// Length of the signature of an effect at its absent value, with and without the part that the base's own parameters compensate for, in
+/// standard deviations of the innovations (`scales`, of each output); `None` if there is no derivative.
 ///
 /// The scales are those of the fit: at the absent value the residuals hold the effect, and would make an output that it acts on count less.
 fn signature(base: &Node, node: &Node, noise: &Noise, scales: &[f64]) -> Option<(f64, f64)> {
@@ -96,7 +96,7 @@ fn signature(base: &Node, node: &Node, noise: &Noise, scales: &[f64]) -> Option<
     order.push(column);
     let chosen = triangle.select(&order);
     let last = order.len() - 1;
-    // Outputs count in units of the first one's noise.
+    // Outputs are weighted relative to the first one's noise.
     let lengths = [chosen.at(last, last).abs(), chosen.column_norm(last)];
     let [own, all] = lengths.map(|length| length / scales[0]);
     Some((own, all))
@@ -117,7 +117,8 @@ mod tests {
 
     #[test]
     fn what_is_visible_hangs_on_the_noise_and_not_on_the_effect() {
-        // Both levels of two linear tanks; the lower sensor drifts by ten times the noise, which is in the residual where it is absent.
+        // Both levels of two linear tanks; the lower sensor drifts by ten times the noise, so the residual of a model without the drift
+        // contains it.
         let mut problem = simulated::two_levels(5);
         for (k, y) in problem.records[0].outputs[1].values.iter_mut().enumerate() {
             *y += 0.0005 * INTERVAL * k as f64;

@@ -1,17 +1,17 @@
-//! The effects of an answer: group, place, size, acceptance.
+//! The accepted effects: group, place, size, acceptance.
 
 use plants::{Domain, EffectInfo};
 
 use super::{list, with_error};
 use crate::{Acceptance, Diagnosis, Step, Verdict};
 
-/// What an effect is outside hydraulics; `None` within, where its name says it, and for a term of the user's own.
+/// Description of an effect outside hydraulics; `None` in hydraulics, where the name is sufficient, and for a user's own term.
 pub(super) fn in_general(effect: &str, domain: Domain) -> Option<&'static str> {
     let effect = EffectInfo::find(effect).filter(|_| domain == Domain::General)?;
     effect.general
 }
 
-/// A sentence for each effect of the answer: its group, its place and its size.
+/// A sentence for each accepted effect: its group, its place and its size.
 pub(super) fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
     let domain = diagnosis.domain();
     let added = diagnosis.effects.iter().zip(&diagnosis.groups);
@@ -41,7 +41,7 @@ pub(super) fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
                     }),
             };
             let doubt = if diagnosis.in_doubt.get(k) == Some(&true) {
-                " In doubt: its size stands at a bound of what is plausible, so it describes the data rather than explains them."
+                " Uncertain: its size is at a bound of its plausible range, so it may describe the data without being the cause."
             } else {
                 ""
             };
@@ -65,7 +65,7 @@ pub(super) fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
         .collect()
 }
 
-/// Another place is said to be possible from this relative likelihood on.
+/// Another place is reported as possible from this relative likelihood on.
 pub(super) const SAME_PLACE_LIKELIHOOD: f64 = 0.05;
 
 /// The parameters of an effect with their standard errors, in brackets.
@@ -75,7 +75,7 @@ pub(super) fn size_of(effect: &str, step: &Step) -> String {
         .parameters
         .iter()
         .filter_map(|p| Some((p, p.name.strip_prefix(&prefix)?)))
-        // Where a lag stood before the record says nothing of the effect.
+        // The initial state of a lag is not a size of the effect.
         .filter(|(_, name)| !name.starts_with("before"))
         .enumerate()
         .filter(|(k, (p, _))| *k == 0 || p.std_error.is_some())
@@ -88,20 +88,20 @@ pub(super) fn size_of(effect: &str, step: &Step) -> String {
     }
 }
 
-/// How much of the excess error the effects of a partial answer explain.
+/// Share of the excess error that the effects of a partial explanation explain.
 pub(super) fn of_acceptance(acceptance: &Acceptance) -> Option<String> {
     let share = acceptance.share?;
     let held_out = acceptance.share_test.map_or(String::new(), |share| {
         format!(", {:.0} % on held-out data", 100.0 * share)
     });
     Some(format!(
-        "That is {:.0} % of the squared error above the noise floor{held_out}; {:.0} % would make it the whole answer.",
+        "That is {:.0} % of the squared error above the noise floor{held_out}; {:.0} % are needed to accept it as the explanation.",
         100.0 * share,
         100.0 * acceptance.required
     ))
 }
 
-/// The command that proposes what would tell the first two of a group apart.
+/// The command that designs an experiment to distinguish the first two effects of a group.
 pub(super) fn next_experiment(group: &[String], added: usize) -> String {
     let [a, b, ..] = group else {
         return String::new();

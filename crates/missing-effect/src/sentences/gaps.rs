@@ -1,18 +1,18 @@
-//! What was done about gaps in records.
+//! Handling of gaps in records.
 
 use ct_signals::{Gaps, duration};
 
 use crate::{LONGEST_HOLD, MendedGaps};
 
 impl MendedGaps {
-    /// In a sentence; nothing where there is nothing to say.
+    /// One sentence; `None` without gaps.
     #[must_use]
     pub fn sentence(&self) -> Option<String> {
         of_gaps(self)
     }
 }
 
-/// What was done about rows and samples of inputs that are missing.
+/// Handling of missing rows and samples of inputs.
 pub(crate) fn of_gaps(mended: &MendedGaps) -> Option<String> {
     let Gaps {
         rows,
@@ -53,7 +53,7 @@ pub(crate) fn of_gaps(mended: &MendedGaps) -> Option<String> {
     }
     if cut > 0 {
         text += &format!(
-            "; the simulation begins anew behind {cut}, where holding would take longer than {:.0} % of the fastest time constant ({})",
+            "; the simulation restarts after {cut}, where the input would have to be held longer than {:.0} % of the fastest time constant ({})",
             100.0 * LONGEST_HOLD,
             duration(mended.time_constant)
         );

@@ -1,4 +1,4 @@
-//! The findings in words: `verdict.rs` first, then the effects, what is left, and remarks.
+//! The findings in words: `verdict.rs` first, then the effects, the residual, and remarks.
 
 mod effects;
 mod gaps;

@@ -1,4 +1,4 @@
-//! What there is to say beside the verdict.
+//! Remarks in addition to the verdict.
 
 use ct_signals::Channel;
 use plants::Placed;
@@ -9,7 +9,7 @@ use crate::{
     numbers::significant,
 };
 
-/// That more effects were found than may be added.
+/// Remark: more effects were found than may be added.
 pub(crate) fn of_a_stop(most: usize, needed: usize) -> String {
     format!(
         "The search was stopped at {most} {}: the data call for {needed}.",
@@ -17,7 +17,7 @@ pub(crate) fn of_a_stop(most: usize, needed: usize) -> String {
     )
 }
 
-/// The best that the catalogue has where it is not the answer.
+/// The best effects of the catalogue, if they are not accepted.
 pub(crate) fn of_a_part(last: &Node) -> String {
     let outputs = &last.setup.records[0].outputs;
     let names: Vec<String> = last
@@ -26,13 +26,13 @@ pub(crate) fn of_a_part(last: &Node) -> String {
         .map(|placed| placed.effect.id.to_string())
         .collect();
     format!(
-        "What comes nearest by more than chance, a course of time aside, is {}, which leaves {}: too much would be left that is not noise, so it is not taken for the answer.",
+        "The best significant effect, apart from functions of time, is {}, with a residual of {}: this residual is not noise, so the effect is not accepted.",
         list(&names, "and"),
         rms(&PerOutput::of(outputs, &last.fit.rmse), &outputs[0].unit)
     )
 }
 
-/// What readings say of their converters, a sentence for each output whose readings are rounded.
+/// Remark on quantisation: one sentence for each output with rounded readings.
 pub(crate) fn of_rounding(rounded: &[RoundedOutput], outputs: &[Channel]) -> String {
     let of_output = |rounded: &RoundedOutput| {
         let output = &outputs[rounded.output];
@@ -53,17 +53,17 @@ pub(crate) fn of_rounding(rounded: &[RoundedOutput], outputs: &[Channel]) -> Str
     all.join(" ")
 }
 
-/// That the two weightings of the residual rank different effects first.
+/// Remark: the two weightings of the residual rank different effects first.
 pub(crate) fn of_rankings(rankings: &Rankings) -> Option<String> {
     let (white, prewhitened) = (rankings.white.first()?, rankings.prewhitened.first()?);
     rankings.disagree.then(|| {
         format!(
-            "The weightings disagree: by the simulation error {white} is the best single effect, prewhitened by the noise model {prewhitened}; the second one looks at fast changes more."
+            "The weightings disagree: by the simulation error {white} is the best single effect, prewhitened by the noise model {prewhitened}; the prewhitened fit gives more weight to fast changes."
         )
     })
 }
 
-/// The effects that were taken out because any course of time would do in their place; `None` where there are none.
+/// The effects that were removed because a function of time explains the same; `None` if there are none.
 pub(crate) fn of_courses(dropped: &[Placed]) -> Option<String> {
     let names: Vec<String> = dropped
         .iter()
@@ -71,13 +71,13 @@ pub(crate) fn of_courses(dropped: &[Placed]) -> Option<String> {
         .collect();
     (!names.is_empty()).then(|| {
         format!(
-            "{} would explain more, but so would some course of time, and something is left that is not noise: not taken for an answer.",
+            "{} would explain more, but so would a function of time, and the residual is not noise: not accepted.",
             list(&names, "and")
         )
     })
 }
 
-/// That the minimum of the last model was not found twice.
+/// Remark: the minimum of the last model was not found twice.
 pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
     let step = diagnosis.steps.last()?;
     (step.starts_agree < 2 && step.starts > 0).then(|| {
@@ -85,7 +85,7 @@ pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
             "Of {} starts {} the minimum that is shown: there may be a better one, and other values of the parameters.",
             step.starts,
             if step.starts_agree == 0 {
-                "around it none came as low as"
+                "no start around it came as low as"
             } else {
                 "one alone ended in"
             }
@@ -93,22 +93,22 @@ pub(crate) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
     })
 }
 
-/// The held-out error is this many times the fitted one where what was fitted does not carry over.
+/// Ratio of the held-out error to the fitted one above which the fitted model does not hold for another record.
 const CARRIES_OVER: f64 = 2.0;
 
-/// Whether what was fitted holds on another record.
+/// Remark: whether the fitted model holds for another record.
 pub(crate) fn of_held_out(diagnosis: &Diagnosis) -> Option<String> {
     let step = diagnosis.steps.last()?;
     let times = step.weighted_rmse_test? / step.weighted_rmse;
     (times > CARRIES_OVER).then(|| {
         format!(
-            "On held-out data the simulation error is {} times as large: what was fitted does not carry over to that record.",
+            "On held-out data the simulation error is {} times as large: the fitted model does not hold for that record.",
             significant(times, 2)
         )
     })
 }
 
-/// What the standard errors do not hold beside a term of the user's own.
+/// Remark: the standard errors do not include the uncertainty of a user's own term.
 pub(crate) fn of_terms(problem: &Problem) -> Option<String> {
     let names: Vec<_> = problem.terms.iter().map(|term| term.name.clone()).collect();
     (!names.is_empty()).then(|| {
@@ -119,10 +119,10 @@ pub(crate) fn of_terms(problem: &Problem) -> Option<String> {
     })
 }
 
-/// What the colour of the noise costs, where it costs something.
+/// Remark: the loss of detectability by the coloured noise, if it is large.
 pub(crate) fn of_the_colour(price: f64) -> Option<String> {
     (price >= 1.2).then(|| format!(
-        "The noise is coloured, and hides what white noise of the same size would show: an effect has to be about {} times larger to be seen. Smaller ones than the sizes under \"visible from\" may be there.",
+        "The noise is coloured: an effect has to be about {} times larger to be detected than in white noise of the same variance. Effects smaller than the sizes under \"visible from\" may be present.",
         significant(price, 2)
     ))
 }

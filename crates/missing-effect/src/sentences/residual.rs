@@ -1,4 +1,4 @@
-//! What the residual of a model holds that is not noise.
+//! Structure in the residual of a model that is not noise.
 
 use ct_signals::duration;
 
@@ -9,15 +9,15 @@ use crate::{
     numbers::significant,
 };
 
-/// What is left in the residual of a step, as the end of a sentence.
+/// Structure in the residual of a step, as the end of a sentence.
 pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
-    // A comparison has not looked into the catalogue.
+    // A comparison has not searched the catalogue.
     let effect = if diagnosis.scores.is_empty() {
         "an effect that the model lacks"
     } else {
         "an effect outside the catalogue"
     };
-    // Of several outputs the one that shows it.
+    // With several outputs, the output with the structure.
     let shown = step.rmse_per_output.0.get(left.output);
     let shown = PerOutput(shown.cloned().into_iter().collect());
     let residual = rms(&shown, &diagnosis.output_unit);
@@ -46,13 +46,13 @@ pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> Strin
         name.map_or(String::new(), |record| format!(" (in {})", record.name))
     );
     match left.what {
-        Remains::Input => format!("the input still shows in {residual}"),
+        Remains::Input => format!("{residual} depends on the input"),
         Remains::Period(period) => format!(
-            "{residual} swings with a period of about {}, which noise does not: it may be a disturbance or {effect}",
+            "{residual} oscillates with a period of about {}, which noise does not explain: it may be a disturbance or {effect}",
             about(period)
         ),
         Remains::Instant(at, length) => format!(
-            "{residual} holds something sudden, {}, which noise does not: it may be a disturbance, a fault of the sensor or {effect}",
+            "{residual} has an abrupt change, {}, which noise does not explain: it may be a disturbance, a fault of the sensor or {effect}",
             if length > 0.0 {
                 diagnosis.clock.span(at, at + length)
             } else {
@@ -60,11 +60,11 @@ pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> Strin
             }
         ),
         Remains::Level => format!(
-            "{residual} follows the {}, which noise does not: the balance lacks {effect}",
+            "{residual} depends on the {}, which noise does not explain: the balance lacks {effect}",
             diagnosis.domain().level_words("level")
         ),
         Remains::Slow(wander, process) => format!(
-            "{residual} wanders as slowly as the process, or more: its correlation lasts {}, the slowest time constant is {}; it may be a disturbance or {effect}",
+            "{residual} drifts: its correlation time of {} reaches the slowest time constant, {}; it may be a disturbance or {effect}",
             if wander < record {
                 about(wander)
             } else {
@@ -75,7 +75,7 @@ pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> Strin
     }
 }
 
-/// A time of which two digits are known: in seconds below two hours.
+/// A time with two significant digits: in seconds below two hours.
 pub(super) fn about(seconds: f64) -> String {
     if seconds.abs() < 7200.0 {
         format!("{} s", significant(seconds, 2))

@@ -1,4 +1,4 @@
-//! What is missing and nothing in the catalogue explains.
+//! The unexplained error, if no effect of the catalogue explains it.
 
 use ct_signals::Clock;
 use plants::Domain;
@@ -6,7 +6,7 @@ use plants::Domain;
 use super::list;
 use crate::{Unknown, diagnostics::unknown::SAME_PLACE, numbers::significant};
 
-/// Where what is missing acts, on what it depends, and what it looks like.
+/// Place, variable and shape of the unexplained error.
 pub(crate) fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> String {
     let place = |name: &str| match name {
         "actuator" => "at the actuator".to_string(),
@@ -35,7 +35,7 @@ pub(crate) fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> St
         );
     }
     if unknown.variable == "time" {
-        said += " and follows no variable of the plant, so that it is a function of time";
+        said += " and depends on no variable of the plant, so it is a function of time";
         if let Some(window) = unknown.windows.first() {
             said += &format!(
                 ": most {}, {} {} on average",

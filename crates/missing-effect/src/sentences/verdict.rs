@@ -1,4 +1,4 @@
-//! The verdict of a comparison and of a diagnosis, and the errors that it rests on.
+//! The verdict of a comparison and of a diagnosis, and the errors that it is based on.
 
 use super::{
     effects::{of_acceptance, of_effects},
@@ -14,7 +14,7 @@ use crate::{
     numbers::significant,
 };
 
-/// What a comparison alone can say.
+/// Verdict of a comparison alone.
 pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<String> {
     let Some(step) = diagnosis.steps.first() else {
         return Vec::new();
@@ -26,7 +26,7 @@ pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<St
             rms(&step.rmse_per_output, unit)
         ),
         (_, None) => format!(
-            "The model does not explain the data: its simulation error of {} holds more than noise.",
+            "The model does not explain the data: its simulation error of {} is more than noise.",
             rms(&step.rmse_per_output, unit)
         ),
         (_, Some(left)) => format!(
@@ -36,7 +36,7 @@ pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<St
     }]
 }
 
-/// The sizes from which on the likeliest effects would have been seen.
+/// The minimum detectable sizes of the most likely effects.
 fn visible(diagnosis: &Diagnosis) -> String {
     let sizes: Vec<String> = diagnosis
         .scores
@@ -55,7 +55,7 @@ fn visible(diagnosis: &Diagnosis) -> String {
     sizes.join(", ")
 }
 
-/// What there is to say, the verdict first.
+/// All sentences, the verdict first.
 pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<String> {
     let unit = &diagnosis.output_unit;
     let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) else {
@@ -85,10 +85,10 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
             }
         }
         Verdict::Unexplained => match left {
-            // A right model under a slow disturbance leaves this too.
+            // A correct model under a slow disturbance has such a residual too.
             Some(left) if matches!(left.what, Remains::Slow(..)) => {
                 said.push(format!(
-                    "Nothing in the catalogue is called for, but what is left is not noise: {}.",
+                    "No effect of the catalogue is significant, but the residual is not noise: {}.",
                     left_over(left, first, diagnosis)
                 ));
                 let visible = visible(diagnosis);
@@ -100,7 +100,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
                 "Something is missing, and nothing in the catalogue explains it: {}.",
                 left.map_or_else(
                     || format!(
-                        "the residual of {} holds more than noise",
+                        "the residual of {} is more than noise",
                         rms(&first.rmse_per_output, unit)
                     ),
                     |left| left_over(left, first, diagnosis)
@@ -137,7 +137,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
     said
 }
 
-/// From what errors fall to what: `from 0.900 to 0.300 cm`, of several outputs each with its name.
+/// Fall of the errors: `from 0.900 to 0.300 cm`, with the output's name if there are several.
 fn falls(before: &PerOutput, after: &PerOutput, unit: &str) -> String {
     let several = before.0.len() > 1;
     let pairs = before.0.iter().zip(after.values());

@@ -40,7 +40,7 @@ fn a_diagnosis_is_read_again() {
     assert_eq!(again.verdict, found.verdict);
     assert_eq!(again.groups, found.groups);
 
-    // A name that there is not is refused.
+    // A name that does not exist is rejected.
     let broken = text.replacen("\"variable\":\"", "\"variable\":\"no ", 1);
     assert_eq!(
         serde_json::from_str::<Diagnosis>(&broken).is_err(),

@@ -1,4 +1,4 @@
-//! What runs is built from plain numbers and the rows that are kept.
+//! Builds the running monitor from plain numbers and the stored rows.
 
 use ct_signals::Hold;
 
@@ -12,7 +12,7 @@ use crate::{
     watch::{Watch, tracked},
 };
 
-/// Rows on which the simulation settles when it is built again.
+/// Number of rows for settling when the simulation is built again.
 const RUN_UP: usize = 1024;
 
 impl<'a> Core<'a> {
@@ -30,7 +30,7 @@ impl<'a> Core<'a> {
         self.build();
     }
 
-    /// A checkpoint after which the tracker finds the parameters again: they have jumped.
+    /// A checkpoint after which the tracker estimates the parameters again, because they have changed abruptly.
     pub(super) fn let_go(&mut self) {
         self.settle_checkpoint();
         if let Some(tracker) = &mut self.now.tracker {
@@ -66,7 +66,7 @@ impl<'a> Core<'a> {
         let outputs = &learned.outputs;
         let most =
             |output: &OutputNoise, samples| Most::new(&output.scatter, samples, outputs.len());
-        // The promise is in rows; scores and blocks count means of so many.
+        // The false alarm rate refers to rows; scores and blocks use means of several rows.
         let samples = self.settings.rows_between_false_alarms / self.now.every as f64;
         let threshold = threshold(
             &windows(learned.rows_per_time_constant()),
@@ -83,7 +83,7 @@ impl<'a> Core<'a> {
         })
     }
 
-    /// Builds what runs from the present numbers and the kept rows.
+    /// Builds the running model from the present numbers and the stored rows.
     pub(super) fn build(&mut self) -> Option<()> {
         let from = self.now.kept.len().saturating_sub(RUN_UP);
         let first = self.now.kept.get(from)?;

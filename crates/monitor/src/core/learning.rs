@@ -1,4 +1,4 @@
-//! Gathering rows to learn from, and taking over what was learned.
+//! Collects rows for learning, and starts monitoring with the learned model.
 
 use std::collections::VecDeque;
 
@@ -17,7 +17,7 @@ use crate::{
 };
 
 impl Core<'_> {
-    /// Begins to learn anew.
+    /// Starts learning again.
     pub(super) fn begin(&mut self, every: usize) {
         self.now.phase = Phase::Learning {
             next: self.settings.learning_rows,
@@ -35,7 +35,7 @@ impl Core<'_> {
         self.set_checkpoint();
     }
 
-    /// What there is to learn from, while it learns.
+    /// Rows collected for learning, during learning.
     pub(crate) fn gathered(&self) -> Option<Gathered> {
         let Phase::Learning { next, span } = self.now.phase else {
             return None;
@@ -50,7 +50,7 @@ impl Core<'_> {
         })
     }
 
-    /// Gathers a row to learn from; a fit is tried at `next` rows. `span`: so many seconds are known to be needed.
+    /// Collects a row for learning; a fit is tried at `next` rows. `span`: required time in seconds, if known.
     pub(super) fn gather(&mut self, sample: Sample, next: usize, span: Option<f64>) -> Fed {
         let time = sample.time;
         self.now.kept.push_back(Kept {
@@ -71,7 +71,7 @@ impl Core<'_> {
             .collect();
         let notice = match self.model.0.learn(&samples, self.hold()) {
             Err(why) => {
-                // The older half goes: what comes next may say more.
+                // The older half is dropped: later rows may contain more information.
                 self.later(2 * next, span, |kept, _| {
                     kept.drain(..KEPT / 2);
                 });
@@ -83,7 +83,7 @@ impl Core<'_> {
                 if span < needed {
                     let full = self.now.kept.len() == KEPT;
                     let rows = self.now.kept.len() as f64 * needed / span;
-                    // A little more, for the estimate of the time constant moves.
+                    // Slightly more, because the estimate of the time constant changes.
                     self.later((1.02 * rows).ceil() as usize, Some(needed), halve);
                     if full {
                         self.now.every = (2 * self.now.every).min(LONGEST_BLOCK);
@@ -101,7 +101,7 @@ impl Core<'_> {
         }
     }
 
-    /// Puts the next try off to so many rows; where no more fit in, room is made.
+    /// Postpones the next fit to this number of rows; if they do not fit into memory, older rows are dropped.
     fn later(
         &mut self,
         next: usize,
@@ -120,7 +120,7 @@ impl Core<'_> {
         }
     }
 
-    /// The learned model is run over the rows that it was learned from, and watched from now on.
+    /// Simulates the learned model over the rows that it was learned from, and starts monitoring.
     fn take_over(&mut self, learned: Learned, states: &[f64]) -> Option<Notice> {
         let (rows, time_constant) = (learned.rows() * self.now.every, learned.time_constant);
         let noise = learned
@@ -157,12 +157,12 @@ impl Core<'_> {
     }
 }
 
-/// The first input of a sample, of which the simulation of a plant says where what it moves stands.
+/// The first input of a sample, with the actuator at rest.
 pub(super) fn at_rest(sample: &Sample) -> f64 {
     sample.inputs.first().copied().unwrap_or(0.0)
 }
 
-/// Means of pairs of rows; a pair without any reading of an output has none of it.
+/// Means of pairs of rows; a pair without any reading of an output has no mean of it.
 fn halve(kept: &mut VecDeque<Kept>, outputs: usize) {
     let pairs = kept.len() / 2;
     let of_output = |output: usize| {

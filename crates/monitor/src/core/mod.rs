@@ -1,4 +1,4 @@
-//! The phases of watching, and how it is saved: learn, watch, alarm, look again, wait until it fits again.
+//! Phases of the monitor, and how it is saved: learn, monitor, alarm, evaluate again, wait until the model fits again.
 //!
 //! **Checkpoints.** Every [`STRETCH`] rows, and whenever the phase changes, all that is not plain numbers (the simulation, the
 //! whitening filter, the tracker's factors) is built again from plain numbers and the rows that are kept. A saved
@@ -24,63 +24,63 @@ use crate::{
     watch::{Said, Watch, tracked},
 };
 
-/// Rows that are kept.
+/// Number of stored rows.
 pub(crate) const KEPT: usize = 2048;
 /// Rows between checkpoints.
 const STRETCH: usize = 2048;
-/// Half the width of the interval that holds a Gaussian value with a probability of 95 %.
+/// Half the width of the interval that contains a Gaussian value with a probability of 95 %.
 const BAND: f64 = 1.96;
 
-const OTHER_NUMBERS: &str = "its numbers are not those of this model";
+const OTHER_NUMBERS: &str = "its numbers do not belong to this model";
 
-/// Where the watching is.
+/// Phase of the monitor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Phase {
-    /// Rows are gathered; at `next` a fit is tried. The one before has found that `span` seconds are needed.
+    /// Rows are collected; at `next` a fit is tried. The preceding fit has determined the required time `span` in seconds.
     Learning { next: usize, span: Option<f64> },
-    /// The learned model is watched.
+    /// Monitoring with the learned model.
     Watching,
-    /// It does not fit, and stays as it was learned until it fits again.
+    /// The model does not fit, and keeps its learned parameters until it fits again.
     Alarmed(Following),
 }
 
-/// An alarm that is followed.
+/// An alarm in progress.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Following {
-    /// What passed, and the output at which it shows most.
+    /// The score that exceeded its threshold, and the output with the largest deviation.
     score: f64,
     output: usize,
-    /// When it was raised \[s\].
+    /// Time of the alarm \[s\].
     since: f64,
-    /// So many rows ago.
+    /// Number of rows since the alarm.
     rows: usize,
-    /// Looked at so many times.
+    /// Number of evaluations.
     looks: usize,
-    /// An effect of the catalogue explained it, the last time.
+    /// Whether an effect of the catalogue explained the rows in the last evaluation.
     explained: bool,
-    /// For so many rows all scores have been small.
+    /// Number of rows since which all scores have been small.
     quiet: usize,
 }
 
-/// All that has to be saved.
+/// Data to be saved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Checkpoint {
     pub phase: Phase,
     /// Rows in a block.
     pub every: usize,
     pub kept: VecDeque<Kept>,
-    /// So many of the latest kept rows have been judged without a break.
+    /// Number of the latest stored rows that were evaluated without a break.
     pub judged: usize,
     /// Rows until the levels are known again.
     pub settling: usize,
     pub learned: Option<Learned>,
     pub bank: Option<Bank>,
-    /// Of each output.
+    /// Noise monitor of each output.
     pub scatter: Vec<Scatter>,
     pub tracker: Option<TrackerState>,
 }
 
-/// What became of a sample.
+/// Result of a sample.
 #[derive(Default)]
 pub(crate) struct Fed {
     pub said: Option<Said>,
@@ -89,13 +89,13 @@ pub(crate) struct Fed {
     pub scatter: Vec<ScatterAlarm>,
 }
 
-/// What is built from the learned numbers.
+/// Objects that are built from the learned numbers.
 struct Running<'a> {
     watch: Watch<'a>,
     tracker: Option<Tracker>,
     covariance: Vec<f64>,
     threshold: f64,
-    /// Of each output the pairs beyond the limit that make the scatter an alarm.
+    /// For each output the number of pairs beyond the limit that raises an alarm of increased noise.
     most: Vec<Most>,
 }
 
@@ -104,7 +104,7 @@ pub(crate) struct Core<'a> {
     settings: Settings,
     units: Units,
     pub(crate) axis: TimeAxis,
-    /// The present state, but for the tracker, which is as of the last checkpoint.
+    /// The present state, except for the tracker, which is that of the last checkpoint.
     now: Checkpoint,
     running: Option<Running<'a>>,
     checkpoint: Checkpoint,
@@ -140,7 +140,7 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// From a checkpoint and the rows since; in words what does not go together.
+    /// Restores from a checkpoint and the rows since; inconsistent data are reported in words.
     pub(crate) fn restore(
         model: Watched<'a>,
         settings: Settings,
@@ -166,7 +166,7 @@ impl<'a> Core<'a> {
         let (inputs, states) = (core.model.0.inputs(), core.model.0.states());
         let fits =
             |sample: &Sample| sample.inputs.len() == inputs && sample.outputs.len() == outputs;
-        // What is gathered has not been simulated yet.
+        // Collected rows have not been simulated yet.
         let (states, shown) = if learning { (0, 0) } else { (states, outputs) };
         let whole = |kept: &Kept| {
             fits(&kept.sample)
@@ -224,7 +224,7 @@ impl<'a> Core<'a> {
         self.now.kept.len()
     }
 
-    /// Every parameter as it was learned and as it is tracked; none while learning.
+    /// Learned and tracked value of every parameter; empty while learning.
     pub(crate) fn estimates(&self) -> Vec<Estimate> {
         let (Some(learned), Some(running)) = (&self.now.learned, &self.running) else {
             return Vec::new();
@@ -259,7 +259,7 @@ impl<'a> Core<'a> {
         Some((bank.largest(&running.covariance), running.threshold))
     }
 
-    /// The output at which a change shows most.
+    /// The output with the largest deviation.
     fn most_at(&self) -> Option<usize> {
         let (bank, running) = (self.now.bank.as_ref()?, self.running.as_ref()?);
         Some(bank.most_at(&running.covariance))
@@ -272,7 +272,7 @@ impl<'a> Core<'a> {
             Follows::Interval => self.begin(1),
             Follows::Gap => notice = self.resume(&sample),
         }
-        // Behind a checkpoint that a new beginning has set: the sample belongs to what follows it.
+        // After a checkpoint of a new start, the sample belongs to the rows after the start.
         self.since.push(sample.clone());
         let fed = match self.now.phase {
             Phase::Learning { next, span } => self.gather(sample, next, span),

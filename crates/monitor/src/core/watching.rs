@@ -1,4 +1,4 @@
-//! Watching: what scores and scatter say of a row, and the looks after an alarm.
+//! Monitoring: evaluation of scores and noise for each row, and evaluations after an alarm.
 
 use super::{Core, Fed, Following, KEPT, Phase, STRETCH, learning::at_rest};
 use crate::{
@@ -9,22 +9,22 @@ use crate::{
     watched::Raised,
 };
 
-/// After a long gap the levels are not known for so many slowest time constants.
+/// After a long gap the levels are unknown for this number of slowest time constants.
 const SETTLING: f64 = 6.0;
-/// After an alarm it is looked again, so many slowest time constants later.
+/// After an alarm the rows are evaluated again after these numbers of slowest time constants.
 const LOOKS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 12.0];
-/// At so many of them the tracker is let go again: the derivatives are those of parameters that stay, and while the change works its way
-/// through the plant they mislead it.
+/// At the evaluation with this number the tracker is released again: its derivatives are those of constant parameters, and are misleading
+/// while the effect of the change propagates through the plant.
 const LET_GO: usize = 3;
-/// A look comes at least so many rows after the alarm, and each later one twice as many.
+/// Least number of rows from the alarm to the first evaluation; each later one needs twice as many.
 const FEWEST: usize = 8;
-/// The model fits again where every score has stayed below this share of the threshold ...
+/// The model fits again if every score has stayed below this share of the threshold ...
 const QUIET: f64 = 0.75;
-/// ... for so many slowest time constants, the longest window of the scores.
+/// ... for this number of slowest time constants, the longest window of the scores.
 const QUIET_FOR: f64 = 6.0;
 
 impl Core<'_> {
-    /// After a long gap: what was gathered is no record, and levels are not known.
+    /// After a long gap: the collected rows do not continue, and levels are not known.
     pub(super) fn resume(&mut self, sample: &Sample) -> Option<Notice> {
         let Some(learned) = &self.now.learned else {
             if self.now.kept.is_empty() {
@@ -33,16 +33,16 @@ impl Core<'_> {
             let every = self.now.every;
             self.begin(every);
             return Some(Notice::LearnsAnew {
-                why: "what was gathered before the long gap is no record with what follows",
+                why: "the rows before the long gap and the rows after it do not form one record",
             });
         };
         if let Phase::Alarmed(following) = &mut self.now.phase {
-            // The rows in which it began are no record with what follows.
+            // The rows of the beginning do not form a record with later rows.
             following.looks = LOOKS.len();
             following.quiet = 0;
         }
         self.now.settling = (SETTLING * learned.rows_per_time_constant()).ceil() as usize;
-        // What is read is where it is read; the others are taken where they were.
+        // Measured levels start at their readings, the others at their last values.
         let last = self.now.kept.back();
         let mut states = last.map_or_else(
             || Each::from_slice(&learned.operating),
@@ -70,11 +70,11 @@ impl Core<'_> {
         let mut fed = Fed::default();
         let finite = |said: &Innovation| said.standardised.is_finite();
         if !said.innovations.iter().flatten().all(finite) {
-            // A level that left all bounds: what was learned is of no use any more.
+            // A level has diverged: the learned model cannot be used any more.
             let every = self.now.every;
             self.begin(every);
             fed.notice = Some(Notice::LearnsAnew {
-                why: "under these inputs the learned model leaves all bounds",
+                why: "under these inputs the learned model diverges",
             });
             fed.said = Some(said);
             return fed;
@@ -85,7 +85,7 @@ impl Core<'_> {
         } else {
             self.now.judged = (self.now.judged + 1).min(self.now.kept.len());
         }
-        // A row without a reading says nothing.
+        // A row without a reading contains no information.
         if settling == 0 && said.any() {
             let share = match self.now.phase {
                 Phase::Alarmed(_) => QUIET,
@@ -104,7 +104,7 @@ impl Core<'_> {
                     fed.scatter.extend(self.scatter(output, e, time));
                 }
             }
-            // A score of the smaller noise says nothing of the larger.
+            // Scores computed with the smaller noise are not valid for the larger noise.
             let passed = passed && fed.scatter.is_empty();
             (fed.alarm, fed.notice) = self.judge(passed, time);
         }
@@ -115,12 +115,12 @@ impl Core<'_> {
         fed
     }
 
-    /// How many times as large as learned the noise of each output is.
+    /// Ratio of the present to the learned noise for each output.
     fn growth(&self) -> Each<f64> {
         self.now.scatter.iter().map(Scatter::growth).collect()
     }
 
-    /// Whether the scatter of an output has moved. Where an effect explains an alarm, its residual is no noise.
+    /// Whether the noise of an output has changed. If an effect explains an alarm, its residual is not noise.
     fn scatter(&mut self, output: usize, innovation: f64, time: f64) -> Option<ScatterAlarm> {
         let (learned, running) = (self.now.learned.as_ref()?, self.running.as_ref()?);
         let scatter = self.now.scatter.get_mut(output)?;
@@ -133,7 +133,7 @@ impl Core<'_> {
         if let Some(bank) = &mut self.now.bank
             && matches!(moved, Moved::Grown(_))
         {
-            // What was summed up of larger noise than was reckoned with says nothing.
+            // Sums over rows with noise above the assumed level are not valid.
             bank.begin();
         }
         let model = &self.model.0;
@@ -144,7 +144,7 @@ impl Core<'_> {
         Some(ScatterAlarm::new(moved, time, name, (noise, unit)))
     }
 
-    /// What follows from whether a score has passed, or, while an alarm is followed, has not stayed small.
+    /// Reaction to a score above its threshold or, during an alarm, to a score that has not stayed small.
     fn judge(&mut self, passed: bool, time: f64) -> (Option<Alarm>, Option<Notice>) {
         match self.now.phase {
             Phase::Watching if passed && !self.now.scatter.iter().any(Scatter::is_suspicious) => {
@@ -169,7 +169,7 @@ impl Core<'_> {
         }
     }
 
-    /// A row after an alarm.
+    /// Processes a row after an alarm.
     fn follow(
         &mut self,
         following: Following,
@@ -219,7 +219,7 @@ impl Core<'_> {
         (alarm, None)
     }
 
-    /// Looks which effect the latest rows are consistent with.
+    /// Determines the effects that the latest rows are consistent with.
     fn look(&mut self, stage: Stage, time: f64) -> Option<Alarm> {
         let Phase::Alarmed(following) = self.now.phase else {
             return None;

@@ -1,4 +1,4 @@
-//! Fits of one suspect after the other to the rows that are kept.
+//! Fits of one candidate after the other to the stored rows.
 
 use ct_signals::{Hold, Record};
 use greybox::{Noise, Setup, Stopping, fit_from};
@@ -16,7 +16,7 @@ pub(super) struct Search<'a> {
     pub(super) noise: Noise,
     pub(super) hold: Hold,
     pub(super) rows: &'a [Kept],
-    /// Of each output.
+    /// Series of each output.
     pub(super) series: Vec<Series>,
     /// Outputs that have readings.
     pub(super) read: usize,
@@ -27,7 +27,7 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The better of an effect with all its parameters and with one of them held, where that makes a simpler effect of it.
+    /// The better of an effect with all its parameters and with one of them fixed, if this gives a simpler effect.
     pub(super) fn suspect(&self, placed: Placed) -> Option<Suspect> {
         let whole = self.suspect_with(placed, None);
         if placed.effect.id != EVEN.0 {
@@ -52,7 +52,7 @@ impl Search<'_> {
         let mut best: Option<(Suspect, usize, Vec<f64>)> = None;
         let mut near: Option<Vec<f64>> = None;
         for (i, &length) in lengths.iter().enumerate() {
-            // From the catalogue's starts now and then, in between from where the last onset ended.
+            // Fits start from the catalogue's values at some onsets, and otherwise from the result of the preceding onset.
             let from = near.take().filter(|_| !i.is_multiple_of(AFRESH));
             let Some((suspect, x)) = self.fitted((placed, held), length, from.as_deref(), ROUGH)
             else {
@@ -67,7 +67,7 @@ impl Search<'_> {
             }
         }
         let (_, at, _) = best.as_ref()?;
-        // Half-way to the next onset on either side, again and again.
+        // Repeatedly halves the distance to the next onset on either side.
         let position = lengths.iter().position(|length| length == at)?;
         let below = position.checked_sub(1).map_or(FEWEST, |i| lengths[i]);
         let above = lengths.get(position + 1).copied().unwrap_or(n);
@@ -92,8 +92,8 @@ impl Search<'_> {
         Some(fine.map_or(rough, |(fine, _)| fine))
     }
 
-    /// A fit begins with play, lags and dead time at rest at its first command. What the learned model, begun in the same way, misses of the
-    /// one that ran on is taken from the readings.
+    /// A fit begins with backlash, lags and dead time at rest at its first command. The difference between the learned model with this
+    /// beginning and the continuous simulation is subtracted from the readings.
     fn put_right(&self, record: &mut Record, from: usize) -> Option<()> {
         if self.structure.effects().is_empty() && self.structure.terms().is_empty() {
             return Some(());
@@ -124,7 +124,7 @@ impl Search<'_> {
         Some(())
     }
 
-    /// The effect as it began `length` rows ago, fitted; its own parameters start at `near` or at the catalogue's starts.
+    /// The effect with an onset `length` rows ago, fitted; its parameters start at `near` or at the catalogue's starts.
     fn fitted(
         &self,
         (placed, held): (Placed, Option<&str>),
@@ -155,11 +155,11 @@ impl Search<'_> {
         let own = structure.effect_parameters(placed);
         let leading = own.first()?.clone();
         let name = |parameter: &str| format!("{}.{parameter}", placed.effect.id);
-        // Its onset is that of the record.
+        // The onset of this effect is the start of the record.
         if placed.effect.id == "valve_step" {
             fixed.insert(name("time"), 0.0);
         }
-        // It followed the command until then.
+        // The actuator followed the command until the onset.
         fixed.insert(BEGIN_IN_BAND.into(), 0.0);
         if let Some(held) = own.iter().find(|parameter| Some(parameter.name) == held) {
             fixed.insert(name(held.name), held.upper);
@@ -217,7 +217,7 @@ impl Search<'_> {
     }
 }
 
-/// All combinations of the starts of an effect's first parameters.
+/// All combinations of the start values of an effect's first parameters.
 fn grid(parameters: &[plants::ParameterInfo], count: usize) -> Vec<Vec<f64>> {
     parameters
         .iter()

@@ -1,4 +1,4 @@
-//! What has been learned of a plant and of its noise.
+//! Learned parameters of a plant and of its noise.
 
 use ct_signals::{ArModel, Hold};
 use greybox::{Noise, PriorValue};
@@ -16,24 +16,24 @@ use crate::threshold::relative_error;
 pub struct Model {
     /// The plant.
     pub plant: Plant,
-    /// What is known of it.
+    /// Known constants of the plant.
     pub known: Known,
-    /// The effects that are on.
+    /// The effects in the model.
     pub effects: Vec<Placed>,
-    /// Terms of the user's own that are on.
+    /// Terms of the user's own in the model.
     pub terms: Vec<Term>,
     /// First guesses by name: `alpha`, `overflow.rim`.
     pub start: BTreeMap<String, f64>,
-    /// Names in `start` that are not fitted, but watched.
+    /// Names in `start` that are not fitted, but monitored.
     pub fixed: Vec<String>,
-    /// What is known of parameters beside the rows, by the same names.
+    /// Priors of parameters, by the same names.
     pub priors: BTreeMap<String, PriorValue>,
-    /// What the command does between rows.
+    /// Hold of the command between rows.
     pub hold: Hold,
 }
 
 impl Model {
-    /// The plant alone, with nothing said of its parameters, under a command that is held between rows.
+    /// The plant with default settings of its parameters, under a command that is held between rows.
     #[must_use]
     pub fn new(plant: Plant, known: Known) -> Self {
         Self {
@@ -66,12 +66,12 @@ impl Model {
     }
 }
 
-/// What was learned.
+/// Result of learning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Learned {
     /// The parameters, in the structure's order.
     pub theta: Vec<f64>,
-    /// Their covariance, row by row; zero for what was not fitted, or held at a bound.
+    /// Covariance of the parameters, row by row; zero for a parameter that was not fitted, or is held at a bound.
     pub covariance: Vec<f64>,
     /// The noise of each output.
     pub outputs: Vec<OutputNoise>,
@@ -79,9 +79,9 @@ pub(crate) struct Learned {
     pub time_constant: f64,
     /// The usual step of the time \[s\].
     pub interval: f64,
-    /// States where it works as a rule.
+    /// Typical operating states.
     pub operating: Vec<f64>,
-    /// Of a plant: sizes by which its effects are scaled, and steps of the simulation in an interval.
+    /// For a plant: scales of its effects, and steps of the simulation per interval.
     pub scales: Option<Scales>,
     pub substeps: usize,
 }
@@ -92,9 +92,9 @@ pub(crate) struct OutputNoise {
     /// Coefficients and innovations' standard deviation \[output unit\].
     pub coefficients: Vec<f64>,
     pub sigma: f64,
-    /// Readings from which it was learned.
+    /// Number of readings in the learning phase.
     pub readings: usize,
-    /// How far neighbouring innovations lie apart.
+    /// Limit of the differences between neighbouring innovations.
     pub scatter: Limit,
 }
 
@@ -119,14 +119,14 @@ impl Learned {
         models.map(Noise::of)
     }
 
-    /// Rows from which it was learned.
+    /// Number of rows in the learning phase.
     pub(crate) fn rows(&self) -> usize {
         let readings = self.outputs.iter().map(|output| output.readings);
         readings.max().unwrap_or(0)
     }
 
-    /// The relative standard error of the noise's slow part ([`relative_error`]) at the output where it is largest, which may be the only
-    /// one that sees a change.
+    /// The relative standard error of the noise's slow part ([`relative_error`]) at the output where it is largest, because this output may
+    /// be the only one that shows a change.
     pub(crate) fn relative_error(&self) -> Option<f64> {
         let of_output = |output: &OutputNoise| {
             let model = output.model()?;

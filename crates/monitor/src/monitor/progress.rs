@@ -1,4 +1,4 @@
-//! What a monitor says of itself: its estimates, and how far it has come.
+//! Report of a monitor: its estimates, and its progress.
 
 use serde::Serialize;
 
@@ -9,46 +9,46 @@ pub struct Estimate {
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// As it was learned.
+    /// Learned value.
     pub learned: f64,
-    /// As it is now.
+    /// Present value.
     pub value: f64,
     /// Half the width of the 95 % interval; `None` for one that is fixed.
     pub half_width: Option<f64>,
 }
 
-/// Where the monitor is.
+/// Phase of the monitor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Progress {
-    /// It learns, and has so many rows (or blocks of rows).
+    /// The monitor learns, and has collected this number of rows (or blocks of rows).
     Learning(usize),
-    /// The learned model is watched: the largest score now and the threshold.
+    /// Monitoring: the largest present score and its threshold.
     Watching {
         /// The largest score, by magnitude.
         score: f64,
-        /// What it has to pass.
+        /// Threshold of the score.
         threshold: f64,
     },
-    /// The model does not fit: the same.
+    /// The model does not fit: score and threshold.
     Alarmed {
         /// The largest score, by magnitude.
         score: f64,
-        /// What it had to pass.
+        /// Threshold of the score.
         threshold: f64,
     },
 }
 
-/// What is there to learn from, and what is needed at least before the next fit is tried.
+/// Rows collected for learning, and the minimum for the next attempt of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gathered {
     /// Rows.
     pub rows: usize,
-    /// From the first to the last \[s\].
+    /// Time from the first to the last row \[s\].
     pub span: f64,
-    /// Rows that are needed.
+    /// Required number of rows.
     pub rows_needed: usize,
-    /// Slowest time constants that are needed.
+    /// Required number of slowest time constants.
     pub time_constants: f64,
-    /// What these last \[s\], by the latest fit; `None` before the first.
+    /// Required time span \[s\] according to the latest fit; `None` before the first.
     pub span_needed: Option<f64>,
 }

@@ -1,17 +1,18 @@
-//! Isolation at the ports of a model of its user's own: which effect of the catalogue, or which candidate of the user's own, began, and when,
-//! explains the latest rows.
+//! Isolation at the ports of a user's own model: the effect of the catalogue, or the user's own candidate, and its onset, that explains the
+//! latest rows.
 //!
-//! An effect that begins at row `j` is fitted to the rows from `j` on, in the metric of the learned noise: every parameter of the model as it
-//! was learned, the states at `j` as the learned model has them, only the effect's own parameters free, and the initial values of the states that
-//! it brings. With `S` the sum of squares, in
-//! the noise's variance, of what is left of the rows from `j` on, without the effect and with it,
+//! An effect that begins at row `j` is fitted to the rows from `j` on, in the metric of the learned noise: every parameter of the model as
+//! it was learned, the states at `j` as the learned model has them, only the effect's own parameters free, and the initial values of the
+//! states that it brings. With `S` the sum of squares, in the noise's variance, of what is left of the rows from `j` on, without the effect
+//! and with it,
 //! ```text
 //! evidence = S_without - S_with - (parameters + 1) ln n
 //! ```
-//! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs. Onsets
-//! are those around the one that a change of unknown direction has ([`super::onset`]).
+//! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs.
+//! Onsets are those around the one that a change of unknown direction has ([`super::onset`]).
 //!
-//! **Cost**: some ten simulations of the rows behind the onset for each effect, port and onset; of a candidate of the user's own up to a hundred.
+//! **Cost**: some ten simulations of the rows behind the onset for each effect, port and onset; of a candidate of the user's own up to a
+//! hundred.
 
 use std::collections::BTreeMap;
 
@@ -26,7 +27,7 @@ use super::{CandidateModel, OwnModel};
 use crate::isolate::{FEWEST, FINE, Left, ROUGH};
 use crate::{Each, isolate::Kept, learn::Learned, learn::record};
 
-/// Effects that begin while a plant runs. What is a model's shape, a wrong law or a lag, does not.
+/// Effects that can begin while a plant runs. The model's shape, a wrong law or a lag are not among them.
 const BEGIN: [&str; 11] = [
     "dead_zone",
     "saturation",
@@ -40,14 +41,14 @@ const BEGIN: [&str; 11] = [
     "coupling",
     "leak_at_height",
 ];
-/// So does a parameter that has another value from then on.
+/// A step of a parameter has the same property.
 const STEP: &str = "step";
-/// Onsets that are tried, in rows behind the one that is found first.
+/// Onsets that are tried, in rows after the one that is found first.
 const AROUND: [f64; 5] = [1.0, 0.6, 0.8, 1.25, 1.6];
-/// So many starts of an effect are fitted, those that leave least.
+/// Number of starts that are fitted for an effect, those with the least sum of squares.
 const STARTS: usize = 3;
-/// So many candidates of the user's own are tried at every onset, those that explain most at the one that is found first: a file may hold
-/// hundreds, and rows do not wait.
+/// Number of the user's own candidates that are tried at every onset. The candidates with the largest improvement at the first onset are
+/// chosen: a file may contain hundreds, and computing time per row is limited.
 const OWN: usize = 16;
 
 /// An effect that explains the latest rows, as well as it can.
@@ -57,9 +58,9 @@ pub(super) struct Suspect {
     pub evidence: f64,
     /// \[s\]
     pub since: f64,
-    /// Its size: name, value, unit.
+    /// Size of the effect: name, value, unit.
     pub size: (String, f64, String),
-    /// The size lies inside its bounds.
+    /// Whether the size is inside its bounds.
     pub plausible: bool,
     pub left: Left,
 }
@@ -72,8 +73,8 @@ fn begins(candidate: &Candidate) -> bool {
     BEGIN.contains(&effect.id) || effect.id == STEP && effect.place == Place::Parameter
 }
 
-/// Every effect that may have begun, best first: an implausible size comes after every plausible one. `since`: the onset that is found first
-/// \[s\]; the noise of each output is `growth` times as large as it was learned.
+/// Every effect that may have begun, best first: implausible sizes come last. `since`: the onset that was found first \[s\]; the noise of
+/// each output is `growth` times the learned noise.
 pub(super) fn isolate(
     own: &OwnModel,
     learned: &Learned,
@@ -119,7 +120,7 @@ pub(super) fn isolate(
         let keys = (b.plausible, b.evidence).partial_cmp(&(a.plausible, a.evidence));
         keys.unwrap_or(std::cmp::Ordering::Equal)
     });
-    // Of several onsets the one that explains most.
+    // Of several onsets, the one that explains most.
     let mut best: Vec<Suspect> = Vec::with_capacity(suspects.len());
     for suspect in suspects {
         if best.iter().all(|known| known.effect != suspect.effect) {
@@ -129,13 +130,13 @@ pub(super) fn isolate(
     best
 }
 
-/// The rows behind an onset.
+/// The rows after an onset.
 struct Window {
-    /// When it begins \[s\].
+    /// Onset \[s\].
     since: f64,
     records: [Record; 1],
     states: Vec<f64>,
-    /// What the learned model leaves.
+    /// Sum of squares of the learned model.
     without: f64,
     candidates: Vec<Candidate>,
 }
@@ -148,7 +149,7 @@ struct Search<'s, 'a> {
     pub(super) noise: Noise,
     /// Standard deviation of each output's innovations.
     pub(super) sigmas: Vec<f64>,
-    /// Rows that are kept times outputs.
+    /// Number of stored rows times outputs.
     samples: f64,
 }
 
@@ -189,7 +190,7 @@ impl Search<'_, '_> {
         })
     }
 
-    /// A model in which nothing is fitted but what it has beside the learned one, without what is `known` of that.
+    /// A model in which only the entries that the learned model lacks are fitted, except those that are `known`.
     fn setup<'b>(
         &self,
         model: &'b Model,
@@ -208,17 +209,17 @@ impl Search<'_, '_> {
         Some(setup.with_free(&free).with_scales(self.sigmas.clone()))
     }
 
-    /// Which state of the learned model this is; `None` of one that an effect brings.
+    /// Index of this state in the learned model; `None` for a state of an effect.
     fn learned_state(&self, state: &State) -> Option<usize> {
         let mut learned = self.spec.states.iter();
         learned.position(|own| own.about.name == state.about.name)
     }
 
-    /// Where a fit begins: the states are those of the learned model; what an effect brings is at its start.
+    /// Start of a fit: states of the learned model; parameters and states of an effect have their start values.
     fn vector(&self, setup: &ModelSetup, states: &[f64]) -> Vec<f64> {
         let mut x = setup.start().to_vec();
         let first = setup.parameter_count();
-        // An effect puts its states where the order of the chains has them.
+        // An effect inserts its states in the order of the chains.
         for (i, state) in setup.model().spec().states.iter().enumerate() {
             if let Some(learned) = self.learned_state(state) {
                 x[first + i] = states[learned];
@@ -227,7 +228,7 @@ impl Search<'_, '_> {
         x
     }
 
-    /// Those of the user's own. `since`: the onset that is found first \[s\].
+    /// Candidates of the user's own. `since`: the onset that was found first \[s\].
     fn of_own(&self, windows: &[Window], since: f64) -> Vec<Suspect> {
         let first = windows
             .iter()
@@ -252,10 +253,10 @@ impl Search<'_, '_> {
         found.chain(others).collect()
     }
 
-    /// A candidate fitted behind an onset; `model`: the learned one with the candidate in it.
+    /// A candidate fitted after an onset; `model`: the learned model with the candidate inserted.
     fn suspect(&self, window: &Window, candidate: &Candidate, model: &Model) -> Option<Suspect> {
         let is_step = candidate.effect.is_some_and(|effect| effect.id == STEP);
-        // Its onset is that of the rows.
+        // The onset of this candidate is the first row.
         let begin = candidate.record_numbers.get("begin");
         let since = candidate
             .parameters
@@ -296,7 +297,7 @@ impl Search<'_, '_> {
         starts.retain(|(cost, _)| cost.is_finite());
         starts.truncate(STARTS);
         let starts: Vec<Start> = starts.into_iter().map(|(_, x)| Start::from(x)).collect();
-        // The catalogue's starts are shares of what the rows visit; those of the user's own may lie far from what has begun.
+        // The catalogue's starts are shares of the range of the rows; those of the user's own candidates may be far from the actual size.
         let stopping = match candidate.effect {
             Some(_) => ROUGH,
             None => FINE,
@@ -307,7 +308,7 @@ impl Search<'_, '_> {
         let leading = |(at, p): &&(usize, &ct_model::effects::EffectParameter)| {
             p.role != Role::Choice && setup.free().contains(at)
         };
-        // Of a candidate of the user's own the one that is zero without it, if there is such a one.
+        // For a candidate of the user's own, the parameter that is zero if the effect is absent, if there is one.
         let is_size = |(_, p): &&(usize, &ct_model::effects::EffectParameter)| {
             candidate.effect.is_none() && p.role == Role::Size
         };

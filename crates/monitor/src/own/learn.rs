@@ -1,4 +1,4 @@
-//! The learning phase of a model of its user's own: fitted to the first rows by `greybox`, with the noise that it leaves at each output.
+//! The learning phase of a user's own model: a fit to the first rows by `greybox`, and the noise model of each output.
 //!
 //! Lost readings are left out of the likelihood, and need nothing in their place. The slowest time constant is that of the fitted model,
 //! linearised at its mean state under the mean inputs: from the eigenvalues of `dx(t + h)/dx(t)`, which the simulation gives exactly.
@@ -17,10 +17,10 @@ use crate::{
 
 /// Derivatives by so many states at once.
 const LANES: usize = 4;
-/// What is nearer to one than this does not settle within the rows that are kept.
+/// An eigenvalue closer to one does not decay within the stored rows.
 const SETTLES: f64 = 1e-7;
 
-/// The fit, and the states at the first row; in words why there is none.
+/// The fit, and the states at the first row; or the reason in words why there is none.
 pub(super) fn learn(
     own: &OwnModel,
     samples: &[Sample],
@@ -57,7 +57,7 @@ pub(super) fn learn(
         && !still.is_empty()
     {
         return Err(format!(
-            "every input has stood still ({}), which says nothing about the plant: move one",
+            "every input has been constant ({}), which does not excite the plant: move one",
             still.join(", ")
         ));
     }
@@ -75,10 +75,10 @@ pub(super) fn learn(
         let silent = (0..free.len()).filter(|&i| fit.triangle.column_norm(i) <= f64::MIN_POSITIVE);
         let silent: Vec<&str> = silent.map(|i| setup.names()[free[i]].as_str()).collect();
         return Err(if silent.is_empty() {
-            "the rows do not determine the parameters one without the other: give one of them under [known], give a [prior], or move the inputs more".into()
+            "the rows determine the parameters only in combination: give one of them under [known], give a [prior], or move the inputs more".into()
         } else {
             format!(
-                "{} leaves no trace in the rows: give it under [known], or move the inputs more",
+                "{} has no effect on the readings: give it under [known], or move the inputs more",
                 silent.join(", ")
             )
         });
@@ -163,7 +163,7 @@ fn time_constant(
 ) -> Result<f64, String> {
     let n = states.len();
     if n == 0 {
-        // What has no state follows at once.
+        // A model without states responds at once.
         return Ok(interval);
     }
     let mean = |i: usize| samples.iter().map(|s| s.inputs[i]).sum::<f64>() / samples.len() as f64;
@@ -191,6 +191,6 @@ fn time_constant(
             "the fitted model does not settle under steady inputs, so that it cannot run beside the plant".into(),
         );
     }
-    // What settles within an interval has a time constant far below it.
+    // A response that decays within one interval has a time constant far below the interval.
     Ok((-interval / largest.max(f64::MIN_POSITIVE).ln()).max(1e-3 * interval))
 }

@@ -1,4 +1,4 @@
-//! A model of its user's own as it is watched.
+//! A user's own model for the monitor.
 //!
 //! The parameters that are watched are those that the text declares as `parameter`, in its order; constants and `final parameter`s stay as
 //! they are. Those that the model file knows are not fitted, and watched all the same: they may change.
@@ -29,20 +29,20 @@ use crate::{
     watched::{Believed, Raised},
 };
 
-/// A model of its user's own, and what is known of it.
+/// A user's own model, and its known properties.
 #[derive(Debug, Clone)]
 pub struct OwnModel<'a> {
     /// The model.
     pub model: &'a Model,
     /// Parameters that are not fitted, by name.
     pub known: BTreeMap<String, f64>,
-    /// What is known of parameters beside the rows, by name.
+    /// Priors of parameters, by name.
     pub priors: BTreeMap<String, PriorValue>,
-    /// What the inputs do between rows.
+    /// Hold of the inputs between rows.
     pub hold: Hold,
     /// Seconds in one unit of the model's time, above zero.
     pub time_unit: f64,
-    /// Candidates of the user's own, which take part in the isolation beside the catalogue's effects.
+    /// Candidates of the user's own, for the isolation in addition to the catalogue's effects.
     pub candidates: &'a [CandidateModel],
 }
 
@@ -51,12 +51,12 @@ pub struct OwnModel<'a> {
 pub struct CandidateModel {
     /// The candidate.
     pub candidate: Candidate,
-    /// The watched model with the candidate in it: what both have goes by the same names.
+    /// The monitored model with the candidate inserted: common variables have the same names.
     pub model: Model,
 }
 
 impl<'a> OwnModel<'a> {
-    /// The model with nothing said of its parameters, its time in seconds, under inputs that are held between rows.
+    /// The model with default settings: time in seconds, inputs held between rows.
     #[must_use]
     pub fn new(model: &'a Model) -> Self {
         Self {
@@ -76,7 +76,7 @@ impl<'a> OwnModel<'a> {
         fitted.map(|(i, _)| i).collect()
     }
 
-    /// All parameters, the watched ones with these values.
+    /// All parameters, with these values for the monitored ones.
     fn parameters_with(&self, theta: &[f64]) -> Vec<f64> {
         let mut all = self.model.parameters();
         for (value, parameter) in all.iter_mut().zip(&self.model.spec().parameters) {
@@ -94,7 +94,7 @@ impl<'a> OwnModel<'a> {
     }
 }
 
-/// Puts what was isolated into an alarm, where it explains the rows.
+/// Adds the result of the isolation to an alarm, if it explains the rows.
 fn put_in(alarm: &mut Alarm, suspects: &[isolate::Suspect]) {
     let explains = |best: &&isolate::Suspect| {
         best.plausible && best.evidence > 0.0 && !best.left.is_more_than_noise()
@@ -172,7 +172,7 @@ impl<'a> Believed<'a> for OwnModel<'a> {
     fn fingerprint(&self) -> Fingerprint {
         let mut all = Fingerprint::new();
         let mut add = |key: String, value: String| drop(all.insert(key, value));
-        // As it is written: a comment or another layout is no other model.
+        // Compared in normalised form: a comment or another layout does not make another model.
         add("model".into(), self.model.spec().to_string());
         add("hold".into(), format!("{:?}", self.hold).to_lowercase());
         add(TIME_UNIT.into(), self.time_unit.to_string());

@@ -1,4 +1,4 @@
-//! Since when a model of its user's own does not fit: the onset of the one change that explains the latest rows best.
+//! Onset of a deviation for a user's own model: the onset of the single change that explains the latest rows best.
 //!
 //! A change of direction `i` (a watched parameter, or an offset of one output) by `d` that begins at row `j` adds `d s_i(k)` to the outputs
 //! from then on, `s_i` the derivative of the learned model that begins at the states of row `j`. With `s` whitened by the noise of the
@@ -8,7 +8,7 @@
 //! ```
 //! is by how much the sum of squares falls with the best of them: the generalised likelihood ratio of a change of unknown onset, which is
 //! where it is largest (A. S. Willsky, H. L. Jones, IEEE Trans. Automatic Control 21 (1976) 108-112). It is linear in the change, whose
-//! beginning a large one shows right; what it does later it does not. So rows count until [`BEHIND`] time constants behind the alarm.
+//! beginning a large one shows right; what it does later it does not. So rows count until [`BEHIND`] time constants after the alarm.
 //!
 //! **Cost**: some 25 simulations with derivatives of at most the rows that are kept, for each look at an alarm.
 
@@ -21,12 +21,12 @@ use crate::{Each, isolate::Kept, learn::Learned};
 const ONSETS: [f64; 14] = [
     0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0,
 ];
-/// Rows count until so many slowest time constants behind the alarm.
+/// Rows are used until this number of slowest time constants after the alarm.
 const BEHIND: f64 = 1.0;
-/// An onset has at least so many rows behind it.
+/// An onset has at least so many rows after it.
 const FEWEST: usize = 2;
 
-/// When the change began \[s\] of which an alarm was raised at `raised` \[s\]; `None` where the rows say nothing of any.
+/// Onset \[s\] of the change after an alarm at `raised` \[s\]; `None` if the rows do not determine it.
 pub(super) fn onset(
     own: &OwnModel,
     learned: &Learned,
@@ -74,7 +74,7 @@ pub(super) fn onset(
     (most > 0.0).then(|| rows[rows.len() - best].sample.time)
 }
 
-/// By how much the sum of squares of these rows falls with the best change at the first of them.
+/// Fall of the sum of squares of these rows with the best change at the first of them.
 fn gain(
     own: &OwnModel,
     learned: &Learned,
@@ -90,7 +90,7 @@ fn gain(
     let mut whiteners = Vec::with_capacity(growth.len());
     for noise in &learned.outputs {
         let mut whitener = noise.model()?.whitener(lanes + 1);
-        // Before the change there was nothing of it.
+        // Before the change its influence is zero.
         for _ in 0..=noise.coefficients.len() {
             row.fill(0.0);
             whitener.push(&mut row);

@@ -1,6 +1,6 @@
-//! A model of its user's own on the rows as they come, with exact derivatives of its outputs by the watched parameters.
+//! A user's own model on the rows as they come, with exact derivatives of its outputs by the watched parameters.
 //!
-//! Simulations that carry a few derivatives each run side by side until every watched parameter has one. **Cost** of a row: that many simulations of the
+//! Simulations that carry a few derivatives each run side by side until every watched parameter has one. **Cost** of a row: so many simulations of the
 //! model from row to row; nothing is allocated, but for the past of what is delayed.
 
 use ct_model::{Dual, Simulation, SimulationNumber};
@@ -11,16 +11,16 @@ use crate::{Each, intake::Sample, sensitivity::Model as Running};
 
 struct Lanes<'a, T> {
     simulations: Vec<Simulation<'a, T>>,
-    /// Of each simulation its outputs, as they were observed.
+    /// Outputs of each simulation.
     observed: Vec<Vec<T>>,
-    /// Model's time since it began, and how many of it a second has.
+    /// Model's time since its start, and its units in one second.
     time: f64,
     per_second: f64,
-    /// It could not go on.
+    /// Whether the simulation diverged.
     failed: bool,
 }
 
-/// The model with these watched parameters, from these states on, which depend on no parameter.
+/// The model with these monitored parameters, from these states, which do not depend on parameters.
 pub(super) fn running<'a>(
     own: &OwnModel<'a>,
     theta: &[f64],

@@ -1,4 +1,4 @@
-//! A believed model that remembers: what came before the onset that is looked for is on its way yet.
+//! A believed model with dead time: commands from before the onset still have an effect after it.
 
 use ct_signals::{excitation, noise};
 use monitor::{Alarm, Model, Monitor, Row, Settings, Units};
@@ -8,7 +8,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 /// Dead time \[rows\].
 const DELAY: usize = 15;
 
-/// A jump of the command is on its way through the dead time while the leak begins.
+/// A step of the command is delayed by the dead time while the leak begins.
 #[test]
 fn a_leak_behind_a_dead_time_is_named_and_measured() {
     let known = Known {
@@ -48,7 +48,7 @@ fn a_leak_behind_a_dead_time_is_named_and_measured() {
     }
     let first = alarms.first().unwrap();
     assert!((3000.0..3200.0).contains(&first.time), "{first:?}");
-    // With the first rows its onset is uncertain; with more it is not.
+    // With the first rows the onset is uncertain; with more rows it is accurate.
     let last = alarms.last().unwrap();
     assert!(alarms.len() > 3);
     assert!(last.effects.iter().any(|e| e == "const_leak"), "{last:?}");

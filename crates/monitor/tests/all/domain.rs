@@ -1,4 +1,4 @@
-//! What begins at a plant that is no tank is not named after one.
+//! Effects at a plant that is no tank do not have the names of tank effects.
 
 use ct_signals::{excitation, noise};
 use monitor::{Model, Monitor, Row, Settings, Units};

@@ -1,4 +1,4 @@
-//! The monitor from outside: a tank with noise, rows one at a time.
+//! The monitor through its interface: a tank with noise, one row at a time.
 
 mod clock;
 mod lost;
@@ -104,7 +104,7 @@ fn a_leak_is_seen_named_and_dated() {
     assert!(first.score > first.threshold);
     assert!(last.evidence.unwrap() > first.evidence.unwrap());
     assert!(last.sentence.contains(" since t = ") && last.sentence.contains(" against "));
-    // The group is what cannot be told apart: a member is within six of the best.
+    // The group contains the effects that cannot be distinguished: a member is within six of the best.
     if last.effects.len() > 1 {
         assert_eq!(last.verdict, Verdict::Undecided);
         let next = last.next.as_ref().unwrap();
@@ -112,7 +112,7 @@ fn a_leak_is_seen_named_and_dated() {
     }
 }
 
-/// What was believed is not given up for what is now: it goes on being said that it does not fit, until it does.
+/// The learned model does not change after an alarm: the monitor reports a mismatch until the model fits again.
 #[test]
 fn the_learned_model_stays_until_it_fits_again() {
     let tank = Tank {
@@ -232,7 +232,7 @@ fn nothing_is_seen_where_nothing_is() {
         let mut monitor = new(model());
         let steps = all(&mut monitor, &tank.run());
         assert!(alarms(&steps).is_empty(), "{:?}", alarms(&steps));
-        // The innovations are white and of the size that was learned.
+        // The innovations are white and have the learned standard deviation.
         let e: Vec<f64> = steps
             .iter()
             .filter_map(|step| Some(step.innovations[0]?.standardised))
@@ -249,7 +249,7 @@ fn nothing_is_seen_where_nothing_is() {
     }
 }
 
-/// The band holds a parameter that stays, and follows one that moves too slowly to alarm at once.
+/// The band contains a constant parameter, and follows one that changes too slowly for an immediate alarm.
 #[test]
 fn the_estimates_follow_and_their_band_holds() {
     let (mut held, mut looked) = (0, 0);
@@ -283,7 +283,7 @@ fn the_estimates_follow_and_their_band_holds() {
     let mut monitor = new(model());
     let rows = tank.run();
     let changed = rows.iter().position(|row| row.time >= 4000.0).unwrap();
-    // Before it is learned anew: the alarm has let the tracker go.
+    // Before the model is learned again: the alarm has released the tracker.
     all(&mut monitor, &rows[..changed + 500]);
     let estimates = monitor.estimates();
     assert_eq!(estimates[1].name, "alpha");
@@ -293,7 +293,7 @@ fn the_estimates_follow_and_their_band_holds() {
     assert!((estimates[0].value - 10.0).abs() < 0.1, "{estimates:?}");
 }
 
-/// Nothing can be learned while the command stands still; it waits, and does not fill the memory.
+/// Learning is not possible while the command is constant; the monitor waits with constant memory.
 #[test]
 fn a_command_that_stands_still_teaches_nothing() {
     let mut rows = Tank {

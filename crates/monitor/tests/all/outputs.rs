@@ -15,7 +15,7 @@ const INTERVAL: f64 = 2.0;
 const NOISE: [f64; 2] = [0.05, 0.12];
 const COLOUR: [f64; 2] = [0.0, 0.5];
 
-/// What changes with the time.
+/// Quantities that change with time.
 struct Tanks {
     rows: usize,
     seed: u64,
@@ -178,7 +178,7 @@ fn an_offset_of_one_sensor_is_named_with_its_sensor() {
     }
 }
 
-/// What no effect has: the reading of the upper level swings.
+/// An error that no effect has: the reading of the upper level oscillates.
 #[test]
 fn an_unexplained_alarm_says_at_which_output_it_shows_most() {
     let tanks = Tanks {
@@ -227,7 +227,7 @@ fn a_scatter_that_grows_is_that_of_its_output() {
     assert_eq!(alarms(&steps), Vec::<&Alarm>::new());
 }
 
-/// Either output loses readings for itself, in a row at times.
+/// Readings of either output are missing independently, sometimes several in a row.
 fn with_lost_readings(mut rows: Vec<Row>) -> Vec<Row> {
     for (k, row) in rows.iter_mut().enumerate() {
         if k % 5 == 1 || (k / 30) % 20 == 3 {
@@ -268,7 +268,7 @@ fn outputs_lose_readings_for_themselves() {
     assert_eq!(last.size.unwrap().vessel.as_deref(), Some("upper"));
 }
 
-/// One sensor fails for good: the other one goes on to be watched, also where no reading of the first is left among the rows.
+/// One sensor fails permanently: the other one is still monitored, also if no reading of the first is left among the rows.
 #[test]
 fn an_output_without_any_reading_leaves_the_other_one_watched() {
     let mut rows = Tanks {
@@ -326,7 +326,7 @@ fn a_restored_monitor_of_two_outputs_goes_on_where_it_was() {
         let words = |steps: &[Step]| format!("{steps:?}");
         assert_eq!(words(&all(&mut restored, &rows[at..])), words(&steps[at..]));
     }
-    // Another choice of outputs is another model.
+    // Another choice of outputs makes another model.
     let mut monitor = new(model());
     all(&mut monitor, &rows[..50]);
     let mut other = model();
@@ -339,7 +339,7 @@ fn a_restored_monitor_of_two_outputs_goes_on_where_it_was() {
     assert!(error.to_string().contains(said), "{error}");
 }
 
-/// One output is one of several: naming the usual one changes nothing.
+/// With one output, naming the default output changes nothing.
 #[test]
 fn one_output_is_watched_as_ever() {
     let rows: Vec<Row> = Tanks {
@@ -359,7 +359,7 @@ fn one_output_is_watched_as_ever() {
     };
     let usual = run(&[]);
     assert_eq!(usual, run(&[1]));
-    // Its lines have no word of outputs.
+    // Its JSON lines do not mention outputs.
     let line = serde_json::to_value(alarms(&usual)[0]).unwrap();
     assert!(line.get("output").is_none() && line.get("schema").is_some());
 }

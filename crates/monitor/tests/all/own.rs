@@ -32,7 +32,7 @@ fn the_parameters_are_found_and_their_bands_hold_them() {
         assert_eq!((capacity.value, capacity.half_width), (52.0, None));
         assert!((heater.value / 0.6 - 1.0).abs() < 0.05, "{heater:?}");
     }
-    // 22.8 of 24 are expected of bands of 95 %; fewer than 19 come by chance once in 200 runs, where those of a run hang together.
+    // Bands of 95 % contain 22.8 of 24 on average; fewer than 19 occur by chance once in 200 runs, with the correlation within a run.
     assert!((19..=of).contains(&inside), "{inside} of {of}");
 }
 
@@ -51,7 +51,7 @@ fn twenty_thousand_quiet_rows_raise_no_alarm() {
 fn a_change_is_seen_soon_and_its_onset_is_found() {
     for seed in 0..4 {
         let mut plant = Plant::block(3500, 20 + seed);
-        // A third more is lost to the room.
+        // The loss to the room grows by a third.
         plant.parameters.push((2500, vec![52.0, 0.25, 0.6, 2e-9]));
         let mut monitor = monitor(&plant.model);
         let steps = all(&mut monitor, &plant.run());
@@ -79,7 +79,7 @@ fn a_change_is_seen_soon_and_its_onset_is_found() {
     }
 }
 
-/// Of two sensors the one that reads too high from then on is named, with the size.
+/// Of two sensors, the one with an offset is named, with its size.
 #[test]
 fn the_sensor_that_is_off_is_named() {
     let mut plant = Plant::heaters(3200, 61);
@@ -94,7 +94,7 @@ fn the_sensor_that_is_off_is_named() {
     let size = last.size.as_ref().unwrap();
     assert_eq!((size.name.as_str(), size.unit.as_str()), ("error", "degC"));
     assert!((size.value - 1.2).abs() < 0.2, "{size:?}");
-    // A reading that is too high now and then is no effect of the catalogue.
+    // A reading with occasional positive errors is no effect of the catalogue.
     let mut rows = plant.run();
     for (k, row) in rows.iter_mut().enumerate().skip(2400) {
         row.outputs[0] += if k / 40 % 2 == 0 { 3.0 } else { -3.0 };
@@ -106,7 +106,7 @@ fn the_sensor_that_is_off_is_named() {
     assert_eq!(last.verdict, Verdict::Unexplained, "{}", last.sentence);
 }
 
-/// What was learned stays; the tracker follows the parameter to where it is now.
+/// The learned model does not change; the tracker follows the parameter to its new value.
 #[test]
 fn the_tracker_follows_a_parameter_that_has_changed() {
     let mut plant = Plant::heaters(6000, 31);
@@ -123,7 +123,7 @@ fn the_tracker_follows_a_parameter_that_has_changed() {
     assert!((heater.value - 0.54).abs() < 0.01, "{heater:?}");
 }
 
-/// Readings of two outputs are lost, at random and in bursts: nothing is raised by that, and what changes is seen.
+/// Readings of two outputs are missing, at random and in bursts: this causes no alarm, and a change is still detected.
 #[test]
 fn several_outputs_may_lack_readings() {
     let mut plant = Plant::heaters(5000, 41);
@@ -181,7 +181,7 @@ fn a_saved_state_goes_on_as_if_nothing_had_happened() {
         let mut second = Monitor::restore(own, Settings::default(), state).unwrap();
         assert_eq!(words(&all(&mut second, &rows[at..])), words(&whole[at..]));
     }
-    // Another text is another model.
+    // Another text makes another model.
     let state = monitor(&plant.model).state();
     let other = model(
         &HEATERS
@@ -214,7 +214,7 @@ fn the_models_time_may_be_in_hours() {
     }
 }
 
-/// Delays and branches have a past and events: the simulation is built again every 2048 rows, and nothing is seen of that.
+/// Delays and branches have a past and events: the simulation is rebuilt every 2048 rows without a visible effect.
 #[test]
 fn delays_and_branches_are_watched_as_well() {
     let text = r#"
@@ -285,7 +285,7 @@ fn what_cannot_be_watched_is_said() {
         matches!(&said[..], [Notice::NotLearned { why }] if why.contains("does not settle")),
         "{said:?}"
     );
-    // An input that is missing refuses the row and says which.
+    // A missing input rejects the row, and the message names the input.
     let block = model(BLOCK);
     let mut of_block = self::monitor(&block);
     let refused = of_block

@@ -97,13 +97,13 @@ fn a_candidate_that_begins_is_named_with_its_size() {
         "{since}: {}",
         alarm.sentence
     );
-    // Nothing of the catalogue is that.
+    // No effect of the catalogue has this form.
     let without = last_alarm("vent", &[0.4], &[]);
     assert!(!without.effects.contains(&"vent".to_string()));
     assert!(without.evidence.unwrap_or(0.0) < alarm.evidence.unwrap());
 }
 
-/// What a candidate brings begins where its fit has it, whatever the states of the model are then.
+/// States of a candidate begin at their fitted values, whatever the states of the model are.
 #[test]
 fn a_candidate_may_bring_a_state() {
     let declared = declared(&model(BLOCK));
@@ -111,6 +111,6 @@ fn a_candidate_may_bring_a_state() {
     assert_eq!(alarm.effects[0], "second_store", "{}", alarm.sentence);
     let size = alarm.size.as_ref().unwrap();
     assert_eq!(size.name, "h");
-    // Its size hangs together with the capacity and with the onset, which is found to a few rows.
+    // Its size is correlated with the capacity and with the onset, which is accurate to a few rows.
     assert!((size.value / 0.8 - 1.0).abs() < 0.5, "{size:?}");
 }

@@ -1,4 +1,4 @@
-//! A pump behind a valve with play: where it stands hangs on commands that may lie further back than any rows that are kept.
+//! A pump after a valve with backlash: the state of the backlash may depend on commands before the stored rows.
 
 use ct_signals::{excitation, noise};
 use monitor::{Model, Monitor, Row, Settings, Units};
@@ -11,7 +11,7 @@ const PLAY: f64 = 0.6;
 fn a_command_that_rests_within_the_play_raises_no_alarm() {
     let rng = &mut ChaCha8Rng::seed_from_u64(3);
     let lively = excitation::steps(1500, 15..=40, 3.0, 7.0, rng).unwrap();
-    // Down through the play, and still for longer than the run-up of a checkpoint.
+    // Down through the backlash, and constant for longer than the run-up of a checkpoint.
     let rests = (0..8000).map(|k| [5.0, 4.5, 5.2, 4.7][k / 2000]);
     let command: Vec<f64> = lively.into_iter().chain(rests).collect();
     let noise = noise::white(command.len(), 0.05, rng);

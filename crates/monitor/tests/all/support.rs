@@ -1,4 +1,4 @@
-//! What all tests of the monitor do: make one, give it rows, and look at what it says.
+//! Shared parts of the monitor's tests: build a monitor, give it rows, and check its results.
 
 use monitor::{Alarm, Model, Monitor, Notice, Row, Settings, Step, Units};
 
@@ -15,7 +15,7 @@ pub fn new(model: Model) -> Monitor<'static> {
     Monitor::new(model, Settings::default(), units()).unwrap()
 }
 
-/// What the monitor says to each row.
+/// Results of the monitor for all rows.
 pub fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<Step> {
     rows.iter()
         .map(|row| monitor.update(row).unwrap())

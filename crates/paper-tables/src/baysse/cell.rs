@@ -4,15 +4,15 @@ use serde::Serialize;
 
 use crate::Printed;
 
-/// The runs that the bands are for.
+/// Number of runs for which the bands are valid.
 pub(super) const BAND_RUNS: f64 = 100.0;
 
-/// A statistic of many runs beside what is printed, and the band it has to be in.
+/// A statistic of many runs with its printed value and its permitted band.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cell {
     /// Number of the table in the paper, 1 or 2.
     pub table: usize,
-    /// How the parameters were estimated.
+    /// Estimation method.
     pub method: &'static str,
     /// Method and statistic.
     pub cell: String,
@@ -26,18 +26,18 @@ pub struct Cell {
     pub decimals: usize,
     /// The statistic of the runs; NaN (`null`) where a fit of it failed.
     pub mean: f64,
-    /// Its standard deviation from one set of as many runs to the next, by the jackknife.
+    /// Standard deviation between sets of this number of runs, by the jackknife.
     pub sd: f64,
-    /// The band in which it has to be, for a reproduction; an end that is `null` is open. It is for 100 runs, and wider for fewer.
+    /// The permitted band of a reproduction; an end that is `null` is open. It is valid for 100 runs, and wider for fewer.
     pub band: Option<[f64; 2]>,
-    /// Whether it is inside; `None` without a band.
+    /// Whether the figure is inside; `None` without a band.
     pub inside: Option<bool>,
-    /// By how much of the band's width the printed figure, give or take its rounding, lies outside the band; 0 where it is inside; `None`
-    /// where there is no printed figure, or no band with two ends.
+    /// Distance of the printed figure, give or take its rounding, from the band, as a share of the band's width; 0 if inside; `None`
+    /// without a printed figure or without a band with two ends.
     pub paper_outside: Option<f64>,
 }
 
-/// What a cell is of, and what it is compared with.
+/// Description of a cell, and its reference values.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asked {
     pub table: usize,
@@ -71,7 +71,7 @@ impl Cell {
     }
 }
 
-/// By how much of its width a printed figure lies outside a band.
+/// Distance of a printed figure from a band, as a share of its width.
 fn beyond(paper: Printed, [low, high]: [f64; 2]) -> Option<f64> {
     let off = (low - paper.value).max(paper.value - high) - paper.rounding;
     let width = high - low;
@@ -126,7 +126,7 @@ mod tests {
         assert_eq!(outside(5.9, 2, [5.8, 6.0]), Some(0.0));
         let above = outside(6.1, 2, [5.8, 6.0]).unwrap();
         assert!((above - 0.095 / 0.2).abs() < 1e-9, "{above}");
-        // Its last digit reaches the band.
+        // Within rounding of its last digit, the figure is in the band.
         assert_eq!(outside(6.004, 2, [5.8, 6.0]), Some(0.0));
         assert_eq!(outside(3.0, 1, [7.5, f64::INFINITY]), None);
     }

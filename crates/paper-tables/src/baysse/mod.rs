@@ -1,8 +1,8 @@
 //! Tables I and II and figure 3 of A. Baysse, F. J. Carrillo, A. Habbadi: a tank level in a loop, identified by least squares, by
 //! instruments, and by closed-loop output error.
 //!
-//! Table I is a simulation of the linear loop. Table II is measured on a rig, which is emulated here. What the paper leaves open was found by a
-//! search against its own tables. What it prints is in [`printed`].
+//! Table I is a simulation of the linear loop. Table II is measured on a rig, which is emulated here. What the paper leaves open was found
+//! by a search against its own tables. What it prints is in [`printed`].
 
 mod cell;
 pub mod printed;
@@ -37,17 +37,17 @@ pub struct Study {
     pub paper: &'static str,
     /// Runs of each table, 10 or more, each with a noise of its own.
     pub runs: usize,
-    /// What the noises were drawn from.
+    /// Seed of the noises.
     pub seed: u64,
-    /// What the paper leaves open and is assumed, a sentence each.
+    /// Assumptions about details that the paper omits, one sentence each.
     pub assumptions: Vec<String>,
-    /// What cannot be as it is printed, a sentence each.
+    /// Figures that cannot be correct as printed, one sentence each.
     pub misprints: Vec<&'static str>,
     /// All cells, in the paper's order.
     pub tables: Vec<Cell>,
-    /// How many cells with a band lie inside.
+    /// Number of cells inside their band.
     pub inside: usize,
-    /// How many have one.
+    /// Number of cells with a band.
     pub of: usize,
     /// Table I.
     pub first: FirstTable,
@@ -56,7 +56,7 @@ pub struct Study {
 }
 
 impl Study {
-    /// Cells whose printed figure can be compared with a band, and by how much of the band's width it lies outside.
+    /// Cells with a printed figure and a band, and the distance of the figure from the band as a share of its width.
     pub fn printed(&self) -> impl Iterator<Item = (&Cell, f64)> {
         let cells = self.tables.iter();
         cells.filter_map(|cell| Some((cell, cell.paper_outside?)))

@@ -1,4 +1,4 @@
-//! What the second paper prints: its tables I and II, and what of it cannot be as printed.
+//! Printed figures of the second paper: its tables I and II, and those that cannot be correct.
 //!
 //! A. Baysse, F. J. Carrillo, A. Habbadi, *Algorithme d'identification à erreur de sortie pour systèmes à temps continu en boucle fermée à
 //! partir de données échantillonnées*, section III.
@@ -9,12 +9,12 @@ const fn p(value: f64, decimals: usize) -> Option<Printed> {
     Some(Printed::new(value, decimals))
 }
 
-/// What a column of table I prints.
+/// Printed figures of a column of table I.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simulated {
     /// Means of K and tau (s) over the runs.
     pub mean: [Option<Printed>; 2],
-    /// Their variances; of tau s^2.
+    /// Variances of the estimates; of tau in s^2.
     pub variance: [Option<Printed>; 2],
     /// The distance D of equation (34).
     pub distance: Option<Printed>,
@@ -63,7 +63,7 @@ pub const RIG_PLAIN: Measured = [p(6.90, 2), p(107.73, 2), p(1.84e-4, 6), p(0.05
 /// Table II: the method with normalisation.
 pub const RIG_NORMALISED: Measured = [p(6.93, 2), p(108.12, 2), p(1.80e-4, 6), p(0.0470, 4)];
 
-/// What cannot be as it is printed, and what is done instead.
+/// Figures that cannot be correct as printed, and their replacement.
 pub const MISPRINTS: [&str; 10] = [
     "Table II's controller, Ki = 0.074: very probably 0.0074, which 40/tau = lambda = 0.5372 and Kp/Ki = tau give. With 0.074 the fit does not come near the printed gain and time constant.",
     "Table II's filter, zeta = 0.6618 = 1.2 lambda: it is 1.2 times Kp = 0.5515, not 1.2 times 0.5372; the two may be swapped.",

@@ -28,9 +28,9 @@ pub struct Rig {
     pub level: f64,
     /// Outflow coefficient, cm^2.5/s. Not printed.
     pub alpha: f64,
-    /// Inflow for one volt above the dead zone, cm^3/(V s). Not printed.
+    /// Inflow per volt above the dead zone, cm^3/(V s). Not printed.
     pub pump_gain: f64,
-    /// Command below which nothing flows, V. Not printed, and nothing in the paper speaks of it.
+    /// Command below which there is no flow, V. Not printed, and not mentioned in the paper.
     pub dead_zone: f64,
     /// Kp, V/cm. Printed.
     pub kp: f64,
@@ -121,8 +121,8 @@ impl Rig {
         })
     }
 
-    /// Records an experiment: command u (V), filtered level y (cm) and set point r (cm), each second. The noise is that of run `run` of a study
-    /// with this seed.
+    /// Records an experiment: command u (V), filtered level y (cm) and set point r (cm), each second. The noise is that of run `run` of a
+    /// study with this seed.
     ///
     /// # Errors
     /// [`Error::Signals`], [`Error::Plant`] or [`Error::Loop`] for settings that no rig can have.
@@ -162,7 +162,7 @@ impl Rig {
         })
     }
 
-    /// As the paper gives it to the fit, with the sensor's filter or without.
+    /// Controller as the paper's fit uses it, with or without the sensor's filter.
     pub(super) fn controller(&self, with_filter: bool) -> Result<Controller, Error> {
         let pi = Controller::pi(self.kp, self.ki)?;
         Ok(if with_filter {

@@ -1,4 +1,4 @@
-//! Table I: the linear loop, `K/(1 + tau p)` under `Kp + Ki/p`, with white noise that circulates.
+//! Table I: the linear loop, `K/(1 + tau p)` under `Kp + Ki/p`, with white noise that is fed back.
 
 use ct_lti::Hold;
 use ct_signals::excitation;
@@ -43,7 +43,7 @@ pub struct FirstTable {
     pub as_printed: Vec<[f64; 2]>,
     /// Closed-loop output error, iterated in theta with `mu I`.
     pub plain: Vec<[f64; 2]>,
-    /// The same, iterated in the relative change delta of equation (28).
+    /// Estimates by iteration in the relative change delta of equation (28).
     pub normalised: Vec<[f64; 2]>,
     /// Iterations.
     pub iterations: Counts,
@@ -64,21 +64,21 @@ pub struct Counts {
     pub normalised_diagonal: Vec<usize>,
 }
 
-/// One run.
+/// Results of one run.
 struct Run {
     starts: [[f64; 2]; 3],
     /// Theta and delta with `mu I`, theta and delta with `mu diag(J'')`.
     fits: [([f64; 2], usize); 4],
 }
 
-/// What the paper leaves open, and is assumed.
+/// Assumptions about details that the paper omits.
 pub(super) fn assumptions() -> Vec<String> {
     let samples = BIT * BITS.len();
     vec![
         format!(
             "Table I: r is one period of a PRBS of 3 cells, ±{AMPLITUDE}, each bit {BIT} s, {samples} samples, from rest; model and data have the controller with its printed digits."
         ),
-        "The noise is white, held from sample to sample, and circulates in the loop; its standard deviation is a tenth of that of y without it.".to_owned(),
+        "The noise is white, held from sample to sample, and is fed back in the loop; its standard deviation is a tenth of that of y without it.".to_owned(),
         "State variable filters and the instruments' model go by Euler's rule.".to_owned(),
         "Estimates are those of a fit that went on to 1e-8. Iterations are counted to the first that changes no parameter by more than 1 %, with mu I, a tenth of mu after each step.".to_owned(),
         "The excitation and the stop of the count were found by a search against the same table: agreement says that the paper can be so, not that it is.".to_owned(),

@@ -66,11 +66,11 @@ pub struct SecondTable {
     pub instruments: Vec<[f64; 2]>,
     /// Closed-loop output error, iterated in theta.
     pub plain: Fits,
-    /// The same, iterated in delta.
+    /// Estimates by iteration in delta.
     pub normalised: Fits,
-    /// By a model without the sensor's filter; NaN (`null`) where the fit failed.
+    /// Estimates of a model without the sensor's filter; NaN (`null`) if the fit failed.
     pub filter_ignored: Vec<[f64; 2]>,
-    /// With the controller as it is printed, in the rig and in the model; NaN (`null`) where the fit failed.
+    /// Estimates with the controller as printed, in the rig and in the model; NaN (`null`) if the fit failed.
     pub ki_as_printed: Vec<[f64; 2]>,
     /// The paper's figure 3, for the first of the runs.
     #[serde(skip)]
@@ -85,7 +85,7 @@ pub struct SecondTable {
 pub struct Fits {
     /// K (cm/V) and tau (s).
     pub estimates: Vec<[f64; 2]>,
-    /// Their variances as each fit estimates them, for a white residual.
+    /// Variances from each fit, for a white residual.
     pub variances: Vec<[f64; 2]>,
     /// Iterations to the first that changes no parameter by more than 1 %.
     pub iterations: Vec<usize>,
@@ -102,7 +102,7 @@ pub struct Figure {
     pub measured: Vec<f64>,
     /// Output of the loop simulated with the plant that instruments give, cm.
     pub instruments: Vec<f64>,
-    /// The same with the plant that the output error gives, cm.
+    /// Level simulated with the plant from the output error, cm.
     pub output_error: Vec<f64>,
 }
 
@@ -134,7 +134,7 @@ fn instruments(record: &Record) -> Result<PlantModel, Error> {
 /// K and tau by output error; NaN where the fit fails.
 fn fitted(rig: &Rig, record: &Record, with_filter: bool) -> Result<[f64; 2], Error> {
     let (start, controller) = (instruments(record)?, rig.controller(with_filter)?);
-    // With u in the record, a controller that disagrees with it would be refused.
+    // With u in the record, a controller that disagrees with it would be rejected.
     let without_u = LoopRecord {
         u: None,
         ..rig.centred(record)?
@@ -154,7 +154,7 @@ fn run(rig: &Rig, seed: u64, index: usize) -> Result<Run, Error> {
     let problem = Problem::new(&[centred], &rig.controller(true)?, start.orders())?;
     let estimate = |coordinates| -> Result<Estimate, Error> {
         let fit = problem.fit(&start, &settings(MU, Damping::Identity, coordinates))?;
-        // Those of a white residual, as the paper's will have been.
+        // Standard errors for a white residual, as probably in the paper.
         let errors = problem.uncertainty(&fit, None)?.white_std_errors;
         let variance = match errors[..] {
             [tau, gain] => [gain * gain, tau * tau],

@@ -5,15 +5,15 @@ use statrs::statistics::{Data, OrderStatistics};
 
 use crate::Printed;
 
-/// Share of cells inside from which on tables are called consistent: nine of ten are expected, less what chance takes.
+/// Least share of cells inside for consistent tables: nine of ten are expected, minus a margin for chance.
 const CONSISTENT: f64 = 0.85;
 
-/// One figure of a table beside many runs.
+/// One figure of a table compared with many runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cell {
     /// Number of the table in the paper, 1 to 4.
     pub table: usize,
-    /// What it is of, as in [`CELLS`](super::printed::CELLS).
+    /// Name of the cell, as in [`CELLS`](super::printed::CELLS).
     pub cell: &'static str,
     /// The printed figure, or a difference of two; its unit is that of the cell: 1 for K, s for tau, c and the criterion.
     pub paper: f64,
@@ -28,7 +28,7 @@ pub struct Cell {
     pub q95: f64,
     /// Share of the runs below the printed figure, 0 to 1.
     pub below: f64,
-    /// Whether the printed figure, give or take its rounding, lies in the 5 to 95 % range.
+    /// Whether the printed figure, give or take its rounding, is in the 5 to 95 % range.
     pub inside: bool,
 }
 
@@ -65,35 +65,35 @@ pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
     quantile(values, 0.5)
 }
 
-/// The value below which this share of the finite values lies; NaN where there is none.
+/// The quantile of the finite values for this share; NaN if there is none.
 pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let finite: Vec<f64> = values.filter(|value| value.is_finite()).collect();
     Data::new(finite).quantile(share)
 }
 
-/// All figures of tables 1 to 4 beside many runs.
+/// All figures of tables 1 to 4 compared with many runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// The figures, in the paper's order.
     pub tables: Vec<Cell>,
-    /// How many of them lie inside.
+    /// Number of figures inside.
     pub inside: usize,
-    /// How many there are.
+    /// Number of figures.
     pub of: usize,
-    /// Those that lie outside, and why.
+    /// Figures outside, with the reason.
     pub outside: Vec<Outside>,
     /// Runs that failed, of all tables.
     pub failed: usize,
 }
 
-/// A figure that lies outside.
+/// A figure outside its range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outside {
     /// Number of the table in the paper, 1 to 4.
     pub table: usize,
     /// What it is of, as in [`CELLS`](super::printed::CELLS).
     pub cell: &'static str,
-    /// What is known of the reason.
+    /// Known reason.
     pub why: &'static str,
 }
 
@@ -121,8 +121,7 @@ impl Comparison {
         }
     }
 
-    /// Whether as many lie inside as can be expected of figures of the same process, 85 % of them, and no run failed, as none of the
-    /// paper's did.
+    /// Whether the expected number of figures is inside, at least 85 %, and no run failed, as none of the paper's did.
     #[must_use]
     pub fn consistent(&self) -> bool {
         self.failed == 0 && self.inside as f64 >= CONSISTENT * self.of as f64

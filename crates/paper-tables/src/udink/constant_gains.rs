@@ -17,7 +17,7 @@ const MOST_RUNS: usize = 100;
 pub struct ConstantGain {
     /// P1 and P2, in words.
     pub gain: &'static str,
-    /// How it is carried over a step.
+    /// Integration rule.
     pub rule: Rule,
     /// Runs, at most 100.
     pub runs: usize,
@@ -31,7 +31,7 @@ pub struct ConstantGain {
     pub time_constant_average: f64,
 }
 
-/// Both gains by both rules. The paper prints no figures of the diagonal one.
+/// Both gains with both rules. The paper prints no figures of the diagonal one.
 pub(super) fn constant_gains(
     settings: &Settings,
     runs: usize,

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::printed::{CELLS, TABLES};
 use super::{Cell, Tables};
 
-/// Pairs of tables, and what is known of their noises; first the one that surely shares it.
+/// Pairs of tables, and the relation of their noises; first the pair that surely has the same noise.
 const PAIRS: [([usize; 2], &str); 3] = [
     (
         [2, 3],
@@ -29,11 +29,11 @@ const PAIRS: [([usize; 2], &str); 3] = [
 pub struct Contrast {
     /// Numbers of the two tables, 1 to 4.
     pub between: [usize; 2],
-    /// What is known of their noises.
+    /// Relation of the two tables' noises.
     pub noise: &'static str,
     /// The differences; the table of each is the second one.
     pub cells: Vec<Cell>,
-    /// How many printed differences lie inside.
+    /// Number of printed differences inside their range.
     pub inside: usize,
 }
 
@@ -42,7 +42,7 @@ fn is_independent(name: &str) -> bool {
     !name.ends_with("rel.err") && !name.contains('-')
 }
 
-/// All pairs; `runs` holds the cells of every table, run by run.
+/// All pairs; `runs` contains the cells of every table, run by run.
 pub(super) fn contrasts(runs: &[&Tables]) -> Vec<Contrast> {
     PAIRS
         .into_iter()
@@ -84,7 +84,7 @@ mod tests {
             .collect();
         let runs: Vec<&Tables> = runs.iter().collect();
         let found = contrasts(&runs);
-        // What both have in common is gone: the differences do not vary.
+        // Common terms cancel: the differences are constant.
         for (contrast, difference) in found.iter().zip([2.0, 1.0, 4.0]) {
             for cell in &contrast.cells {
                 assert_eq!((cell.q05, cell.q95), (difference, difference));

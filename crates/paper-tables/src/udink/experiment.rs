@@ -1,5 +1,4 @@
-//! The experiment of tables 1 to 4: a tank of first order, `tau dy/dt + y = K u`, with white noise on its output; what the paper prints of it,
-//! and what is assumed.
+//! The experiment of tables 1 to 4: a tank of first order, `tau dy/dt + y = K u`, with white output noise; printed values and assumptions.
 
 use ct_signals::noise;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -8,7 +7,7 @@ use serde::Serialize;
 /// End of a run, s.
 pub const END: f64 = 1000.0;
 
-/// The experiment. The values that the paper does not print were found by a search against its tables.
+/// The experiment. Values that the paper does not print were found by a search that fits its tables.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Settings {
     /// K of the tank; the output is in units of the input. Printed.
@@ -17,7 +16,7 @@ pub struct Settings {
     pub time_constant: f64,
     /// Mean square of the noise over that of the output without it. Printed; that it is of powers is not.
     pub noise_ratio: f64,
-    /// c^ is kept within plus and minus this, s. Printed.
+    /// Bound of |c^|, s. Printed.
     pub filter_limit: f64,
     /// Weights `c_p` and gamma of (4.11), which are equal. gamma is printed.
     pub weight: f64,
@@ -57,7 +56,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What the paper leaves open and is assumed here, a sentence each.
+    /// Assumptions about details that the paper omits, one sentence each.
     #[must_use]
     pub fn assumptions(&self) -> Vec<String> {
         let span = self.span as f64 * self.dt;
@@ -131,7 +130,7 @@ impl Settings {
         }
     }
 
-    /// Standard normal numbers for a run: a stream of the generator of its own.
+    /// Standard normal numbers for a run, from a separate stream of the generator.
     pub(super) fn noise(&self, seed: u64, run: usize) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(run as u64);
@@ -139,7 +138,7 @@ impl Settings {
     }
 }
 
-/// How the equations are carried over a step.
+/// Integration rule of the equations over a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Rule {
@@ -153,7 +152,7 @@ impl Rule {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Euler, Self::Exact];
 
-    /// Its name in tables and sentences.
+    /// Name in tables and sentences.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

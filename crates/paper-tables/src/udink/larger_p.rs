@@ -29,11 +29,11 @@ pub struct LargerP {
     pub exact_failed: usize,
     /// Median of the criterion (6.2) at 1000 s by Euler's rule, of the runs that did not fail, s; NaN where all did.
     pub euler_criterion: f64,
-    /// The same by the exact step.
+    /// Criterion with the exact step.
     pub exact_criterion: f64,
 }
 
-/// What each factor does, with the first of the noises of the tables.
+/// Results of each factor with the first of the tables' noises.
 pub(super) fn larger_p(
     settings: &Settings,
     runs: usize,

@@ -1,4 +1,4 @@
-//! Tables 1 to 4 of A. J. Udink ten Cate, WP-85-54, IIASA, 1985, with many noises, and what goes with them: figure 1, differences between
+//! Tables 1 to 4 of A. J. Udink ten Cate, WP-85-54, IIASA, 1985, with many noises, and related results: figure 1, differences between
 //! tables, other settings, constant gains, larger `P(0)`, and three gains on an experiment of second order.
 //!
 //! The experiment is in [`Settings`], one run of it in [`run`]; what the paper prints is in [`printed`].
@@ -35,7 +35,7 @@ use crate::{Error, Progress, Stage};
 /// The fewest runs of which a 5 to 95 % range can be told: of fewer, none lies beyond 5 %.
 pub const FEWEST: usize = 20;
 
-/// Tables 1 to 4 with many noises, and what goes with them.
+/// Tables 1 to 4 with many noises, and related results.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Study {
     /// Version of this record.
@@ -44,7 +44,7 @@ pub struct Study {
     pub paper: &'static str,
     /// Noises, 20 or more; the same ones in every table and for both rules.
     pub runs: usize,
-    /// What they were drawn from.
+    /// Seed of the noises.
     pub seed: u64,
     /// The experiment.
     pub settings: Settings,
@@ -71,19 +71,19 @@ pub struct Study {
     pub figure: Figure,
 }
 
-/// What can be said of the paper's tables: never that they are identical.
+/// Verdict on the paper's tables: never that they are identical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// By both rules the cells are consistent with the paper's, one by one.
+    /// With both rules, each cell is consistent with the paper's.
     Consistent,
-    /// By Euler's rule they are, by the exact step they are not.
+    /// The cells are consistent with Euler's rule, and not with the exact step.
     ConsistentByEulerOnly,
-    /// By Euler's rule, which the paper used, they are not.
+    /// With Euler's rule, which the paper used, the cells are not consistent.
     NotConsistent,
 }
 
 impl Study {
-    /// What can be said of the paper's tables, cell by cell.
+    /// Verdict on the paper's tables, cell by cell.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         match (self.euler.consistent(), self.exact.consistent()) {
@@ -111,7 +111,7 @@ pub struct Figure {
     pub criterion: Vec<f64>,
 }
 
-/// Runs the tables with `runs` noises, 20 or more, drawn from `seed`, and what goes with them.
+/// Runs the tables with `runs` noises, 20 or more, drawn from `seed`, and the related computations.
 ///
 /// The same seed gives the same numbers, whatever the number of threads.
 ///
@@ -160,7 +160,7 @@ pub fn study(
 /// The cells of each table; `None` where its run failed.
 type Tables = [Option<Cells>; TABLES.len()];
 
-/// All tables by both rules with one noise.
+/// All tables with both rules and one noise.
 fn with_one_noise(settings: &Settings, noise: &[f64]) -> Result<[Tables; 2], Error> {
     let mut result = [[None; TABLES.len()]; 2];
     for (rule, tables) in Rule::ALL.into_iter().zip(&mut result) {
@@ -172,7 +172,7 @@ fn with_one_noise(settings: &Settings, noise: &[f64]) -> Result<[Tables; 2], Err
     Ok(result)
 }
 
-/// Of the paper's bounds on c^, for plants with half to twice the tank's time constant and the least-squares gain.
+/// Check of the paper's bounds on c^, for plants with half to twice the tank's time constant and the least-squares gain.
 fn filter_bounds(settings: &Settings) -> Result<String, Error> {
     let (limit, tau) = (settings.filter_limit, settings.time_constant);
     let plausible = Bounds::new([0.5 * tau], [2.0 * tau])?;
@@ -197,7 +197,7 @@ fn comparison(runs: &[&Tables], rule: Rule) -> Comparison {
     Comparison::new(cells, failed.count(), |cell| why(cell, rule))
 }
 
-/// What is known of a cell that lies outside.
+/// Known reason for a cell outside its range.
 fn why(cell: &Cell, rule: Rule) -> &'static str {
     match (cell.table, cell.cell, rule) {
         (3, "tau rel.var", _) => {

@@ -1,7 +1,7 @@
 //! Tables 1 to 4 with one setting changed: which changes the comparison with the paper would notice.
 //!
-//! The paper leaves much open, and agreement with its cells says only that the settings can be so. How much that is worth is seen from settings
-//! that are not so: those whose tables are called consistent all the same cannot be told from the ones that are used.
+//! The paper leaves much open, and agreement with its cells says only that the settings can be so. How much that is worth is seen from
+//! settings that are not so: those whose tables are called consistent all the same cannot be distinguished from the ones that are used.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -15,7 +15,7 @@ use crate::{Error, Progress, Stage};
 /// Runs of each setting, at most.
 const MOST_RUNS: usize = 100;
 
-/// Other settings: name, and what is changed.
+/// Other settings: name, and change.
 type Other = (&'static str, fn(&mut Settings));
 
 const OTHERS: [Other; 20] = [
@@ -52,10 +52,10 @@ const OTHERS: [Other; 20] = [
     }),
 ];
 
-/// The tables with one setting changed, by Euler's rule, beside the paper's.
+/// The tables with one setting changed, with Euler's rule, compared with the paper's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Changed {
-    /// What is changed, in words.
+    /// The changed setting, in words.
     pub setting: &'static str,
     /// Cells inside.
     pub inside: usize,
@@ -63,7 +63,7 @@ pub struct Changed {
     pub of: usize,
     /// Runs that failed.
     pub failed: usize,
-    /// Whether the comparison notices the change: the tables are not [consistent](super::Comparison::consistent) with the paper's.
+    /// Whether the comparison detects the change: the tables are not [consistent](super::Comparison::consistent) with the paper's.
     pub noticed: bool,
 }
 

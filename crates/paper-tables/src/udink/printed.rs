@@ -1,4 +1,4 @@
-//! What the paper prints: its tables 1 to 4, on a plant `K/(1 + tau s)` with K = 1 and tau = 10 s.
+//! Printed figures of the paper: its tables 1 to 4, for a plant `K/(1 + tau s)` with K = 1 and tau = 10 s.
 //!
 //! A. J. Udink ten Cate, *Continuous-time constrained least-squares algorithms for recursive parameter estimation of stochastic linear
 //! systems by a stabilized output error method*, WP-85-54, IIASA, Laxenburg, 1985, section 6.
@@ -8,7 +8,7 @@ use crate::Printed;
 /// One of the tables.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Table {
-    /// Its number, 1 to 4.
+    /// Number of the table, 1 to 4.
     pub number: usize,
     /// Forgetting rate eta, 1/s; 0 where the gain is constant.
     pub eta: f64,
@@ -93,7 +93,8 @@ pub const TABLES: [Table; 4] = [
     },
 ];
 
-/// Names of the cells of a table, in the order of [`Table::cells`]: `E250` is the criterion at 250 s, `P11`, `P12` and `P22` are entries of P1.
+/// Names of the cells of a table, in the order of [`Table::cells`]: `E250` is the criterion at 250 s, `P11`, `P12` and `P22` are entries of
+/// P1.
 pub const CELLS: [&str; 19] = [
     "K avg",
     "K rel.var",

@@ -1,4 +1,4 @@
-//! One run of tables 1 to 4: gain and time constant of the tank, estimated by the stabilized output error (4.11).
+//! One run of tables 1 to 4: gain and time constant of the tank, estimated by the stabilised output error method (4.11).
 //!
 //! Data flow of one step k, at `t = k dt`, for Euler's rule; every right side at step k:
 //! ```text
@@ -26,7 +26,7 @@ const AVERAGED: usize = 20;
 type Estimator<I, const SPAN: usize> =
     StabilizedOe<1, 2, BlockDiagonal<1, 2, I>, LateDifference<SPAN>>;
 
-/// As the settings and a table say, with `P(0)` times `factor`.
+/// Estimator for the settings and a table, with `P(0)` times `factor`.
 fn estimator<I: Integrator, const SPAN: usize>(
     settings: &Settings,
     table: &Table,
@@ -41,7 +41,7 @@ fn estimator<I: Integrator, const SPAN: usize>(
         BlockDiagonal::constant((theta, p1), (c, p2), settings.weight)?
     } else {
         let weights = Weights::new(settings.weight, settings.weight, table.eta)?;
-        // As the paper's: nothing that keeps P from growing.
+        // As in the paper: no limit of the growth of P.
         let guards: Guards = UNGUARDED;
         BlockDiagonal::new(
             ContinuousRls::with_integrator(theta, p1, weights)?.with_guards(guards)?,
@@ -52,7 +52,7 @@ fn estimator<I: Integrator, const SPAN: usize>(
     Ok(StabilizedOe::new(gain, LateDifference::new())?.with_filter_bounds(limit)?)
 }
 
-/// Where a run is after a step.
+/// State of a run after a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moment {
     pub t: f64,
@@ -66,8 +66,8 @@ pub(super) struct Moment {
 /// The cells of a table, as in [`CELLS`]; their units are those of the quantities: 1 for K, s for tau, c and the criterion.
 pub type Cells = [f64; CELLS.len()];
 
-/// One run of a table; `noise` is added to the output, in its unit: a value for each of [`Settings::steps`] and one more for the last sample.
-/// `None` where the run failed: the estimator refused an update, or P was no longer positive definite.
+/// One run of a table; `noise` is added to the output, in its unit: a value for each of [`Settings::steps`] and one more for the last
+/// sample. `None` where the run failed: the estimator refused an update, or P was no longer positive definite.
 ///
 /// # Errors
 /// [`Error::ShortNoise`], [`Error::Span`]; [`Error::Estimator`] for a start that makes no sense.
@@ -86,7 +86,7 @@ pub fn run(
     run_from(settings, table, rule, 1.0, (1.0, noise), |_| {})
 }
 
-/// The same with `P(0)` times `factor` and the noise times its level; `watch` is called after every step.
+/// A run with `P(0)` times `factor` and the noise times its level; `watch` is called after every step.
 pub(super) fn run_from(
     settings: &Settings,
     table: &Table,

@@ -1,4 +1,4 @@
-//! Tables I and II with few noises: all figures of the runs inside the bands of a reproduction, and what the paper's own text implies.
+//! Tables I and II with few noises: all figures of the runs inside the bands, and what the paper's own text implies.
 
 use paper_tables::Error;
 use paper_tables::baysse::{TRUTH, study};
@@ -10,7 +10,7 @@ fn every_figure_is_inside_its_band() {
     assert!(outside.is_empty(), "{outside:?}");
     assert_eq!((study.inside, study.of), (32, 32));
 
-    // With mu diag(J'') the iterations in theta and in delta are the same to rounding.
+    // With mu diag(J'') the iterations in theta and in delta agree to rounding.
     let counts = &study.first.iterations;
     assert_eq!(counts.plain_diagonal, counts.normalised_diagonal);
     assert!(study.first.diagonal_difference < 1e-9);

@@ -7,13 +7,13 @@ use paper_tables::udink::{Settings, Verdict, study};
 #[test]
 fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
     let study = study(&Settings::default(), 200, 1, &|_| {}).unwrap();
-    // One cell in ten lies outside by chance; what differs by the rule, not by chance, is named.
+    // One cell in ten is outside by chance; differences caused by the rule are listed.
     assert!(study.euler.inside >= 66, "{:?}", study.euler.outside);
     assert!(study.exact.inside >= 62, "{:?}", study.exact.outside);
     assert_eq!(study.euler.failed + study.exact.failed, 0);
     assert_eq!(study.verdict(), Verdict::Consistent);
 
-    // Tables 2 and 3 have one noise, and what the paper prints of both differs by other than the settings do.
+    // Tables 2 and 3 have the same noise, and the paper's differences between them are not explained by the settings.
     let [shared, ..] = &study.contrasts[..] else {
         panic!("no contrasts")
     };
@@ -24,7 +24,7 @@ fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
     }
     assert_eq!((shared.inside, shared.cells.len()), (10, 14));
     assert_eq!(study.power.iter().filter(|it| !it.noticed).count(), 7);
-    // Settings that are far off are noticed; some that are near are not, which the tables say.
+    // Settings that are far off are detected; some near ones are not, which the tables report.
     let noticed = |name: &str| {
         let mut found = study.power.iter().filter(|it| it.setting.contains(name));
         found.next().unwrap().noticed
@@ -49,7 +49,7 @@ fn two_hundred_noises_agree_with_the_paper_and_with_another_program() {
         }
     }
 
-    // Where it lies beside the checkout: the range for the median of 200 noises of another program, cell by cell.
+    // If it is next to the checkout: the range of the median of 200 noises from another program, cell by cell.
     let bands =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reproduction/udink-accept.md");
     let Ok(bands) = std::fs::read_to_string(&bands) else {

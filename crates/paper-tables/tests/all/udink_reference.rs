@@ -26,7 +26,7 @@ R2 v_k=0.2*sin(1.3*k^1.5) y0 power 0.431268415
   T3 Euler K 1.01061383 tau 10.1147876 c -0.06106545 sdc 0.1860430 E 266.29703 275.40448 276.24364 276.46476 P11 8.6870503 P12 0.49983893 P22 0.048644657 P2 1.091044
 ";
 
-/// Round numbers; the record's R2 is what fits the tables best, and is what the program runs.
+/// Rounded numbers; the reference record's R2 fits the tables best, and is the program's setting.
 fn coarse() -> Settings {
     Settings {
         dt: 0.5,
@@ -37,7 +37,7 @@ fn coarse() -> Settings {
     }
 }
 
-/// To 1e-6, or to the last digit of what was printed as 0.
+/// Agreement to 1e-6, or to the last digit of a value printed as 0.
 fn agrees(printed: &str, found: f64) -> bool {
     let value: f64 = printed.parse().unwrap();
     (value - found).abs() <= (1e-6 * value.abs()).max(5e-8)

@@ -58,12 +58,12 @@ fn the_derivative_at_absent_is_that_of_the_limit() {
             for substeps in [1, 3] {
                 for placed in placements(plant) {
                     if placed.effect.id == "coarse_quantisation" {
-                        // Ever finer steps have no slope in the limit; derivatives.rs has what it carries instead.
+                        // Finer and finer steps have no slope in the limit; derivatives.rs tests the derivative that is used instead.
                         continue;
                     }
                     let info = &base.structure.effect_parameters(placed)[0];
                     if !info.absent.is_finite() {
-                        // A threshold that is never reached has no derivative there; derivatives.rs has it at work.
+                        // A threshold that is never reached has no derivative there; derivatives.rs tests it in use.
                         continue;
                     }
                     let case = base.with_absent(&[placed]);
@@ -73,8 +73,8 @@ fn the_derivative_at_absent_is_that_of_the_limit() {
                         moved.theta[own] = x;
                         moved.run(&input, substeps)
                     };
-                    // Towards the inside of the bounds, of second order, where there is one side only: below absent a delay or a
-                    // lag has no meaning, and a leak or a dead zone has a corner there. Else the central difference.
+                    // Towards the inside of the bounds, of second order, if only one side exists: below the absent value a delay or a lag
+                    // has no meaning, and a leak or a dead zone has a corner there. Otherwise the central difference.
                     let step = 1e-4 * (interior(&base, placed, info) - info.absent);
                     let (up, down) = (at(info.absent + step), at(info.absent - step));
                     let (here, beyond) = (at(info.absent), at(info.absent + 2.0 * step));

@@ -5,14 +5,14 @@ use plants::{Command, Plant};
 
 use crate::support::{Case, DRIVES, Drive, base, input};
 
-/// Numbers that a derivative is taken by, at most.
+/// Largest number of parameters with derivatives.
 const LANES: usize = 15;
 
 fn spec(plant: Plant) -> ModelSpec {
     ModelSpec::parse(plant.text()).unwrap()
 }
 
-/// The text with the values that the case knows.
+/// The text with the parameter values of the case.
 fn model(case: &Case) -> Model {
     let scales = &case.structure.scales;
     let mut spec = spec(case.structure.plant);
@@ -67,7 +67,8 @@ fn run(case: &Case, model: &Model, input: &[(Command, f64)]) -> (Vec<Dual<LANES>
     (outputs, simulation.method())
 }
 
-/// By how much the text is off the kernel in `substeps` parts of an interval, as shares of ranges: the output, and the worst derivative.
+/// Difference between the text's simulation and the kernel with `substeps` parts of an interval, as shares of ranges: the output, and the
+/// worst derivative.
 fn off(case: &Case, input: &[(Command, f64)], substeps: usize) -> (f64, f64) {
     let kernel = case.run_dual(input, substeps);
     let (text, _) = run(case, &model(case), input);
@@ -121,7 +122,7 @@ fn outputs_and_derivatives_are_those_of_the_kernel() {
 #[test]
 fn heads_of_either_sign_are_the_same_in_both() {
     let mut case = base(Plant::ThreeTank);
-    // One pump after the other: the water flows to and fro.
+    // One pump after the other: the water flows back and forth.
     case.second = |command| Command::held(if command.from > 0.0 { 2.0 } else { 9.0 });
     let input: Vec<_> = (0..1800)
         .map(|k| {

@@ -69,7 +69,7 @@ fn out_of_reach_the_command_stays_at_its_limit_and_comes_back_at_once() {
         simulator.advance(Command::held(last), case.h);
     }
     assert_eq!(last, 10.0);
-    // Back within reach the command leaves its limit within one sample.
+    // After saturation, the command leaves its limit within one sample.
     let y = simulator.read(0);
     assert!(pi.command(y - 2.0, y, case.h) < 10.0);
 }

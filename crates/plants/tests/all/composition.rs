@@ -1,4 +1,4 @@
-//! Effects compose: any that may act together, added in any order, are one chain; what may not is refused.
+//! Effects compose: a permitted set of effects, added in any order, is one chain; other sets are rejected.
 
 use crate::support::{DRIVES, base, effect, input, label, placements, random_sets};
 use plants::{Error, Placed, Plant, Simulator, Structure};
@@ -38,7 +38,7 @@ fn removing_an_effect_undoes_adding_it() {
             assert_eq!(with.effects().len(), 3);
             let without = set.iter().fold(with.clone(), |s, p| s.without(p.effect));
             assert_eq!(without, base);
-            // What is on is no candidate; everything else is.
+            // An effect in the model is no candidate; every other effect is.
             let candidates = with.candidates();
             assert!(
                 candidates
@@ -88,7 +88,7 @@ fn names_units_and_values_line_up() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever the ranges of a record are, a fit can begin: bounds in order, starts and the absent value between them.
+    /// For any ranges of a record a fit can begin: bounds in order, starts and the absent value between them.
     #[test]
     fn bounds_are_in_order_for_any_record(
         u in (-20.0..20.0_f64, 0.0..20.0_f64),

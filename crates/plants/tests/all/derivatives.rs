@@ -6,7 +6,7 @@ use crate::support::{
 };
 use plants::{Placed, Plant};
 
-/// The largest disagreement, as a share of the largest derivative by that variable, over samples and variables.
+/// The largest difference, as a share of the largest derivative with respect to that variable, over samples and variables.
 ///
 /// The output has corners (the hysteresis turns, the reading saturates between two samples), and a difference across a
 /// corner is no derivative: of two step lengths the better counts at each sample, and both are short. Where neither will do, a
@@ -51,8 +51,8 @@ pub fn disagreement(
         };
         let mut tried = vec![difference(1e-5), difference(1e-6)];
         if case.structure.plant.joined() {
-            // Where a step is cut hangs on the heads, and the output moves by some 1e-11 with the cut: of that a short difference
-            // makes too much, and a long one is better where there is no corner.
+            // The cut of a step depends on the heads, and the output changes by about 1e-11 with it: a short difference amplifies this, and
+            // a long one is better where there is no corner.
             tried.push(difference(1e-4));
         }
         let least = (floor * reading / scale).max(1e-12);
@@ -91,7 +91,7 @@ fn check(
     let most = if begins_with_a_root(effects) {
         1e-5
     } else if plant.joined() {
-        // What a cut that comes a step sooner or later leaves in a difference, up to 2.7e-7.
+        // The influence of the cut on a difference, up to 2.7e-7.
         f64::max(most, 5e-7)
     } else {
         most
@@ -155,7 +155,7 @@ fn pairs_and_triples_have_the_derivatives_of_their_output() {
 #[test]
 fn vessels_that_are_over_within_a_step_have_the_derivatives_of_their_output() {
     let mut failures = Vec::new();
-    // Of joined tanks joined.rs has the fast ones.
+    // The fast vessels of joined tanks are in joined.rs.
     for plant in Plant::ALL.into_iter().filter(|plant| !plant.joined()) {
         for vessel in 0..plant.vessels() {
             for ratio in [1.6, 4.5, 11.0, 45.0] {
@@ -164,7 +164,7 @@ fn vessels_that_are_over_within_a_step_have_the_derivatives_of_their_output() {
                 failures.extend(check(&case, &[], DRIVES[0], 400, 1e-6, 1e-3));
                 for (i, placed) in placements(plant).into_iter().enumerate() {
                     if begins_with_a_root(&[placed]) {
-                        // So fast a level rests near where the root begins, and no difference is short enough.
+                        // Such a fast level settles near the corner of the root, and no difference is short enough.
                         continue;
                     }
                     let seed = 400 + i as u64;
@@ -197,7 +197,7 @@ fn what_sticks_has_the_slope_of_a_chord_of_a_twentieth() {
                 (0.3, 0.9, 0.98),
                 (0.3, 1.0, 0.0),
                 (0.8, 0.0, -1.0),
-                // It never moves.
+                // A constant input.
                 (9.0, 1.0, 0.3),
             ] {
                 let mut case = base.with_interior(&[placed]);
@@ -245,7 +245,7 @@ fn a_reading_in_steps_has_the_slope_of_a_whole_step() {
         for (y, smooth) in case.run_dual(&input, 1).iter().zip(&without) {
             let count = (smooth.re / step).round();
             assert!((y.re - step * count).abs() < 1e-12);
-            // By its own step the reading rises with the number of steps; all else as if there were none.
+            // The derivative with respect to the step is the number of steps; other derivatives are those without quantisation.
             assert!((y.eps[own] - count).abs() < 1e-12);
             assert_eq!(y.eps[..own], smooth.eps[..own]);
             assert_eq!(y.eps[own + 1], 0.0);

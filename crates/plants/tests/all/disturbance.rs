@@ -20,7 +20,7 @@ fn cases() -> Vec<(Case, String)> {
         .collect()
 }
 
-/// The same course held where the first input is a ramp, and a ramp where it is held.
+/// The same course held if the first input is a ramp, and a ramp if it is held.
 fn otherwise(command: Command) -> Command {
     let there = mirrored(command).from;
     match command.to {
@@ -66,8 +66,8 @@ fn effects_beside_it_agree_with_their_equations() {
         let singles = placements(plant).into_iter().map(|placed| vec![placed]);
         let sets = random_sets(plant, 3, 8, 20 + i as u64);
         for (k, set) in singles.chain(sets).enumerate() {
-            // A level that leaves its rim and comes back within a step is not seen to spill; a disturbance that falls back at every
-            // sample and rises in between would do that all the time.
+            // A level that leaves its rim and returns within a step is not detected; a disturbance that falls at every sample and rises in
+            // between would cause this all the time.
             let rim = set.iter().any(|placed| placed.effect.id == "overflow");
             case.second = [mirrored, otherwise][usize::from(!rim && (k + i / 4) % 2 == 1)];
             let with = case.with_interior(&set);
@@ -189,7 +189,7 @@ fn of_a_linear_plant_it_adds_to_the_response() {
             let error = difference(&both, &sum);
             println!("{error:8.1e} {which} {drive:?}");
             assert!(error < 1e-13, "{which} {drive:?}: {error:e}");
-            // At rest the level stands at its gain.
+            // At rest the level is at its gain.
             let long = response(&case, &vec![[none, Command::held(2.0)]; 3000]);
             let gain = case.theta.last().unwrap();
             assert!((long[2999] - 2.0 * gain).abs() < 1e-9 * gain.abs());
@@ -214,7 +214,7 @@ fn none_leaves_the_output_as_it_is() {
                 with.theta[at.len()] = 0.0;
                 let error = difference(&with.run(&input, 1), &without.run(&input, 1));
                 assert!(error < 1e-13, "{which} {}: {error:e}", label(&set, plant));
-                // A record whose second input nobody knows of ignores it.
+                // A record whose second input is unknown to the model is simulated without it.
                 let mut other = without.clone();
                 other.second = otherwise;
                 assert_eq!(other.run(&input, 1), without.run(&input, 1));
@@ -231,7 +231,7 @@ fn effects_that_are_absent_leave_it_bit_for_bit() {
         let without = case.run(&input, 1);
         for placed in placements(plant) {
             let with = case.with_absent(&[placed]);
-            // Lags and dead times cut a step or follow the level, and a hole's height is a number even where the hole is shut.
+            // Lags and dead times cut a step or follow the level, and a hole's height is a parameter even if the hole is closed.
             let smooth = placed.effect.place == Place::Vessel && placed.effect.id != "coupled_tank";
             let error = difference(&with.run(&input, 1), &without);
             if smooth {
@@ -243,7 +243,7 @@ fn effects_that_are_absent_leave_it_bit_for_bit() {
 
 #[test]
 fn the_command_alone_is_late() {
-    // A dead time and a lag of the pump leave the disturbance as it is: under a command that stands still they do nothing.
+    // A dead time and a lag of the pump do not change the disturbance: for a constant command they have no effect.
     for (case, which) in cases() {
         let plant = case.structure.plant;
         for id in ["transport_delay", "pump_lag"] {
@@ -310,7 +310,7 @@ fn it_has_one_parameter_more_and_no_places_for_effects() {
 
 #[test]
 fn what_it_takes_from_a_tank_leaves_it_empty() {
-    // More is taken than the pump brings: the level ends at zero and has finite derivatives.
+    // The disturbance takes more than the pump supplies: the level ends at zero and has finite derivatives.
     for plant in [Plant::SingleTank, Plant::CascadedTanks] {
         for vessel in 0..plant.vessels() {
             let mut case = disturbed(plant, vessel, 1.0);

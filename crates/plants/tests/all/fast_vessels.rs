@@ -1,4 +1,4 @@
-//! Vessels that are over within a sampling interval: against the equations, absent effects, and derivatives.
+//! Vessels with time constants far below a sampling interval: compared with the equations, absent effects, and derivatives.
 
 use crate::support::{Case, DRIVES, difference, fast, input, label, placements, reference};
 use plants::{Outlet, Plant};
@@ -37,9 +37,9 @@ fn fast_vessels_follow_their_equations() {
             let error = difference(&with.run(&input, 1), &reference::run(&with, &input));
             let line = format!("{error:8.1e} {which} {}", label(&[placed], plant));
             println!("{line}");
-            // What is beside an exact flow errs by little; a root that is emptied within a step by more, and by how much hangs
-            // on the input: over 40 inputs a sensor's lag (h/tau 45) errs by 2.6e-3 in the median and 7.2e-3 at most, a coupled
-            // tank (1.6) by 2.8e-3 and 1.5e-2. Each case has one of them here: the limit is that of this draw.
+            // Errors next to an exact flow are small; a vessel that empties within a step has a larger error, which depends on the input:
+            // over 40 inputs a sensor's lag (h/tau 45) has an error of 2.6e-3 in the median and 7.2e-3 at most, a coupled tank (1.6) 2.8e-3
+            // and 1.5e-2. Each case uses one input here: the limit is that of this draw.
             let most = match plant.outlet() {
                 Outlet::Linear => 1e-3,
                 Outlet::Torricelli => 6e-3,
@@ -65,15 +65,15 @@ fn effects_that_are_absent_leave_fast_vessels_bit_for_bit() {
     }
 }
 
-/// What a vessel holds reaches the next one, also where it is gone long before a step's shortest part is over.
+/// The content of a vessel reaches the next one, also if the vessel empties long before the shortest part of a step.
 #[test]
 fn nothing_is_lost_where_a_vessel_empties_at_once() {
     for ratio in [4.5, 45.0, 200.0] {
         let mut case = fast(Plant::CascadedTanks, 0, ratio);
-        // What stays of it is a thousandth.
+        // A thousandth of it is left.
         case.theta[1] *= 30.0;
         let input = input(DRIVES[0], 60, case.h, 960);
-        // So fine that every part is short against the vessel's time constant.
+        // So fine that every part is short compared with the vessel's time constant.
         let fine = case.run(&input, 512);
         let error = difference(&case.run(&input, 1), &fine);
         println!("{error:8.1e} h/tau {ratio}");

@@ -3,7 +3,7 @@
 use crate::support::{Case, DRIVES, base, difference, effect, input, mirrored, reference};
 use plants::{Command, Dual, Known, Placed, Plant, Scalar, Scales, Simulator, Structure};
 
-/// The DTS200 as its manual has it, levels in cm and flow coefficients pure numbers: areas of 154 cm^2, pipes of 0.5 cm^2.
+/// The DTS200 according to its manual, levels in cm and flow coefficients pure numbers: areas of 154 cm^2, pipes of 0.5 cm^2.
 fn rig(measured: usize, second: bool) -> Structure {
     let mut scales = Scales::from_ranges((0.0, 10.0), (5.0, 50.0), 1.0, 1000.0);
     scales.input_2 = second.then_some((0.0, 10.0));
@@ -48,7 +48,7 @@ fn a_flow_coefficient_of_a_known_orifice_is_at_most_two() {
     for (lower, upper) in coefficients(&structure) {
         assert!(0.0 < lower && lower < upper && upper == 2.0);
     }
-    // Of an orifice that is not known they have a unit.
+    // For an unknown orifice they have a unit.
     let mut scales = Scales::from_ranges((0.0, 10.0), (5.0, 50.0), 1.0, 1000.0);
     scales.input_2 = Some((0.0, 10.0));
     let known = Known {
@@ -62,7 +62,7 @@ fn a_flow_coefficient_of_a_known_orifice_is_at_most_two() {
 #[test]
 fn water_is_neither_made_nor_lost() {
     let mut theta = THETA;
-    // The outlet shut: all that is pumped stays.
+    // With a closed outlet, all pumped water stays.
     theta[4] = 0.0;
     for substeps in [1, 3] {
         for h in [0.2, 1.0, 5.0, 40.0] {
@@ -84,7 +84,7 @@ fn water_is_neither_made_nor_lost() {
 #[test]
 fn it_rests_where_the_equations_say() {
     let orifice = 0.5 * (2.0 * 981.0_f64).sqrt();
-    // With the first pump off T1 and T3 come to one level, with more of it to different ones.
+    // With the first pump off, T1 and T3 reach the same level, otherwise different ones.
     for u in [[3.0, 2.0], [4.0, 0.0], [0.0, 5.0]] {
         let mut simulator = simulator(&THETA, [20.0, 10.0, 12.0], u);
         for _ in 0..3000 {
@@ -106,7 +106,7 @@ fn it_rests_where_the_equations_say() {
 
 #[test]
 fn tanks_that_are_exchanged_exchange_their_levels() {
-    // Without an outlet the rig is its own mirror image.
+    // Without an outlet the rig is symmetric.
     let (one, other) = ([9.0, 8.5, 0.46, 0.48, 0.0], [8.5, 9.0, 0.48, 0.46, 0.0]);
     let mut a = simulator(&one, [14.0, 9.0, 4.0], [0.0; 2]);
     let mut b = simulator(&other, [4.0, 9.0, 14.0], [0.0; 2]);
@@ -121,8 +121,8 @@ fn tanks_that_are_exchanged_exchange_their_levels() {
     }
 }
 
-/// Classical Runge-Kutta in steps so short that no root matters, on the equations as the manual writes them, with no
-/// regularisation at all.
+/// Classical Runge-Kutta method with so short steps that the corners of roots do not matter, on the manual's equations without
+/// regularisation.
 fn sharp(levels: [f64; 3], samples: usize, every: usize, h: f64, parts: usize) -> Vec<[f64; 3]> {
     let orifice = 0.5 * (2.0 * 981.0_f64).sqrt();
     let root = |d: f64| d.signum() * d.abs().sqrt();
@@ -240,7 +240,7 @@ fn derivatives_are_finite_and_right_where_levels_cross_and_rest() {
     }
 }
 
-/// Valves and an outlet that are over within a sample: the levels still follow, and nothing is lost.
+/// Valves and an outlet with time constants far below a sample: the levels still follow, and the balance of mass holds.
 #[test]
 fn valves_that_are_over_within_a_step_settle() {
     for ratio in [3.0, 30.0, 300.0, 3e4] {
@@ -254,7 +254,7 @@ fn valves_that_are_over_within_a_step_settle() {
         let mut simulator =
             Simulator::with_inputs(&rig(1, true), &duals, &levels, [0.0; 2]).unwrap();
         let mut content = 27.0;
-        // As one tank of three times the area, to within the heads that the flow needs.
+        // Equivalent to one tank of three times the area, up to the heads that the flow needs.
         for k in 0..300 {
             let u = back_and_forth(k, 60);
             simulator.advance_both(held(u), 1.0);
@@ -281,7 +281,7 @@ fn valves_that_are_over_within_a_step_settle() {
 
 #[test]
 fn either_pump_may_have_what_a_pump_can_have() {
-    // Pump 1 waits and pump 2 is cut short: their pieces end at different instants of a sample.
+    // Pump 1 has a dead time and pump 2 is interrupted: their intervals end at different instants of a sample.
     let base = base(Plant::ThreeTank);
     let sets = [
         [("transport_delay", 0), ("pump_saturation", 1)],

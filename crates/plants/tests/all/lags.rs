@@ -28,7 +28,7 @@ fn derivative(
     dual.iter().map(|y| (y.re, y.eps[lane])).unzip()
 }
 
-/// By how much values and derivatives at two sizes of one effect differ, as shares of the largest.
+/// Difference of values and derivatives between two sizes of one effect, as shares of the largest.
 fn gap(plant: Plant, id: &str, a: f64, b: f64, input: &[(Command, f64)]) -> (f64, f64) {
     let lane = base(plant).theta.len();
     let (ya, da) = derivative(&with(plant, &[(id, a)]), lane, input, 1);
@@ -45,7 +45,7 @@ fn a_lag_vanishes_smoothly() {
             for id in ["pump_lag", "sensor_lag", "transport_delay"] {
                 for t in [1e-9, 1e-6, 1e-4] {
                     let (values, derivatives) = gap(plant, id, t * h, 0.0, &input);
-                    // The derivative by the lag, times the lag, is the change; the derivative itself moves in proportion.
+                    // The derivative with respect to the lag, times the lag, is the change; the derivative itself changes in proportion.
                     assert!(
                         values < 0.05 * t && derivatives < 60.0 * t,
                         "{} {id} {t}: {values:e} {derivatives:e}",
@@ -64,7 +64,7 @@ fn a_lag_has_no_seam_where_its_formula_changes() {
             let h = base(plant).h;
             let input = input(drive, 120, h, 62);
             for id in ["pump_lag", "sensor_lag"] {
-                // Where the exponential is dropped, and where the series takes over from the recursion.
+                // At the values where the exponential is dropped, and where the series replaces the recursion.
                 for t in [h / 700.0, 2.0 * h] {
                     let (values, derivatives) =
                         gap(plant, id, t * (1.0 - 1e-9), t * (1.0 + 1e-9), &input);
@@ -78,8 +78,8 @@ fn a_lag_has_no_seam_where_its_formula_changes() {
     }
 }
 
-/// What a lag about and below the sample costs: it reaches a vessel as the parabola with the right three moments, of which
-/// Runge-Kutta sees the third to (h/tau)^2 alone. With one step a sample that is up to 5e-7 here.
+/// Error of a lag near and below the sampling interval: it reaches a vessel as a parabola with the right three moments, of which the
+/// Runge-Kutta method uses the third to (h/tau)^2 only. With one step per sample that is up to 5e-7 here.
 fn lag_error(plant: Plant, lag_over_h: f64) -> f64 {
     if plant.outlet() == plants::Outlet::Torricelli && lag_over_h < 3.0 {
         6e-7
@@ -157,8 +157,8 @@ fn a_delay_agrees_with_its_equation_wherever_it_falls() {
 
 #[test]
 fn the_derivative_by_a_delay_passes_whole_samples_without_a_jump() {
-    // With one vessel the level has a corner where a step arrives, so that only two in series are smooth there; a ramp
-    // has no jump, and is smooth with one.
+    // With one vessel the level has a corner where a step arrives, so that only two vessels in series are smooth there; a ramp has no step,
+    // and is smooth with one.
     for (plant, drives) in [
         (Plant::CascadedTanks, &DRIVES[..]),
         (Plant::CascadedTanksLinear, &DRIVES[..]),
@@ -180,8 +180,8 @@ fn the_derivative_by_a_delay_passes_whole_samples_without_a_jump() {
                         difference(&at(k - 1e-9, substeps), &on)
                             .max(difference(&at(k + 1e-9, substeps), &on))
                     };
-                    // Runge-Kutta cuts the steps elsewhere on either side, which changes its error: by (h/tau)^4/24 of
-                    // the jumping rate, or by (h/tau)^2 for a lag below the sample.
+                    // The Runge-Kutta method cuts the steps elsewhere on either side, which changes its error: by (h/tau)^4/24 of the rate
+                    // with steps, or by (h/tau)^2 for a lag below the sample.
                     let (most, fall) = match (plant.outlet(), lag) {
                         (plants::Outlet::Linear, None) => (1e-8, 1.0),
                         (plants::Outlet::Linear, _) => (1e-6, 0.1),
@@ -210,7 +210,7 @@ fn a_delay_at_a_whole_sample_has_the_derivative_of_its_output() {
             let lane = base(plant).theta.len();
             for lag in [0.0, 0.7, 40.0] {
                 let at = |d: f64| with(plant, &[("transport_delay", d), ("pump_lag", lag * h)]);
-                // The side from which the arrival comes is the one that duals see at the sample itself.
+                // The derivative at an arrival exactly at a sample is the one-sided one that duals compute.
                 let (y, exact) = derivative(&at(3.0 * h), lane, &input, 1);
                 let step = 1e-4 * h;
                 let (one, two) = (

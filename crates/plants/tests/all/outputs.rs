@@ -15,7 +15,7 @@ fn reading(plant: Plant, measured: &[usize]) -> Case {
     case
 }
 
-/// The same with an effect, its parameters where it shows and a lag that has not settled.
+/// The case with an effect, its parameters at values with influence, and a lag that has not settled.
 fn with(case: &Case, id: &str, output: usize) -> Case {
     let placed = Placed {
         effect: effect(id),
@@ -80,8 +80,8 @@ fn every_output_reads_the_level_of_its_vessel() {
     }
 }
 
-/// Largest disagreement of the derivatives of an output with central differences, as a share of the largest by that variable. Of
-/// two lengths of the difference the better counts: one may lie across a corner of the output.
+/// Largest difference between the derivatives of an output and central differences, as a share of the largest with respect to that
+/// variable. Of two lengths of the difference the better one is used: one may cross a corner of the output.
 fn disagreement(case: &Case, input: &[(Command, f64)], output: usize) -> f64 {
     let variables = case.variables();
     let duals: Vec<Dual<15>> = variables
@@ -148,7 +148,7 @@ fn an_effect_at_a_sensor_changes_its_output_alone() {
             for output in 0..measured.len() {
                 let mut case = with(&base, id, output);
                 let own = base.theta.len();
-                // Where the readings are: half-way up what they visit.
+                // Middle of the range of the readings.
                 let readings = without.iter().map(|(readings, _)| readings[output]);
                 let middle = readings.sum::<f64>() / without.len() as f64;
                 match id {
@@ -230,7 +230,7 @@ fn a_lag_follows_the_level_that_its_sensor_reads() {
         for (k, (readings, _)) in read.iter().enumerate() {
             worst = worst.max((readings[0] - behind).abs());
             for i in k * parts..((k + 1) * parts).min(levels.len() - 1) {
-                // The level runs straight over so short a step.
+                // The level is nearly linear over such a short step.
                 let slope = (levels[i + 1] - levels[i]) / step;
                 let settled = |level: f64| level - slope * lag;
                 let left = (behind - settled(levels[i])) * (-step / lag).exp();

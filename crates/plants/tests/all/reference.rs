@@ -1,4 +1,4 @@
-//! The simulator against the written equations, integrated by other means, and against closed forms.
+//! The simulator compared with an independent integration of the equations, and with analytic solutions.
 
 use crate::support::{
     Case, DRIVES, Drive, base, begins_with_a_root, difference, effect, input, label, placements,
@@ -11,8 +11,8 @@ fn compare(case: &Case, drive: Drive, seed: u64, most: f64) -> Vec<String> {
     let input = input(drive, 150, case.h, seed);
     let reference = reference::run(case, &input);
     let effects = case.structure.effects();
-    // Where a root begins within a step its error falls by 3 to the power of one and a half, five times, and is of the size
-    // of a tenth of what flows through the hole meanwhile.
+    // If an outflow begins within a step, the order of the error falls to one and a half (a factor of five for three parts), and the error
+    // is about a tenth of the flow through the hole in that time.
     let (most, falls) = if begins_with_a_root(effects) {
         (2e-4, 0.25)
     } else {
@@ -52,9 +52,8 @@ fn every_effect_agrees_with_its_equation() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-// Five times the bound of a single effect: effects add up to a shorter time constant (0.06 h, and a vessel that narrows
-// to half its surface shortens it again), and the hysteresis multiplies the level's error by the slope with which it
-// drops, five.
+// Five times the bound of a single effect: effects together give a shorter time constant (0.06 h, and a vessel that narrows to half its
+// surface shortens it again), and the hysteresis multiplies the level's error by its slope, five.
 #[test]
 fn pairs_and_triples_agree_with_their_equations() {
     let mut failures = Vec::new();
@@ -77,7 +76,7 @@ fn pairs_and_triples_agree_with_their_equations() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// Two lags in series behind `K u`, `u` from `u0` with a slope, after a time `t`.
+/// Two lags in series after `K u`, `u` from `u0` with a slope, after a time `t`.
 fn two_lags(x: [f64; 2], [t1, t2]: [f64; 2], q0: f64, slope: f64, t: f64) -> [f64; 2] {
     let c1 = x[0] - q0 + slope * t1;
     let q = q0 + slope * t;
@@ -156,7 +155,7 @@ fn two_lags_in_series_may_be_exchanged() {
         let offset = case.theta[names.iter().position(|info| info.name == "offset").unwrap()];
         let mut other = base(plant);
         other.theta.swap(at[0], at[1]);
-        // The same reading and the same slope of it at the beginning.
+        // The same reading and the same slope at the beginning.
         let low = case.levels[1] - offset;
         other.levels[0] = low + (case.levels[0] - low) * case.theta[at[0]] / case.theta[at[1]];
         for drive in DRIVES {
@@ -202,7 +201,7 @@ fn the_order_is_four_with_contacts_at_a_rim_inside_the_steps() {
                 let input = input(drive, 60, case.h, 11);
                 let reference = reference::run(&case, &input);
                 if !set.is_empty() {
-                    // The rim must be met, and left between samples.
+                    // The rim must be reached, and left between samples.
                     let without = base.run(&input, 1);
                     assert!(difference(&case.run(&input, 1), &without) > 0.01);
                 }

@@ -1,4 +1,4 @@
-//! Whatever a fit may try and a user may record, the output stays finite and the levels within their vessels.
+//! For any values that a fit may try and a user may record, the output stays finite and the levels stay in their vessels.
 
 use crate::support;
 use crate::support::{Case, base, difference, effect, placements, random_sets, reference};
@@ -14,7 +14,7 @@ fn between(lower: f64, upper: f64, share: f64) -> f64 {
     }
 }
 
-/// Runs a case and checks every level at every sample; how far a derivative went.
+/// Runs a case and checks every level at every sample; returns the largest derivative.
 fn run(case: &Case, input: &[(Command, f64)], substeps: usize) -> Result<f64, TestCaseError> {
     let variables: Vec<Dual<15>> = case
         .variables()
@@ -57,7 +57,7 @@ fn run(case: &Case, input: &[(Command, f64)], substeps: usize) -> Result<f64, Te
         }
         for (i, level) in simulator.levels().iter().enumerate().take(plant.vessels()) {
             prop_assert!(level.re.is_finite());
-            // A rim below the bottom holds nothing: the bottom comes first.
+            // A rim below the bottom has no effect: the bottom comes first.
             if plant.outlet() == Outlet::Torricelli {
                 prop_assert!(level.re >= 0.0, "level {}", level.re);
             }
@@ -144,7 +144,7 @@ fn an_empty_vessel_with_a_laminar_outflow_fills() {
     }
 }
 
-/// So many samples of a steady input.
+/// The given number of samples of a constant input.
 fn steady(n: usize, h: f64) -> Vec<(Command, f64)> {
     vec![(Command::held(4.9), h); n]
 }
@@ -161,7 +161,7 @@ fn a_level_a_little_above_a_hole_settles() {
                 vessel,
             });
             let mut case = base(plant).with_interior(&placed);
-            // Where the level settles with the hole out of reach; the hole is put below by so much, and lets it fall.
+            // The level at rest without the hole; the hole is then put below it by this distance, and the level falls.
             let height = case.theta.len() - 1;
             case.theta[height] = 100.0;
             let settled = *case.run(&steady(4000, case.h), 1).last().unwrap();
@@ -169,7 +169,7 @@ fn a_level_a_little_above_a_hole_settles() {
             for stretch in [10.0, 30.0, 130.0, 300.0] {
                 let input = steady(60, stretch * case.h);
                 let largest = run(&case, &input, 1).unwrap();
-                // Dormand and Prince's step shrinks to nothing at a root; many short ones are as good.
+                // The step of the Dormand-Prince method shrinks to zero at a root; many short steps are as good.
                 let fine = case.run_dual(&input, (8.0 * stretch) as usize);
                 let coarse = case.run_dual(&input, 1);
                 let values = |run: &[Dual<15>]| run.iter().map(|y| y.re).collect::<Vec<_>>();
@@ -180,7 +180,7 @@ fn a_level_a_little_above_a_hole_settles() {
                     "{largest:8.1e} {error:8.1e} {slopes:8.1e} {above} {stretch} {}",
                     plant.id()
                 );
-                // The one sample that comes to stand above the hole may be far off: there the outflow has a corner.
+                // The one sample that ends near the hole may have a large error: the outflow has a corner there.
                 assert!(largest < 1e4, "a derivative of {largest}");
                 assert!(slopes < 1e-4, "settled derivatives differ by {slopes:e}");
                 assert!(error < 5e-3, "{error:e}");
@@ -189,7 +189,7 @@ fn a_level_a_little_above_a_hole_settles() {
     }
 }
 
-/// The same below a tank that leaks, where the hole is two thirds of the forgetting.
+/// The same for a leaking tank, where the hole causes two thirds of the decay.
 #[test]
 fn a_hole_below_a_leak_settles() {
     let placed = [("const_leak", 0), ("leak_at_height", 1)].map(|(id, vessel)| plants::Placed {
@@ -201,8 +201,7 @@ fn a_hole_below_a_leak_settles() {
     assert!(largest < 20.0, "a derivative of {largest}");
 }
 
-/// A tank that is pumped less than its pipe takes as soon as there is anything in it: it stands a hair above empty, where the outflow
-/// rises with a root.
+/// A tank with less inflow than its pipe can carry is nearly empty, and its outflow is a root of its level.
 #[test]
 fn a_joined_tank_that_a_pipe_keeps_all_but_empty_settles() {
     let placed = ["pipe_height", "const_leak"].map(|id| plants::Placed {
@@ -260,13 +259,13 @@ proptest! {
     ) {
         let plant = Plant::ALL[plant];
         let mut set = random_sets(plant, size, 1, seed).remove(0);
-        // The hysteresis turns small differences into large ones by nature.
+        // The hysteresis amplifies small differences into large ones.
         set.retain(|p| p.effect.id != "sensor_hysteresis");
         let mut case = base(plant);
-        // Sampling from one to three hundred times as coarse, at a steady input: what decays must not grow.
+        // Sampling from one to three hundred times as coarse, with a constant input: a decaying response must not grow.
         let h = case.h * 10.0_f64.powf(stretch);
         let input = steady(300, h);
-        // What follows the clock is made for the record's duration, and goes on growing beyond.
+        // Functions of time are made for the record's duration, and grow further after it.
         let duration = &mut case.structure.scales.duration;
         *duration = duration.max(input.len() as f64 * h);
         let case = case.with_interior(&set);
@@ -294,8 +293,8 @@ fn a_tank_that_runs_dry_and_fills_again_agrees_with_its_equation() {
         assert!(one.iter().any(|&y| y < 1e-3), "it runs dry");
         let errors = [1, 4, 16].map(|n| difference(&case.run(&input, n), &reference));
         println!("{errors:?} {}", plant.id());
-        // As an empty tank fills the outflow rises with a root of time: the order falls to one and a half, of a small
-        // error, down to where the root gives way to a parabola.
+        // While an empty tank fills, the outflow is a root of time: the order falls to one and a half, of a small error, until the root is
+        // replaced by a parabola.
         assert!(
             errors[0] < 1e-3 && errors[1] < 0.2 * errors[0] && errors[2] < 0.2 * errors[1] + 1e-5,
             "{errors:?}"
@@ -311,7 +310,7 @@ fn coarse_sampling_follows_the_equation() {
             case.h *= 60.0;
             case.structure.scales.duration = 60.0 * case.h;
             let mut case = case.with_interior(&[placed]);
-            // Intervals of one to two time constants; lags and dead times as they were.
+            // Intervals of one to two time constants; lags and dead times do not change.
             for (value, info) in case.theta.iter_mut().zip(case.structure.parameters()) {
                 if info.unit == plants::Unit::TIME
                     && ["delay", "time_constant"].contains(&info.name)

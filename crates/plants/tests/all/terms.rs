@@ -1,5 +1,5 @@
-//! A term of the user's own: absent it is the base model bit for bit, its derivatives are those of its output, and a straight
-//! one is what an effect of the catalogue or a parameter of the plant would be.
+//! A term of the user's own: at its absent value the model is the base model bit for bit, its derivatives agree with differences, and a
+//! linear term is equivalent to an effect of the catalogue or a parameter of the plant.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -150,7 +150,7 @@ fn a_straight_term_is_what_it_replaces() {
             ordinates: ordinates.to_vec(),
             ..bent(&base, place, 0, variable, Fitted::Scale)
         };
-        // A line in the command through zero is a larger gain, where the gain multiplies nothing else.
+        // A linear function of the command through zero is a larger gain, if the gain multiplies nothing else.
         let line = straight(Place::Actuator, Variable::Input, &[0.0, 10.0], &[0.0, 1.0]);
         let mut gain = base.clone();
         gain.theta[0] *= 1.1;
@@ -186,7 +186,7 @@ fn a_straight_term_is_what_it_replaces() {
             &offset.run(&input, 4),
         );
         assert!(error < 1e-13, "{}: {error:e}", plant.id());
-        // A linear outlet's slope: what leaves beside it in proportion to the level.
+        // The slope of a linear outlet: a loss in proportion to the level.
         if plant.outlet() == Outlet::Torricelli {
             let slope = straight(Place::Vessel, Variable::Level, &[0.0, 100.0], &[0.0, -30.0]);
             let laminar = base.with(
@@ -196,7 +196,7 @@ fn a_straight_term_is_what_it_replaces() {
                 }],
                 |_, _, _| 0.3,
             );
-            // What leaves beside the outlet does not reach the next tank; of one tank there is none.
+            // A loss next to the outlet does not reach the next tank; a single tank has no next one.
             if plant.vessels() == 1 {
                 let error = difference(
                     &with(&base, &slope, &[1.0]).run(&input, 4),

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use crate::error;
 
-/// How long a search may take.
+/// Time limit of a search.
 pub fn limit(
     effort: &str,
     seconds: Option<f64>,
@@ -34,7 +34,7 @@ pub fn limit(
     }
 }
 
-/// What a simulation is asked for: the probability of its band, and how many first readings its initial states are fitted to.
+/// Checks the options of a simulation: the probability of its band, and the number of first readings that the initial states are fitted to.
 pub fn check_simulation(level: f64, first: usize) -> PyResult<()> {
     if level > 0.0 && level < 1.0 && first > 0 {
         return Ok(());
@@ -44,7 +44,7 @@ pub fn check_simulation(level: f64, first: usize) -> PyResult<()> {
     )))
 }
 
-/// A simulation as Python takes it.
+/// A simulation as a Python object.
 pub fn simulation<'py>(py: Python<'py>, found: &Simulated) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     let outputs = PyDict::new(py);

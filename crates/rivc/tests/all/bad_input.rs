@@ -1,4 +1,4 @@
-//! What cannot be is refused in one line that names the numbers and the mend.
+//! Invalid inputs are rejected in one line with the numbers and the correction.
 
 use ct_signals::excitation;
 use rivc::{Data, Delay, Noise, Plant, Settings, Structure, estimate};
@@ -97,7 +97,7 @@ fn uneven_times() {
     );
 }
 
-/// Times that were rounded are even enough to count by.
+/// Rounded times are even enough for methods that count samples.
 #[test]
 fn rounded_times_are_even_enough() {
     let mut rounded = record(400);

@@ -1,4 +1,4 @@
-//! Intervals hold the truth as often as they say. `RECORDS=400` runs more records than a test needs.
+//! Intervals contain the true value as often as they say. `RECORDS=400` runs more records than a test needs.
 
 use crate::support::{add, data, even, held, respond, rng};
 use ct_signals::{ArModel, excitation, noise};
@@ -75,7 +75,7 @@ fn check(
             100.0 * spread / truth,
         );
         assert!((covered - 0.95).abs() <= band, "{name} {kind:?}: {covered}");
-        // The share says nothing of errors that are too large; half the records' standard deviation is off by 1/sqrt(2 n).
+        // The share contains no information about errors that are too large; half the records' standard deviation is off by 1/sqrt(2 n).
         let band = 4.0 / (2.0 * n).sqrt();
         assert!(
             (told / spread - 1.0).abs() <= band,
@@ -190,8 +190,8 @@ fn closed_loop() {
     }
 }
 
-/// A long quiet record beside a short one with a hundred times the noise, and records of different steps, one of them coloured: each has a
-/// variance, and an autoregression, of its own.
+/// A long quiet record with a short one with a hundred times the noise, and records with different steps, one of them with coloured noise:
+/// each has a separate variance and autoregression.
 #[test]
 fn unequal_records() {
     let (a, b) = ([1.0, 10.0], [2.0]);

@@ -1,4 +1,4 @@
-//! Without noise the plant comes back to rounding, whatever the structure.
+//! Without noise the plant is recovered to rounding, for every structure.
 
 use crate::support::{add, data, even, held, respond};
 use ct_lti::Hold;
@@ -56,7 +56,7 @@ fn orders_one_to_four_from_any_state_and_offset() {
     }
 }
 
-/// A direct term: the reading is the one after the input's jump.
+/// A direct term: the reading is taken after the input's step.
 #[test]
 fn a_direct_term() {
     let (a, b) = ([1.0, 10.0], [1.0, 4.0]);
@@ -141,7 +141,7 @@ fn an_integrator() {
         let time = even(1000, 0.5);
         let u = held(prbs(1000, 14, 9));
         let y = respond(b, a, &time, &u, 0.0);
-        // A leak that nobody measures.
+        // An unmeasured leak.
         let y = y
             .iter()
             .zip(&time)
@@ -181,7 +181,7 @@ fn several_inputs_with_delays_of_their_own() {
     assert!((found.plant.delays[1] - 7.3).abs() < 1e-6);
 }
 
-/// Each record has an offset and a state of its own; the plant is the same.
+/// Each record has a separate offset and initial state; the plant is the same.
 #[test]
 fn several_records() {
     let (a, b) = ([1.0, 12.0, 30.0], [2.0]);

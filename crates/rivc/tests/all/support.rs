@@ -36,7 +36,7 @@ pub fn respond(b: &[f64], a: &[f64], time: &[f64], u: &Input, delay: f64) -> Vec
     instants.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
     let mut y = Vec::new();
     let mut k = 0;
-    // The input jumps at instants: one short line before each makes a jump.
+    // The input has steps at instants: a short interval before each approximates a step.
     let mut output = simulator
         .update(value(instants[0] - delay, true), 0.0)
         .unwrap();

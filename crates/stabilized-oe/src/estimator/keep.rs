@@ -1,4 +1,4 @@
-//! What keeps an update within its rows, its bounds and a stable filter.
+//! Corrections of an update: rows, bounds and a stable filter.
 
 use ct_constrained::Relation;
 use ct_rls::{Innovation, Outcome};
@@ -63,7 +63,7 @@ impl<const N: usize, const P: usize, G: Gain<N, P>, D: Derivatives<N>, const R: 
         Ok(())
     }
 
-    /// Takes part of the last step of `theta^` back, so much that the model is stable.
+    /// Reduces the last step of `theta^` so far that the model is stable.
     #[cold]
     fn stabilize(&mut self, before: SVector<f64, P>) -> Result<(), Error> {
         self.bounded.unstable += 1;

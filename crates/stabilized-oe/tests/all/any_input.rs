@@ -1,4 +1,4 @@
-//! Whatever comes in, nothing panics and the estimates stay numbers.
+//! For any input there is no panic, and the estimates stay finite.
 
 use ct_constrained::Relation;
 use ct_rls::{ContinuousRls, Euler, ExactHold, Outcome, RecursiveEstimator, Weights};

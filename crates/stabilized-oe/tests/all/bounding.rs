@@ -1,4 +1,4 @@
-//! With noise, bounds on `c^` decide: n = 2, where `c^` without them goes to a place that is not positive real.
+//! With noise, bounds on `c^` are decisive: n = 2, where `c^` without bounds converges to a value that is not positive real.
 
 use crate::support::second_order::{block_diagonal, error, response, sample, weights};
 use ct_constrained::{Bounds, Keep};

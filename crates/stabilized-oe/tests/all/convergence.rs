@@ -1,4 +1,4 @@
-//! Where the method converges without noise, gain by gain, and the example where the paper's gain does not.
+//! Convergence without noise for each gain, and the example where the paper's gain does not converge.
 
 use crate::support::second_order::{
     self, START, block_diagonal, error, full, input, sample, weights,

@@ -1,4 +1,4 @@
-//! The gains' own parts: what they say of themselves, and how they are kept to bounds.
+//! Parts of the gains: their state, and their bounds.
 
 use ct_constrained::{Bounds, Keep};
 use ct_rls::{ContinuousRls, Euler, ExactHold, RecursiveEstimator, Sample, Weights};
@@ -73,7 +73,7 @@ fn blocks() -> BlockDiagonal<1, 2, ExactHold> {
 
 fn is_kept<G: Gain<1, 2>>(make: impl Fn() -> G) {
     let penalty = Keep::Penalty { weight: WEIGHT };
-    // nothing is correlated: each entry comes to its bound, or a penalty's part of the way
+    // without correlation each entry is set to its bound, or moves towards it by a penalty
     let kept = |keep: Keep, start: f64, bound: f64, p: f64| match keep {
         Keep::Projection | Keep::Clamp => bound,
         Keep::Penalty { weight } => bound + (start - bound) * f64::exp(-weight * p * DT),

@@ -1,5 +1,5 @@
-//! Without noise `V = delta' P^-1 delta` over `(theta, c)` falls in every step for the full and the constant gain, whatever the plant and
-//! the input; for the adaptive block-diagonal gain it need not.
+//! Without noise `V = delta' P^-1 delta` over `(theta, c)` falls in every step for the full and the constant gain, for any plant and input;
+//! for the adaptive block-diagonal gain it need not.
 
 use crate::support::second_order;
 use ct_constrained::Bounds;

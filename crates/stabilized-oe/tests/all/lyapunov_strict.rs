@@ -13,8 +13,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stabilized_oe::{BlockDiagonal, CoupledRow, Full, Gain, Known, StabilizedOe, UNGUARDED};
 
-/// What `V` is to lose over a step besides its forgetting: `eps~` and `s = phi'P phi` at its start, the equations
-/// `eps~' = -c s eps~`, `s' = eta s - gamma s^2`, in fiftieths of the time they take at the moment.
+/// Predicted fall of `V` over a step in addition to forgetting: `eps~` and `s = phi'P phi` at its start, the equations `eps~' = -c s eps~`,
+/// `s' = eta s - gamma s^2`, in fiftieths of their present time scale.
 fn fallen(epsilon: f64, s: f64, weights: Weights, dt: f64) -> f64 {
     let (c, gamma, eta) = (weights.c(), weights.gamma(), weights.eta());
     let slope = |[e, s, i]: [f64; 3]| {
@@ -89,7 +89,7 @@ impl<const N: usize, const P: usize> Proven<N, P> for BlockDiagonal<N, P> {
     }
 }
 
-/// What acts beside the data.
+/// Constraints in addition to the data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Beside {
     Nothing,
@@ -115,11 +115,11 @@ fn beside() -> impl Strategy<Value = Beside> {
 struct Checked {
     equalities: Cell<u64>,
     bounds: Cell<u64>,
-    /// Of the bounds, those where an inequality was violated.
+    /// Number of violated inequalities for the bounds.
     at_work: Cell<u64>,
     /// Left out: a step that is shortened to keep the model stable is not one of the equations.
     shortened: Cell<u64>,
-    /// Cases that end early: shortened steps have raised `V` a millionfold, and the estimates run away from there.
+    /// Cases that end early: shortened steps have raised `V` a millionfold, and the estimates diverge from there.
     ran_away: Cell<u64>,
 }
 

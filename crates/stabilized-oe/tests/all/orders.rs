@@ -58,7 +58,8 @@ fn without_noise_the_parameters_are_found() {
     assert!(found.iter().all(|e| *e < 2e-3), "{found:?}");
 }
 
-/// With m = n the highest derivative of the filtered input jumps with the input, and the line between samples is of first order.
+/// With m = n the highest derivative of the filtered input has steps with the input, and linear interpolation between samples is of first
+/// order.
 #[test]
 fn a_direct_path_is_of_first_order_in_the_step() {
     let [coarse, fine] = [0.05, 0.0125].map(|dt| error::<1, 4, 5>([2.0], &[1.5, 1.0], 1.0, dt));

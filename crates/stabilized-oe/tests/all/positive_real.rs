@@ -47,7 +47,7 @@ fn order_two_is_a_parabola() {
     assert!((1000..4000).contains(&holds), "{holds}");
 }
 
-/// Where the corners hold, every point of the boxes does; where a corner fails, it is one.
+/// If the condition is satisfied at the corners, it is at every point of the boxes; if it fails, it fails at a corner.
 fn corners_decide<const N: usize>(seed: u64, cases: usize, spread: f64) -> [usize; 3] {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut found = [0; 3];

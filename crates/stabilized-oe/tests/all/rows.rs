@@ -196,7 +196,7 @@ fn rows_after_data_are_of_first_order() {
     }
 }
 
-/// One step of data and rows with the full gain is the minimum of the quadratic criterion, by a direct inverse.
+/// One step of data and rows with the full gain is the minimum of the quadratic criterion, checked by a direct inverse.
 #[test]
 fn data_and_equalities_together_are_exact_for_the_full_gain() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -333,7 +333,7 @@ fn a_row_that_couples_draws_theta_along() {
     );
 }
 
-/// Penalties come after equalities, whatever the order they are given in: what they ask for holds when the step is over.
+/// Penalties come after equalities in any order of the arguments: they are satisfied at the end of the step.
 #[test]
 fn penalties_act_after_equalities() {
     let weights = Weights::least_squares(0.0).unwrap();

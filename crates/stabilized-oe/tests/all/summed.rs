@@ -164,7 +164,7 @@ fn v<const N: usize, const P: usize>(
     0.5 * sum
 }
 
-/// With `Lambda = I`: by what factor `V` grows over a second of held `phi` at most, in random cases without noise.
+/// With `Lambda = I`: largest growth factor of `V` over a second of constant `phi`, in random cases without noise.
 fn search(c_lambda: f64) -> (u32, f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let (mut grown, mut most) = (0, 0.0_f64);
@@ -243,7 +243,8 @@ fn second_order_run(c_lambda: f64) -> (Theta, f64) {
     (theta, after / before)
 }
 
-/// And it is not a gap in the proof alone: a small constant part leaves the adaptive gain's wrong end, a large one slowly wins.
+/// The limit is real: with a small constant part the estimates still reach the adaptive gain's wrong end; a large constant part slowly
+/// converges to the truth.
 #[test]
 fn with_a_small_constant_part_the_estimates_end_elsewhere() {
     let (theta, grown) = second_order_run(1e-3);

@@ -8,16 +8,16 @@ use std::fmt::Write;
 use super::{BELOW, CONDITIONS, MARGIN, listed, median, named_condition, ratio, shown};
 use crate::record::{Answer, Job, Outcome, unknown_name};
 
-/// What was said of records that miss nothing.
+/// Results of records without a missing effect.
 #[derive(Default)]
 pub(super) struct Nulls {
     records: usize,
-    /// Those in which something of the catalogue is named.
+    /// Records with a named effect of the catalogue.
     claims: Vec<String>,
-    /// Those called unexplained.
+    /// Records with the verdict unexplained.
     doubted: Vec<String>,
     open: usize,
-    /// Those in open loop whose command is said to answer to the noise.
+    /// Open-loop records with detected feedback.
     feedback: Vec<String>,
 }
 
@@ -78,9 +78,9 @@ struct Pairs {
     partial: usize,
     unexplained: usize,
     adequate: usize,
-    /// Of those without both: the criterion is lower with the pair than with the answer by more than the margin.
+    /// Among those with neither effect: the criterion is lower with the pair by more than the margin.
     search: usize,
-    /// It is not.
+    /// The criterion is not lower.
     record: usize,
     seconds: Vec<f64>,
 }
@@ -164,7 +164,7 @@ pub(super) fn pairs(jobs: &[Job], outcomes: &[Outcome]) -> String {
     out
 }
 
-/// How many records took how long, and which one longest.
+/// Distribution of the computing time over the records, and the longest one.
 pub(super) fn times(jobs: &[Job], outcomes: &[Outcome]) -> String {
     let taken: Vec<(f64, String)> = jobs
         .iter()
@@ -191,7 +191,7 @@ pub(super) fn times(jobs: &[Job], outcomes: &[Outcome]) -> String {
     out
 }
 
-/// For each kind of unknown: its name, records, those declared unexplained, and what the others were called.
+/// For each kind of unknown disturbance: its name, records, those declared unexplained, and the verdicts of the others.
 pub(super) fn unknowns(
     jobs: &[Job],
     outcomes: &[Outcome],
@@ -215,7 +215,7 @@ pub(super) fn unknowns(
         .collect()
 }
 
-/// How often each of the others was said.
+/// Counts of the other verdicts.
 pub(super) fn counted(others: &[String]) -> String {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for other in others {

@@ -14,7 +14,7 @@ use crate::fuzz::source::Source;
 use crate::http;
 use crate::http::Answer;
 
-/// Within this another request is answered, whatever was sent before.
+/// Time limit for the answer to another request, whatever was sent before.
 pub(super) const AT_ONCE: Duration = Duration::from_secs(2);
 
 /// A request that is not answered by then is not answered.
@@ -26,7 +26,7 @@ const COMPUTED: Duration = Duration::from_secs(30);
 /// A page that runs.
 pub(super) struct Running {
     child: Child,
-    /// Of its model file.
+    /// Folder of its model file.
     _folder: Folder,
     address: String,
     secret: String,
@@ -77,7 +77,7 @@ impl Running {
         Ok(running)
     }
 
-    /// A tab of its own.
+    /// Opens a new tab.
     fn open(&mut self) -> Result<(), String> {
         let answer = self.exchange(
             &self.request("POST", "/api/session", b"{\"session\": null}"),
@@ -129,7 +129,7 @@ impl Running {
         self.exchange(&self.request("GET", &path, b""), PATIENCE)
     }
 
-    /// Lets a computation end, and looks at what it gives.
+    /// Waits for the end of a computation, and checks its result.
     pub(super) fn computed(&self) -> Result<(), String> {
         let body = [
             r#"{"what": "compare"}"#,

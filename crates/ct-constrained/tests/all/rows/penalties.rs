@@ -129,7 +129,7 @@ fn falls<const P: usize>(
 ) -> Result<(), TestCaseError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let theta: SVector<f64, P> = normals(&mut rng);
-    // no cap: it may forget less than eta says
+    // no cap, because a cap reduces the forgetting below eta
     let guards = Guards {
         trace_limit: f64::INFINITY,
         silent_below: 0.0,
@@ -150,7 +150,7 @@ fn falls<const P: usize>(
     for _ in 0..5 {
         let phi: SVector<f64, P> = normals(&mut rng);
         let blurred = |rls: &ContinuousRls<P>| {
-            // theta is known to some units in the last place, and so far V is blurred
+            // theta is accurate to some units in the last place, which limits the accuracy of V
             let axis = |i: usize| SVector::from_fn(|j, _| f64::from(u8::from(i == j)));
             let information: f64 = (0..P)
                 .map(|i| rls.factor().information_norm(&axis(i)))
@@ -205,7 +205,7 @@ proptest! {
     }
 }
 
-/// Why penalties have `Gamma = 0`: taken in as equality rows where violated, the Lyapunov function can grow.
+/// Reason for `Gamma = 0` of penalties: used as equality rows while violated, the Lyapunov function can grow.
 #[test]
 fn a_penalty_with_gamma_of_its_weight_would_let_it_grow() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);

@@ -13,7 +13,7 @@ model constant_flow
 end constant_flow;
 "#,
     parameters: &[("amount", Role::Size, Starts::Balances(&[0.05, -0.05]))],
-    physics: "Something flows in or out all the time that the model does not have: a leak, a load, a source.",
+    physics: "A constant flow into or out of the balance is missing in the model: a leak, a load, a source.",
     confused_with: &["offset(y)", "dead_zone(u)", "loss(x)"],
     confirm: "Switch all inputs off and watch whether the state still changes.",
     symptoms: &["leak", "base load", "never quite balances"],

@@ -33,8 +33,8 @@ end hidden_state;
             Starts::Durations(&[0.003, 0.01, 0.03, 0.1, 0.3, 1.0]),
         ),
     ],
-    physics: "The state exchanges with a store beside it that fills and empties: a wall, a sleeve, a dead volume.",
+    physics: "The state exchanges with a second store that the model does not contain: a wall, a sleeve, a dead volume.",
     confused_with: &["lag(y)", "loss(x)", "lag(u)"],
-    confirm: "Step and wait: is there a fast answer and then a slow one?",
+    confirm: "Apply a step and wait: is there a fast response and then a slow one?",
     symptoms: &["two time constants", "long tail", "creeps after a step"],
 };

@@ -27,6 +27,6 @@ end limit;
     ],
     physics: "The state does not go beyond a bound: a rim, an end stop, a thermostat that cuts out.",
     confused_with: &["saturation(y)", "saturation(u)"],
-    confirm: "Push the state there and look: does it spill, touch or cut out?",
+    confirm: "Drive the state to the bound: does it overflow, hit a stop or cut out?",
     symptoms: &["overflows", "end stop", "stays at a value", "cuts out"],
 };

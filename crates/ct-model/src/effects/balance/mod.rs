@@ -9,7 +9,7 @@ mod step;
 
 use super::Effect;
 
-/// What stops the state last: it has to know everything else.
+/// Effects that limit a state come last: they need the complete right-hand side.
 pub(super) const EFFECTS: [Effect; 6] = [
     constant::EFFECT,
     loss::EFFECT,

@@ -30,7 +30,7 @@ end periodic;
             ]),
         ),
     ],
-    physics: "Something flows in and out in a rhythm of its own: a consumer that switches, day and night, an imbalance that turns.",
+    physics: "A periodic flow into and out of the balance: a consumer that switches, day and night, a rotating imbalance.",
     confused_with: &["hidden_state(x)"],
     confirm: "Log what runs nearby: what has this period?",
     symptoms: &["oscillates", "hum", "rhythm", "day and night"],

@@ -23,8 +23,8 @@ end step;
             Starts::Times(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]),
         ),
     ],
-    physics: "From some time on something more flows in or out: a door, a valve or a consumer has been opened, and stays so.",
+    physics: "From some time on an additional constant flow enters or leaves: a door, a valve or a consumer was opened and stays open.",
     confused_with: &["step(p)", "drift(p)", "drift(y)"],
-    confirm: "Look into the log of that time: what was switched, opened or replaced?",
+    confirm: "Look into the log for that time: what was switched, opened or replaced?",
     symptoms: &["different since", "jumped", "something was opened"],
 };

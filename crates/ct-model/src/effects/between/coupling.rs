@@ -20,8 +20,8 @@ end coupling;
         Role::Size,
         Starts::BalancesPerWidth(&[0.05, 0.3]),
     )],
-    physics: "A flow from the one to the other in proportion to their difference: a leak between vessels, a thermal bridge.",
+    physics: "A flow from one state to the other in proportion to their difference: a leak between vessels, a thermal bridge.",
     confused_with: &["loss(x)", "varies_with(p,x)"],
-    confirm: "Hold one of them and change the other: does the first one follow?",
+    confirm: "Hold one state and change the other: does the first one follow?",
     symptoms: &["follows its neighbour", "thermal bridge", "leak between"],
 };

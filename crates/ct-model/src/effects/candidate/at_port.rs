@@ -1,4 +1,4 @@
-//! An effect at a port: its text, with the names, units and starting values that it has there.
+//! An effect at a port: its text with the names, units and start values for this port.
 
 use std::collections::BTreeMap;
 
@@ -68,7 +68,7 @@ pub(super) fn candidate(
     } else {
         scales.reading(port)
     };
-    // Of a temperature: its zero above absolute zero.
+    // For a temperature: the zero of its unit above absolute zero.
     let zero = if spec.about(signal).unit == "K" {
         0.0
     } else {
@@ -131,7 +131,7 @@ pub(super) fn candidate(
             .map_or((Role::Size, Starts::Values(&[])), |(_, role, starts)| {
                 (*role, *starts)
             });
-        // A reading of a row is later by a row with the slightest delay of what it shows at once.
+        // Even the smallest delay of a direct feedthrough shifts the reading by one row.
         let jumps = effect.id == "delay" && spec.is_read_directly(signal);
         let role = if jumps { Role::Threshold } else { role };
         EffectParameter {

@@ -33,8 +33,8 @@ end second_rc;
             Starts::Durations(&[0.003, 0.01, 0.03, 0.1, 0.3]),
         ),
     ],
-    physics: "A voltage builds up behind the current with a time constant of its own: slow diffusion beside a fast reaction.",
+    physics: "A voltage builds up behind the current with a separate time constant: slow diffusion next to a fast reaction.",
     confused_with: &["series_resistance(y,i)", "hidden_state(x)", "lag(y)"],
-    confirm: "Switch the current off and watch the voltage recover: in two time constants?",
+    confirm: "Switch the current off and watch the voltage recover: are there two time constants?",
     symptoms: &["voltage recovers slowly", "two time constants"],
 };

@@ -1,4 +1,4 @@
-//! `series_resistance(y,i)`: a resistance between what the model has and the terminals.
+//! `series_resistance(y,i)`: a resistance between the modelled voltage and the terminals.
 
 use crate::effects::{Effect, Place, Role, Starts};
 

@@ -1,5 +1,5 @@
-//! `leak_at_height(h)`: a hole in the wall, above the outlet. Torricelli's root, but for heads of a hundredth of the visited range, where the
-//! flow is laminar: an infinite slope would make the derivative by the height depend on the steps.
+//! `leak_at_height(h)`: a hole in the wall, above the outlet. Torricelli's law, with laminar flow for heads below a hundredth of the
+//! visited range: an infinite slope would make the derivative with respect to the height depend on the steps.
 
 use crate::effects::{Effect, Place, Role, Starts};
 
@@ -27,7 +27,7 @@ end leak_at_height;
             Starts::Quantiles(&[0.9, 0.75, 0.5, 0.25, 0.1]),
         ),
     ],
-    physics: "A hole in the wall or a second outlet: above its height liquid leaves as Torricelli's law has it.",
+    physics: "A hole in the wall or a second outlet: liquid above its height leaves according to Torricelli's law.",
     confused_with: &["limit(h)", "varies_with(p,h)", "loss(h)"],
     confirm: "Fill the tank with the outlet closed: does the level fall, and where does it stop?",
     symptoms: &[

@@ -1,4 +1,4 @@
-//! `overflow(h1,h2)`: what spills over a rim falls into the tank below.
+//! `overflow(h1,h2)`: water over the rim flows into the tank below.
 
 use crate::effects::{Effect, Place, Role, Starts};
 
@@ -22,8 +22,8 @@ end overflow;
         Role::Threshold,
         Starts::Quantiles(&[0.97, 0.9, 0.8, 0.65, 0.5, 0.35]),
     )],
-    physics: "The tank is full: what comes in beyond spills over the rim, into the tank below.",
+    physics: "The tank is full: further inflow spills over the rim, into the tank below.",
     confused_with: &["limit(h)", "saturation(y)", "leak_at_height(h)"],
-    confirm: "Fill the upper tank and look.",
+    confirm: "Fill the upper tank and watch whether it overflows.",
     symptoms: &["overflows", "spills into the tank below"],
 };

@@ -18,7 +18,7 @@ end backlash;
         Role::Size,
         Starts::Widths(&[0.01, 0.05, 0.15]),
     )],
-    physics: "After each reversal the command has to cross a play before the actuator follows: worn gears, a valve's stem that sticks.",
+    physics: "After each reversal the command has to cross a backlash before the actuator follows: worn gears, a valve's stem that sticks.",
     confused_with: &["dead_zone(u)", "lag(u)", "hysteresis(y)"],
     confirm: "Reverse the input in small steps and count those that change nothing.",
     symptoms: &["play", "stiction", "no answer to small reversals", "slack"],

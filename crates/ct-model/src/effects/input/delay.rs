@@ -20,6 +20,6 @@ end delay_effect;
     )],
     physics: "The command acts a dead time later: transport through a pipe or on a belt, a computer, a network.",
     confused_with: &["lag(u)", "lag(y)"],
-    confirm: "Step the input and time how long nothing at all happens.",
+    confirm: "Apply a step of the input and measure the time until the output responds.",
     symptoms: &["dead time", "reacts late", "nothing happens at first"],
 };

@@ -15,7 +15,7 @@ model gain_drift
 end gain_drift;
 "#,
     parameters: &[("rate", Role::Size, Starts::Values(&[0.1, -0.1]))],
-    physics: "The actuator gives more or less for the same command as time goes on: it wears, warms up, or its supply changes.",
+    physics: "The gain of the actuator changes in proportion to time: the actuator wears or warms up, or its supply changes.",
     confused_with: &["drift(p)", "drift(y)", "step(p)"],
     confirm: "Repeat the same step of the input at the beginning and at the end of a run.",
     symptoms: &["gets weaker over time", "drifts", "ages"],

@@ -1,7 +1,8 @@
 //! `lag(u)`: the actuator follows the command with a time constant.
 //!
-//! Below half an interval between rows a lag differs from a smaller one only by how late it is: there the filter keeps that time constant, and
-//! a share of the input goes past it, so that the mean delay is the time constant. At zero all of it does, and the derivative there is right.
+//! Below half an interval between rows a lag differs from a smaller one only by how late it is: there the filter keeps that time constant,
+//! and a share of the input goes past it, so that the mean delay is the time constant. At zero all of it does, and the derivative there is
+//! right.
 
 use crate::effects::{Effect, Place, Role, Starts};
 
@@ -24,8 +25,8 @@ equation
 end lag;
 "#,
     parameters: &[("tau", Role::Size, Starts::Intervals(&[1.0, 5.0, 25.0]))],
-    physics: "What acts follows the command with a time constant: the actuator has to spin up, warm up or travel.",
+    physics: "The actuator follows the command with a time constant: it has to spin up, warm up or travel.",
     confused_with: &["delay(u)", "lag(y)", "backlash(u)"],
-    confirm: "Step the input and watch the actuator itself: is it there at once?",
+    confirm: "Apply a step of the input and watch the actuator: does it reach its final position at once?",
     symptoms: &["sluggish", "reacts slowly", "answers late and softly"],
 };

@@ -10,7 +10,7 @@ pub(super) mod saturation;
 
 use super::Effect;
 
-/// A delay first, as it delays what is known beforehand; it may be exchanged with all others but a drift.
+/// A delay comes first, because it delays known inputs; it commutes with all other effects but a drift.
 pub(super) const EFFECTS: [Effect; 7] = [
     delay::EFFECT,
     nonlinearity::EFFECT,

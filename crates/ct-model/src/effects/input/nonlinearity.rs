@@ -1,4 +1,4 @@
-//! `nonlinearity(u)`: a bend over the visited range.
+//! `nonlinearity(u)`: a parabola over the visited range.
 
 use crate::effects::{Effect, Place, Role, Starts};
 
@@ -20,8 +20,8 @@ end nonlinearity;
         Role::Size,
         Starts::Values(&[0.05, -0.05, 0.2, -0.2]),
     )],
-    physics: "What the actuator gives is no straight line of the command: a parabola through both ends of the visited range.",
+    physics: "The output of the actuator is not linear in the command: a parabola through both ends of the visited range.",
     confused_with: &["dead_zone(u)", "saturation(u)", "varies_with(p,u)"],
-    confirm: "Hold the input at five levels over its range and draw what the plant settles at.",
+    confirm: "Hold the input at five levels over its range and plot the steady-state output.",
     symptoms: &["gain depends on the level", "curved characteristic"],
 };

@@ -26,7 +26,7 @@ end saturation;
     ],
     physics: "The actuator cannot give more (or less) than a limit that lies within the range of the command.",
     confused_with: &["nonlinearity(u)", "limit(x)"],
-    confirm: "Step the input near the end of its range: does the plant still answer?",
+    confirm: "Step the input near the end of its range: does the plant still respond?",
     symptoms: &[
         "no more above a value",
         "clipped",

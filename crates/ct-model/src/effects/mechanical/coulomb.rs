@@ -16,8 +16,8 @@ model coulomb
 end coulomb;
 "#,
     parameters: &[("friction", Role::Size, Starts::Balances(&[0.03, 0.2]))],
-    physics: "Dry friction: against the motion, as large at any speed.",
+    physics: "Dry friction: a force against the motion that has the same size at any speed.",
     confused_with: &["dead_zone(u)", "backlash(u)", "stribeck(v)"],
-    confirm: "Raise the force slowly from zero and note where it begins to move; do the same back.",
+    confirm: "Raise the force slowly from zero and note where the motion begins; repeat in the other direction.",
     symptoms: &["sticks", "stops early", "does not start"],
 };

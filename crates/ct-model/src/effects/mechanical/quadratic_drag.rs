@@ -15,8 +15,8 @@ model quadratic_drag
 end quadratic_drag;
 "#,
     parameters: &[("drag", Role::Size, Starts::Balances(&[0.1, 0.5]))],
-    physics: "Air or liquid that is pushed aside: a force against the motion, with the square of the speed.",
+    physics: "Drag of air or liquid: a force against the motion, in proportion to the square of the speed.",
     confused_with: &["loss(x)", "varies_with(p,x)"],
-    confirm: "Let it run out from a high speed: it slows down quickly at first, and less and less.",
+    confirm: "Let it coast from a high speed: it slows down fast at high speed and ever more slowly at low speed.",
     symptoms: &["slower than expected at high speed", "fan", "air drag"],
 };

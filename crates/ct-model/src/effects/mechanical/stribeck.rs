@@ -22,8 +22,8 @@ end stribeck;
         ("more_at_rest", Role::Size, Starts::Balances(&[0.05])),
         ("speed", Role::Shape, Starts::Widths(&[0.03, 0.1, 0.3])),
     ],
-    physics: "Dry friction that falls as the motion begins: it breaks loose, and moves in jerks.",
+    physics: "Dry friction that falls as the motion begins: the motion alternates between sticking and slipping.",
     confused_with: &["coulomb(v)", "dead_zone(u)", "backlash(u)"],
-    confirm: "Move it very slowly: does it jerk?",
+    confirm: "Move it very slowly: does it stick and slip?",
     symptoms: &["stick-slip", "jerks", "breaks loose"],
 };

@@ -1,4 +1,4 @@
-//! `drift(y)`: the sensor's zero moves.
+//! `drift(y)`: the sensor's zero drifts.
 
 use crate::effects::{Effect, Place, Role, Starts};
 

@@ -18,7 +18,7 @@ end hysteresis;
         Role::Size,
         Starts::Widths(&[0.005, 0.03, 0.1]),
     )],
-    physics: "The reading sticks after each reversal until what it measures has moved by the width of a play.",
+    physics: "The reading stays constant after each reversal until the measured quantity has moved by the width of the hysteresis.",
     confused_with: &["lag(y)", "backlash(u)", "quantisation(y)"],
     confirm: "Approach one value from above and from below: do the readings differ?",
     symptoms: &["sticky reading", "reading depends on the direction"],

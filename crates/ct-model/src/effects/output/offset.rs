@@ -14,8 +14,8 @@ model offset
 end offset;
 "#,
     parameters: &[("error", Role::Size, Starts::Widths(&[0.05, -0.05]))],
-    physics: "The reading is off by a constant.",
+    physics: "The reading has a constant error.",
     confused_with: &["constant(x)"],
-    confirm: "Read the sensor where what it measures is known: empty, at rest, in ice water.",
+    confirm: "Read the sensor where the measured quantity is known: empty, at rest, in ice water.",
     symptoms: &["wrong zero", "reads too high", "reads too low"],
 };

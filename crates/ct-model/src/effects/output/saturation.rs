@@ -4,7 +4,7 @@ use crate::effects::{Effect, Place, input::saturation};
 
 pub(super) const EFFECT: Effect = Effect {
     place: Place::Output,
-    physics: "The reading stays at the end of the sensor's range while what it measures goes on.",
+    physics: "The reading stays at the end of the sensor's range while the measured quantity changes further.",
     confused_with: &["limit(x)", "nonlinearity(y)"],
     confirm: "Look for long runs of one value at an end of the readings; measure by other means there.",
     symptoms: &["clipped reading", "sensor at its end", "flat top"],

@@ -15,7 +15,7 @@ model drift
 end drift;
 "#,
     parameters: &[("rate", Role::Size, Starts::Values(&[0.1, -0.1]))],
-    physics: "It changes in proportion to time: by fouling, wear, warming up.",
+    physics: "The parameter changes in proportion to time: by fouling, wear, warming up.",
     confused_with: &["step(p)", "gain_drift(u)", "drift(y)"],
     confirm: "Repeat the same experiment at the beginning and at the end of a run.",
     symptoms: &["changes over time", "fouls", "clogs", "ages"],

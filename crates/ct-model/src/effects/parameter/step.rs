@@ -23,8 +23,8 @@ end step;
             Starts::Times(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]),
         ),
     ],
-    physics: "From some time on it has another value: something was replaced, blocked, opened or has broken.",
+    physics: "From some time on the parameter has another value: a part was replaced, blocked, opened or has broken.",
     confused_with: &["drift(p)", "step(x)"],
-    confirm: "Look into the log of that time: what was changed?",
+    confirm: "Look into the log for that time: what was changed?",
     symptoms: &["different since", "sudden change", "blocked", "broken"],
 };

@@ -20,8 +20,8 @@ end varies_with;
         Role::Size,
         Starts::Values(&[0.1, -0.1, 0.4, -0.4]),
     )],
-    physics: "It is no constant but rises or falls with the signal: a conductivity with the temperature, an area with the level.",
+    physics: "The parameter is not constant but rises or falls with the signal: a conductivity with the temperature, an area with the level.",
     confused_with: &["nonlinearity(u)", "nonlinearity(y)", "loss(x)"],
-    confirm: "Estimate it from records at a low and at a high value of the signal.",
+    confirm: "Estimate the parameter from records at a low and at a high value of the signal.",
     symptoms: &["depends on the operating point", "right at one level only"],
 };

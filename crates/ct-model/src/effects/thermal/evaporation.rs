@@ -1,4 +1,4 @@
-//! `evaporation(T,Ta)`: heat lost with what evaporates.
+//! `evaporation(T,Ta)`: heat loss by evaporation.
 
 use crate::effects::{Effect, Place, Role, Starts};
 
@@ -17,7 +17,7 @@ model evaporation
 end evaporation;
 "#,
     parameters: &[("flow_at_middle", Role::Size, Starts::Balances(&[0.05, 0.3]))],
-    physics: "Water evaporates and takes heat with it: with the difference of the vapour pressures, which rise steeply with temperature.",
+    physics: "Water evaporates and takes heat with it, in proportion to the difference of the vapour pressures, which rise steeply with temperature.",
     confused_with: &["radiation(T,Ta)", "varies_with(p,x)"],
     confirm: "Cover the surface with a lid or a film of oil, and repeat a hot run.",
     symptoms: &["loses much more when hot", "steam", "level sinks"],

@@ -1,4 +1,4 @@
-//! `natural_convection(T,Ta)`: heat lost to air that moves by itself.
+//! `natural_convection(T,Ta)`: heat loss to air by natural convection.
 
 use crate::effects::{Effect, Place, Role, Starts};
 
@@ -20,7 +20,7 @@ end natural_convection;
         Role::Size,
         Starts::BalancesPerWidth(&[0.1, 0.5]),
     )],
-    physics: "Heat is lost to air that rises along the surface: with the power 1.25 of the difference.",
+    physics: "Heat is lost to air that rises along the surface: the loss is proportional to the temperature difference to the power of 1.25.",
     confused_with: &["radiation(T,Ta)", "varies_with(p,x)", "loss(x)"],
     confirm: "Turn the surface upside down or blow air along it: the loss changes.",
     symptoms: &["loses more when hot", "draught"],

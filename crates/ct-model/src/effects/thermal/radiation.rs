@@ -22,7 +22,7 @@ end radiation;
         Role::Size,
         Starts::BalancesPerWidth(&[0.1, 0.5]),
     )],
-    physics: "Heat is lost by radiation, with the fourth power of the absolute temperatures.",
+    physics: "Heat is lost by radiation: the loss is proportional to the difference of the fourth powers of the absolute temperatures.",
     confused_with: &["natural_convection(T,Ta)", "varies_with(p,x)", "loss(x)"],
     confirm: "Cover the surface with foil and repeat a hot run.",
     symptoms: &["loses more when hot", "cools faster at high temperature"],

@@ -7,13 +7,13 @@ use crate::text::lexer::Word;
 use crate::text::syntax::{Kind, Node};
 
 impl Parser<'_> {
-    /// What holds more than so many within each other would take a stack of any size.
+    /// Deeper nesting could overflow the stack.
     fn bounded(&self, node: Node) -> Result<Node, TextError> {
         if node.depth <= DEEPEST {
             return Ok(node);
         }
         let what = format!(
-            "an expression of more than {DEEPEST} operators within each other: give a part of it a name of its own"
+            "an expression of more than {DEEPEST} operators within each other: define a variable for a part of it"
         );
         Err(TextError::at(self.text, node.from, what))
     }
@@ -26,7 +26,7 @@ impl Parser<'_> {
         self.brackets += 1;
         if self.brackets > DEEPEST {
             return self.error(format!(
-                "more than {DEEPEST} brackets within each other: give a part of it a name of its own"
+                "more than {DEEPEST} brackets within each other: define a variable for a part of it"
             ));
         }
         let node = if self.is_name("if") {
@@ -38,7 +38,7 @@ impl Parser<'_> {
         Ok(node)
     }
 
-    /// From `if` or `elseif` on.
+    /// Parses from `if` or `elseif` on.
     fn choice(&mut self) -> Result<Node, TextError> {
         let from = self.next().from;
         let condition = self.expression()?;
@@ -164,7 +164,7 @@ impl Parser<'_> {
         }
         let exponent = self.primary()?;
         if self.is_sign("^") {
-            return self.error("`^` behind `^` has two meanings: put brackets, `(a^b)^c`");
+            return self.error("`^` after `^` is ambiguous: put brackets, `(a^b)^c`");
         }
         self.join(
             Kind::Binary(Operator::Power, Box::new(base), Box::new(exponent)),
@@ -184,8 +184,7 @@ impl Parser<'_> {
                 self.next();
                 let inner = self.expression()?;
                 if self.is_sign(",") {
-                    return self
-                        .error("a list in brackets is outside the subset: write one expression");
+                    return self.error("a list in brackets is not supported: write one expression");
                 }
                 self.expect_sign(")", "`)`")?;
                 Ok(inner)
@@ -215,7 +214,7 @@ impl Parser<'_> {
         }
     }
 
-    /// From the bracket on.
+    /// Parses from the opening bracket on.
     fn call(&mut self, name: String, from: usize) -> Result<Node, TextError> {
         self.expect_sign("(", "`(`")?;
         let mut arguments = Vec::new();

@@ -1,4 +1,4 @@
-//! Words of Modelica that are no names, and those that stand outside the subset.
+//! Reserved words of Modelica, and words outside the subset.
 
 /// Words of Modelica that are no names.
 pub(super) const KEYWORDS: [&str; 58] = [
@@ -62,7 +62,7 @@ pub(super) const KEYWORDS: [&str; 58] = [
     "within",
 ];
 
-/// What stands outside the subset, and the mend.
+/// Words outside the subset, with the correction.
 pub(super) fn outside(word: &str) -> Option<&'static str> {
     Some(match word {
         "connect" => "connections are outside the subset: write the equations that it stands for",

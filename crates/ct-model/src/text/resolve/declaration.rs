@@ -1,4 +1,4 @@
-//! What is declared: attributes, values and initial values.
+//! Declarations: attributes, values and initial values.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -48,7 +48,7 @@ impl Builder<'_> {
                 }
                 ("start" | "fixed", Attribute::Value(_)) => {
                     let what = format!(
-                        "{name} is of states; {} is none: write its value behind `=`, or delete {name}",
+                        "{name} is an attribute of states, and {} is not a state: write its value behind `=`, or delete {name}",
                         shown(&declaration.name)
                     );
                     return self.error(*from, what);
@@ -123,7 +123,7 @@ impl Builder<'_> {
             Kept::FinalParameter => Given::Measured,
             _ => Given::Fitted,
         };
-        // Of a fitted one it is where a fit starts, and no part of the model.
+        // For a fitted parameter the value is the start of a fit, and not part of the model.
         let holds = match given {
             Given::Fitted => Holds::Numbers,
             Given::Measured | Given::Constant => Holds::Parameters,
@@ -187,7 +187,8 @@ impl Builder<'_> {
                 _ => "",
             };
             if !matches!(self.names.all.get(name), Some(Variable::State(_))) {
-                let what = "on the left of an initial equation stands one state: write `x = ...;`";
+                let what =
+                    "the left side of an initial equation must be one state: write `x = ...;`";
                 return self.error(left.from, what);
             }
             if all.insert(name, right).is_some() {
@@ -198,7 +199,7 @@ impl Builder<'_> {
         Ok(all)
     }
 
-    /// As [`Self::start`], from an initial equation.
+    /// As [`Self::start`], for an initial equation.
     pub(super) fn initial_value(
         &mut self,
         declaration: &Declaration,

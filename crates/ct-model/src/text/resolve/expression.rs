@@ -1,4 +1,4 @@
-//! Expressions of a text: names looked up, and what may stand where.
+//! Expressions of a text: resolution of names, and checks of allowed variables.
 
 use super::{Builder, Holds};
 use crate::expression::{Condition, Expression, Function, Variable};
@@ -46,7 +46,7 @@ impl Builder<'_> {
             Kind::Truth(_) | Kind::Compare(..) | Kind::Not(_) | Kind::And(..) | Kind::Or(..) => {
                 return self.error(
                     node.from,
-                    "true or false where a number has to stand: write `if ... then 1 else 0`",
+                    "a condition where a number is needed: write `if ... then 1 else 0`",
                 );
             }
         })
@@ -75,7 +75,7 @@ impl Builder<'_> {
             _ => {
                 return self.error(
                     node.from,
-                    "a number where a condition has to stand: compare it, `x > 0`",
+                    "a number where a condition is needed: compare it, `x > 0`",
                 );
             }
         })
@@ -84,7 +84,7 @@ impl Builder<'_> {
     fn variable(&mut self, name: &str, from: usize, holds: Holds) -> Result<Expression, TextError> {
         if name == "time" {
             if holds != Holds::Everything {
-                return self.error(from, "`time` where only numbers and parameters may stand");
+                return self.error(from, "`time` where only numbers and parameters are allowed");
             }
             return Ok(Expression::Time);
         }
@@ -97,7 +97,7 @@ impl Builder<'_> {
                 Variable::Flow(i) if i < self.names.tied => true,
                 _ => {
                     let what = format!(
-                        "{} is no parameter: only numbers and parameters may stand here",
+                        "{} is no parameter: only numbers and parameters are allowed here",
                         shown(name)
                     );
                     return self.error(from, what);
@@ -128,7 +128,7 @@ impl Builder<'_> {
             if arguments.len() == wanted {
                 return Ok(());
             }
-            let what = format!("{name} takes {of}, and {} stand here", arguments.len());
+            let what = format!("{name} takes {of}, and {} are given here", arguments.len());
             Err(TextError::at(self.text, from, what))
         };
         match name {
@@ -147,7 +147,7 @@ impl Builder<'_> {
             }
             "delay" => {
                 if holds != Holds::Everything {
-                    return self.error(from, "a delay where only numbers and parameters may stand");
+                    return self.error(from, "a delay where only numbers and parameters are allowed");
                 }
                 count(2, "an expression and a time")?;
                 let delayed = self.expression(&arguments[0], holds)?;
@@ -192,7 +192,7 @@ impl Builder<'_> {
         }
         self.error(
             node.from,
-            "a dead time of numbers and parameters alone: one that changes is outside the subset",
+            "a dead time may depend on numbers and parameters only: a dead time that changes with time is not supported",
         )
     }
 }

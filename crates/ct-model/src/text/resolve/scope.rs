@@ -1,4 +1,4 @@
-//! Expressions that stand outside a text, in the words of a model.
+//! Parses expressions outside a model text with the names of a model.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use crate::text::error::TextError;
 use crate::text::names::{Names, differentiated};
 use crate::text::syntax::Equation;
 
-/// Expressions that stand outside a text, in the words of a model.
+/// Parser for expressions outside a model text, with the names of a model.
 pub(crate) struct Scope<'a> {
     spec: &'a ModelSpec,
 }
@@ -47,8 +47,9 @@ impl<'a> Scope<'a> {
         let mut builder = self.builder(text);
         let Some((_, coefficient)) = differentiated(&left).filter(|(name, _)| *name == state)
         else {
-            let what =
-                format!("on the left of this equation stands `der({state})` or `c*der({state})`");
+            let what = format!(
+                "the left side of this equation must be `der({state})` or `c*der({state})`"
+            );
             return builder.error(left.from, what);
         };
         let coefficient = coefficient

@@ -1,4 +1,4 @@
-//! Models of several domains that are driven by a record, on which the effects are tried.
+//! Models of several domains with inputs from a record, for tests of the effects.
 
 use ct_model::effects::{Candidate, EffectParameter, Role, Visited, candidates, shapes_keeping};
 use ct_model::{Method, Model, ModelSpec, Simulation, SimulationNumber};
@@ -69,7 +69,7 @@ equation
 end Battery;
 "#;
 
-/// A model and what drives it, held from row to row.
+/// A model with its inputs, held from row to row.
 pub(super) struct Driven {
     pub(super) spec: ModelSpec,
     time: Vec<f64>,
@@ -131,7 +131,7 @@ impl Driven {
         candidates(&self.spec, &self.visited())
     }
 
-    /// And the smooth functions, which no search looks at.
+    /// All candidates, and the smooth functions that searches do not use.
     pub(super) fn with_shapes(&self) -> Vec<Candidate> {
         let mut all = self.candidates();
         all.extend(shapes_keeping(
@@ -156,9 +156,9 @@ pub(super) fn range(rows: &[Vec<f64>]) -> f64 {
     largest(1.0) + largest(-1.0)
 }
 
-/// Where a fit of the candidate would start: some of its starts, with a size that shows.
+/// Start of a fit of the candidate: some of its starts, with a size that has an influence.
 pub(super) fn active(candidate: &Candidate) -> Vec<f64> {
-    // Quantiles are levels at which an input stays: a limit that moves over one has no derivative.
+    // Quantiles are levels at which an input is constant: a limit that passes over such a level has no derivative.
     let of = |p: &EffectParameter| {
         let start = match p.role {
             Role::Size => p.starts[0],

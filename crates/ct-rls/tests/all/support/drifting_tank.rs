@@ -63,17 +63,17 @@ impl Tank {
     }
 }
 
-/// What a run of one estimator showed, after its first `OPEN` samples.
+/// Results of a run of one estimator after its first `OPEN` samples.
 #[derive(Debug)]
 pub struct Run {
     /// Largest relative error of `b` and of `a` in each tenth of the run; infinite where an estimate was no number.
     pub drifting: [f64; 10],
     /// Largest relative error of `g`, the constant parameter.
     pub constant: f64,
-    /// Largest entry of P's diagonal that was seen, and the smallest pivot.
+    /// Largest diagonal entry of P, and smallest pivot.
     pub largest: f64,
     pub smallest_pivot: f64,
-    /// Steps in which a guard forgot less.
+    /// Number of steps in which a guard reduced forgetting.
     pub capped: u64,
 }
 

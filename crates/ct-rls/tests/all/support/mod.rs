@@ -1,4 +1,4 @@
-//! What the tests share: random numbers, random covariances, and the textbook's update to compare with.
+//! Shared parts of the tests: random numbers, random covariances, and the textbook's update for comparison.
 #![allow(dead_code, missing_docs)]
 
 use nalgebra::{SMatrix, SVector};

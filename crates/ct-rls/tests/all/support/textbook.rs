@@ -1,9 +1,9 @@
-//! Recursive least squares as it is usually written down and coded, on a full covariance, in two forms that differ by
-//! rounding alone: `P = (P - k g')/lambda` with `g = P phi`, and `P = (P - k phi' P)/lambda`. Test-only.
+//! Recursive least squares in the usual textbook form, with a full covariance, in two variants that differ only in rounding: `P = (P - k
+//! g')/lambda` with `g = P phi`, and `P = (P - k phi' P)/lambda`. Test-only.
 
 use nalgebra::{SMatrix, SVector};
 
-/// Which product makes the update of `P`.
+/// Product formula for the update of `P`.
 #[derive(Clone, Copy, Debug)]
 pub enum Form {
     /// `k g'`, `g = P phi`, needed for the gain anyway.
@@ -40,7 +40,7 @@ impl<const P: usize> Textbook<P> {
         self.p = (self.p - k * row) / self.lambda;
     }
 
-    /// Positive definite, within nothing: by Cholesky's factorisation of the symmetric part.
+    /// Positive definite up to rounding: by Cholesky's factorisation of the symmetric part.
     pub fn positive_definite(&self) -> bool {
         let symmetric = 0.5 * (self.p + self.p.transpose());
         symmetric.iter().all(|x| x.is_finite()) && symmetric.cholesky().is_some()

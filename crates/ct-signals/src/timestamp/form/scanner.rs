@@ -45,7 +45,7 @@ impl Scanner<'_> {
         Ok(value)
     }
 
-    /// The digits after a decimal mark, as nanoseconds; what is finer is cut off.
+    /// The digits after a decimal mark, as nanoseconds; further digits are dropped.
     #[inline]
     pub(super) fn fraction(&mut self) -> Result<u32, Fault> {
         let begin = self.at;
@@ -69,7 +69,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// What stands between date and time: `T`, or blanks with or without a comma before them.
+    /// Separator between date and time: `T`, or blanks with or without a comma before them.
     #[inline]
     pub(super) fn date_separator(&mut self) -> bool {
         if matches!(self.peek(), b'T' | b't') {

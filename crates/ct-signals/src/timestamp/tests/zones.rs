@@ -25,7 +25,7 @@ fn an_hour_that_occurs_twice_goes_forward() {
         "2026-10-25 03:00",
     ];
     assert_eq!(hour(&cells), [-1.0, 0.0, 0.5, 1.0, 1.5, 2.0]);
-    // One sample an hour: the time stands still if the earlier is taken twice.
+    // One sample an hour: the times would not increase if the earlier hour is used twice.
     assert_eq!(
         hour(&["2026-10-25 02:00", "2026-10-25 02:00", "2026-10-25 03:00"]),
         [0.0, 1.0, 2.0]
@@ -49,7 +49,7 @@ fn a_time_that_is_left_out_is_refused() {
             zone: "Europe/Berlin".into()
         })
     );
-    // What is known of the clocks after the change is not taken for what was before.
+    // Knowledge of the clocks after the change is not used for times before it.
     let mut reader = TimestampReader::new(None, Some("Europe/Berlin"), cells).unwrap();
     assert_eq!(reader.read(cells[1]), Ok(times[1]));
     assert!(reader.read("2026-03-29 02:30").is_err());
@@ -109,7 +109,7 @@ proptest! {
         // The later of two equal times is read as the earlier.
         let read = zone.bound(&text).unwrap();
         prop_assert!(read == instant || zone.format(read) == text && read < instant, "{text}");
-        // As a time that follows an hour later than the earlier, it is the later.
+        // A time one hour after the earlier one is the later one.
         let mut reader = TimestampReader::new(None, Some(zone.name()), [text.as_str()]).unwrap();
         reader.previous = Some(instant.after(-1.0));
         prop_assert_eq!(reader.read(&text).unwrap(), instant);

@@ -12,7 +12,7 @@ fn convert(value: f64, from: &str, to: &str) -> Option<f64> {
     Some(unit(from).conversion_to(&unit(to))?.apply(value))
 }
 
-/// Units as headers have them, with the word for the quantity, and the size in SI units.
+/// Units as in headers, with the word for the quantity, and the size in SI units.
 const HEADERS: &[(&str, &str, f64)] = &[
     ("l/min", "flow", 1e-3 / 60.0),
     ("L/h", "flow", 1e-3 / 3600.0),

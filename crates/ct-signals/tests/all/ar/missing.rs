@@ -26,7 +26,7 @@ fn rows_behind_lost_ones_come_out_white_and_of_the_same_variance() {
                 whitener.push(&mut row);
                 whitened.push(row);
             }
-            // Each row is a sum of n independent unit values: their covariance has to be the identity.
+            // Each row is a sum of n independent unit values: their covariance must be the identity.
             for (i, a) in whitened.iter().enumerate() {
                 for (j, b) in whitened.iter().enumerate() {
                     let covariance: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
@@ -102,7 +102,7 @@ fn missing_samples_are_left_out_as_by_dense_algebra() {
     }
 }
 
-/// A gap is as many lost rows, however it is passed.
+/// A gap equals the same number of lost rows, for each way of skipping.
 #[test]
 fn long_gaps_are_as_many_lost_rows() {
     let slow = [1.989, -0.989_01];
@@ -125,7 +125,7 @@ fn long_gaps_are_as_many_lost_rows() {
                         one_by_one.push_with_variance(&mut a),
                         at_once.push_with_variance(&mut b),
                     );
-                    // Of a signal that is far larger than its innovations some digits are lost either way.
+                    // For a signal far larger than its innovations, rounding loses some digits in both computations.
                     let close = if coefficients == slow { 1e-6 } else { 1e-8 };
                     assert_relative_eq!(of_a, of_b, max_relative = close);
                     for (a, b) in a.iter().zip(b) {
@@ -134,7 +134,7 @@ fn long_gaps_are_as_many_lost_rows() {
                 }
             }
         }
-        // Of the largest possible gap nothing is remembered.
+        // After the largest possible gap the memory is empty.
         let mut whitener = model.whitener(1);
         whitener.push(&mut [1.0]);
         whitener.skip_many(usize::MAX);
@@ -183,7 +183,7 @@ fn moments(x: &[f64]) -> (f64, f64) {
 fn fit_recovers_what_missing_samples_leave() {
     let runs: u64 = std::env::var("RECORDS").map_or(60, |runs| runs.parse().unwrap());
     let n = 2000;
-    // The most that the spread grows: of samples lost at random the pairs are fewer, of blocks only the samples.
+    // Largest increase of the spread: samples lost at random reduce the number of pairs, blocks only that of samples.
     for (coefficients, at_random, third) in [(&[0.8][..], 1.45, 1.7), (&[1.5, -0.7], 1.45, 2.2)] {
         let p = coefficients.len();
         let mut whole = Vec::new();

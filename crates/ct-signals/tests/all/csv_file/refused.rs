@@ -120,7 +120,7 @@ fn unit_contradiction_names_both_units() {
         ],
     );
     says(&error, &["the model's constants in bar"]);
-    // Units of the time are converted, whatever the model says.
+    // Units of the time are converted, whatever the model's unit is.
     let record = read_bytes(text.as_bytes(), &named("t [ms]", "u [V]", "y")).unwrap();
     assert_eq!(record.sample_interval(), 2.0);
 }

@@ -102,7 +102,7 @@ fn a_missing_sample_is_found_in_jitter() {
 fn constant_signals() {
     let mut still = rows();
     still.iter_mut().for_each(|row| row[1] = 4.5);
-    // An input that stands still is a matter of what the record is for.
+    // Whether an input may be constant depends on the purpose of the record.
     let record = read(&text(HEADER, &still)).unwrap();
     let error = record.require_moving_input().unwrap_err();
     assert!(matches!(error, Error::ConstantInput { rows: 40, .. }));

@@ -1,4 +1,4 @@
-//! The records, as `--columns` and `--model` say.
+//! Records for `--columns` and `--model`.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::Error;
 use crate::column_errors::of_option;
 
 impl Identify {
-    /// What a column that is not there is blamed on: the model file, or the option.
+    /// Source of the column names for error messages: the model file, or the option.
     pub(super) fn named_by(&self) -> fn(ct_signals::Error) -> Error {
         if self.model.is_some() {
             Error::from
@@ -18,7 +18,7 @@ impl Identify {
         }
     }
 
-    /// A record as `--columns` says: without a reference that it does not name.
+    /// The record without a reference that `--columns` does not name.
     pub(super) fn without_unnamed(&self, mut record: Record) -> Record {
         let named = self
             .columns
@@ -30,7 +30,7 @@ impl Identify {
         record
     }
 
-    /// A record as `--columns` and `--model` say.
+    /// Reads a record for `--columns` and `--model`.
     pub(super) fn read(&self, path: &Path, (columns, hold, own): Layout) -> Result<Reading, Error> {
         let options = ReadOptions {
             hold,

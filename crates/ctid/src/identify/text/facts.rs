@@ -1,11 +1,11 @@
-//! What the methods with instruments, and those of a loop, say of their way: a name and a sentence each.
+//! Facts about a fit by the methods with instruments and by those for a loop: a name and a sentence each.
 
 use fcloe::{Condition, NoisePath, Verdict};
 use linear_identification::{Identification, InLoop, LevelChoice, Refined};
 
 use crate::numbers;
 
-/// What SRIVC and RIVC say of their way.
+/// Facts about a fit by SRIVC or RIVC.
 pub(crate) fn refined_facts(
     found: &Identification,
     refined: &Refined,
@@ -67,7 +67,7 @@ pub(crate) fn refined_facts(
             ),
         }
     });
-    // SRIVC takes the noise for white, whatever its residual is.
+    // SRIVC assumes white noise, whatever its residual is.
     let name = match refined.name.ends_with("SRIVC") {
         true => "residual",
         false => "noise model",
@@ -86,7 +86,7 @@ pub(crate) fn refined_facts(
     facts
 }
 
-/// What is known of the loop and of the way to the estimates.
+/// Facts about the loop and the fit.
 pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static str, String)> {
     let (y, u) = (&found.shown.output.unit, &found.shown.input.unit);
     let digits = |value| numbers::significant(value, 4);
@@ -151,8 +151,8 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
         };
         let noise = match batch.noise {
             _ if open => "",
-            NoisePath::Loop => "; the noise circulates in the loop",
-            NoisePath::Record => "; the noise is on the record alone",
+            NoisePath::Loop => "; the controller feeds the noise back",
+            NoisePath::Record => "; the noise is added to the output only",
         };
         facts.push((
             "fit",
@@ -189,13 +189,13 @@ pub(crate) fn facts(found: &Identification, in_loop: &InLoop) -> Vec<(&'static s
 pub(crate) fn condition(condition: &Condition) -> String {
     let verdict = match condition.verdict {
         Verdict::Holds => {
-            "it holds if these estimates are the plant: then a recursion that keeps the filter of this start converges"
+            "it holds if these estimates are the true plant: then a recursion that keeps the filter of this start converges"
         }
         Verdict::Positive => {
-            "if these estimates are the plant it fails, but the real part stays above 0: a recursion that keeps the filter of this start usually converges"
+            "if these estimates are the true plant it fails, but the real part stays above 0: a recursion that keeps the filter of this start usually converges"
         }
         Verdict::Negative => {
-            "if these estimates are the plant it fails, and the real part falls below 0: a recursion that keeps the filter of this start may go the wrong way; renew the filter"
+            "if these estimates are the true plant it fails, and the real part falls below 0: a recursion that keeps the filter of this start may diverge; update the filter with the estimates"
         }
         Verdict::Unstable => "the loop of the estimates is not stable",
     };

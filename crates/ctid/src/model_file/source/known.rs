@@ -1,4 +1,4 @@
-//! What is known of a plant: areas, heights, and what is measured.
+//! Known constants of a plant: areas, heights, and the measured levels.
 
 use ct_signals::quoted;
 use plants::{Known, MAX_VESSELS, Plant};
@@ -79,7 +79,7 @@ impl Source<'_> {
         })
     }
 
-    /// The areas of three tanks, as they stand: one for all, or each its own.
+    /// The areas of three tanks, as given: one for all, or one for each.
     fn areas_of_three(&self, raw: &RawKnown) -> Result<[Option<f64>; MAX_VESSELS], Error> {
         let each = [
             ("area_1", &raw.area_1),
@@ -112,8 +112,8 @@ impl Source<'_> {
         Ok(areas)
     }
 
-    /// The vessels whose levels are the outputs, in their order. Without a word it is the last one; of tanks that are joined, and of several
-    /// outputs, it has to be said.
+    /// The vessels whose levels are the outputs, in their order. The default is the last one; for joined tanks, and for several outputs,
+    /// the file has to name them.
     fn measured(
         &self,
         plant: Plant,
@@ -187,7 +187,7 @@ impl Source<'_> {
             );
             return Err(self.at(at, what));
         }
-        // Nothing of what is below would show in the level of what is above.
+        // Changes in the lower tank do not affect the level of the upper one.
         let last = plant.vessels() - 1;
         if !plant.joined() && !vessels.contains(&last) {
             let what = format!(
@@ -223,7 +223,7 @@ impl Source<'_> {
             self.at(
                 at,
                 format!(
-                    "disturbance = \"{}\" says nothing of where it flows in; write {}",
+                    "disturbance = \"{}\" is no tank; write {}",
                     quoted(name),
                     disturbed(plant).join(" or ")
                 ),
@@ -231,7 +231,7 @@ impl Source<'_> {
         })
     }
 
-    /// What a valve lets through at one unit of head and a flow coefficient of one.
+    /// Flow through a valve at one unit of head with a flow coefficient of one.
     fn orifice(&self, raw: &RawKnown, area_known: bool) -> Result<Option<f64>, Error> {
         match (&raw.pipe_area, &raw.gravity) {
             (None, None) => Ok(None),
@@ -239,7 +239,7 @@ impl Source<'_> {
                 if !area_known {
                     return Err(self.at(
                         pipe.span().start,
-                        "pipe_area says nothing of the levels without the area of the tanks; give area too, in the same unit",
+                        "pipe_area has no effect on the levels without the area of the tanks; give area too, in the same unit",
                     ));
                 }
                 let section = self.positive("pipe_area", pipe)?;
@@ -257,7 +257,7 @@ impl Source<'_> {
 /// The only vessel of a plant, as `disturbance` names it.
 const ONLY: &str = "tank";
 
-/// What `disturbance` may say, in quotes.
+/// Allowed values of `disturbance`, in quotes.
 pub(super) fn disturbed(plant: Plant) -> Vec<String> {
     let names = (0..plant.vessels()).map(|vessel| plant.vessel_name(vessel).unwrap_or(ONLY));
     names.map(|name| format!("\"{name}\"")).collect()

@@ -1,4 +1,4 @@
-//! The first line and the first row: columns, units, times, and where a saved state goes on.
+//! The first line and the first row: columns, units, times, and continuation of a saved state.
 
 use ::monitor::{Monitor, TimeAxis, Units};
 use ct_signals::{BadLine, RowTimes, Rows, quoted};
@@ -10,7 +10,7 @@ use crate::Error;
 use crate::own_model::{OwnModelFile, conversion};
 
 impl<'a> Session<'a> {
-    /// The first line that says something; whether it is a row.
+    /// The first line with content; returns whether it is a row.
     pub(super) fn first(&mut self, line: &[u8]) -> Result<bool, Error> {
         let Ok(text) = std::str::from_utf8(line) else {
             self.bad(|| BadLine::NotText.to_string());
@@ -85,7 +85,7 @@ impl<'a> Session<'a> {
         Ok(is_row)
     }
 
-    /// The units of the rows: as many readings as the model has outputs, in one unit.
+    /// The units of the rows: the number of readings equals the number of the model's outputs, with a single unit.
     fn units(&self, rows: &Rows) -> Result<Units, Error> {
         let mut units = rows.units();
         let input = units.next().unwrap_or("").to_string();
@@ -113,7 +113,7 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// How the rows of a model of its user's own are put into its units, and in which one its time is.
+    /// Conversion of the rows to the units of a user's own model, and the unit of the time.
     fn own_units(
         &mut self,
         file: &'a OwnModelFile,
@@ -173,7 +173,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// After the first row: how it writes the time, which has to go on as the saved state has it.
+    /// After the first row: checks that its time format matches the saved state.
     pub(super) fn times(&mut self) -> Result<(), Error> {
         let known = self.rows.as_ref().filter(|_| !self.timed);
         let Some(times) = known.and_then(Rows::times) else {

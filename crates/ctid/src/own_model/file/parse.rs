@@ -1,4 +1,4 @@
-//! A model file of the user's own as it is written: keys, columns, and what of them cannot be.
+//! Parser of the model file of a user's own model: keys, columns, and their errors.
 
 use ct_model::{Model, ModelSpec, Variable};
 use ct_signals::{Columns, Hold, Zone, quoted};
@@ -53,20 +53,20 @@ pub(super) enum Column {
 }
 
 impl OwnModelFile {
-    /// Reads the text of a model file, and the model that it names, which is looked for beside the file.
+    /// Reads the text of a model file, and the model that it names, with a path relative to the file.
     ///
     /// # Errors
-    /// One line that names the file, the line, what is wrong and the mend.
+    /// One line that names the file, the line, what is wrong and the correction.
     pub(super) fn parse(path: &Path, text: &str) -> Result<Self, Error> {
         Self::parse_with(path, text, |named| {
             read_model(&path.parent().unwrap_or(Path::new("")).join(named))
         })
     }
 
-    /// The same, the model from wherever `read` has it; it is given the name that stands in the file.
+    /// Parses a model file; `read` provides the model text for the name in the file.
     ///
     /// # Errors
-    /// One line that names the file, the line, what is wrong and the mend.
+    /// One line that names the file, the line, what is wrong and the correction.
     pub fn parse_with(
         path: &Path,
         text: &str,
@@ -126,8 +126,8 @@ impl OwnModelFile {
         })
     }
 
-    /// A model with what is said of it in place of a model file; `name` stands for the file in messages. Columns that are not named are those
-    /// of the model's own names.
+    /// A model with settings instead of a model file; `name` is its name in messages. Columns without a name have the names of the model's
+    /// signals.
     ///
     /// # Errors
     /// Where a name is none of a parameter, an effect cannot act in the model, or the numbers of columns are not those of its signals.
@@ -187,7 +187,7 @@ impl OwnModelFile {
     }
 }
 
-/// Where a controller stands that is written as that of a plant, which has one input.
+/// Position of a `[controller]` table without the name of an input. Only built-in plants have such a table.
 fn unnamed_controller(text: &str) -> Option<usize> {
     let table = text.parse::<toml::Table>().ok()?;
     let controller = table.get("controller")?.as_table()?;
@@ -198,7 +198,7 @@ fn unnamed_controller(text: &str) -> Option<usize> {
     at.filter(|_| controller.values().any(is_setting))
 }
 
-/// Whether a model, or an effect in it, has a parameter of this name; in words where not.
+/// Checks that a model, or an effect in it, has a parameter of this name.
 fn is_parameter(spec: &ModelSpec, effects: &OwnEffects, name: &str) -> Result<(), String> {
     let parameters = spec.parameters.iter().map(|p| p.about.name.as_str());
     let parameters: Vec<&str> = parameters
@@ -216,7 +216,7 @@ fn is_parameter(spec: &ModelSpec, effects: &OwnEffects, name: &str) -> Result<()
     ))
 }
 
-/// The columns of the model's signals: those that `[columns]` names, else the ones of their own names.
+/// The columns of the model's signals: those named by `[columns]`, else columns with the signals' names.
 pub(super) fn columns(spec: &ModelSpec, raw: &Raw, source: &Source) -> Result<Columns, Error> {
     let inputs = (0..spec.inputs.len()).map(Variable::Input);
     let inputs: Vec<&str> = inputs.map(|v| spec.about(v).name.as_str()).collect();

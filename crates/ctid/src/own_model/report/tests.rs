@@ -1,4 +1,4 @@
-//! What the report shows of a model that nothing explains.
+//! Report of a model with an unexplained error.
 
 #![allow(clippy::unwrap_used)]
 
@@ -28,7 +28,7 @@ fn unknown(effect: &str, variable: [&str; 2], unit: &str) -> Unknown {
     }
 }
 
-/// Where the term acts, what it depends on, its units and the command stand in the report, and its values are those of its figure.
+/// The report contains the place of the term, its variable, its units and the command, and its values agree with its figure.
 #[test]
 fn what_nothing_explains_is_shown_with_its_port_and_units() {
     let text = include_str!("../../../models/heated-block.mo");
@@ -51,7 +51,7 @@ fn what_nothing_explains_is_shown_with_its_port_and_units() {
     };
     let html = document.html();
     for part in [
-        "What nothing explains",
+        "The unexplained error",
         "id=\"plot-unknown-shape\"",
         "added to the equation of T, in W",
         "<code>ctid add &#39;shape(T,u)&#39; --model M.toml --from RESULT.json</code>",

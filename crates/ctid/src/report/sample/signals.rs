@@ -4,7 +4,7 @@ pub(super) const PERIOD: f64 = 4.0;
 
 pub(super) const NOISE: f64 = 0.08;
 
-/// What the two tanks do with this command: lower and upper level \[V\].
+/// Simulates the two tanks for this command: lower and upper level \[V\].
 pub(super) fn simulate(input: &[f64], rim: f64, deadzone: f64, gain: f64) -> [Vec<f64>; 2] {
     let (mut upper, mut lower) = (2.0_f64, 3.0_f64);
     let fine = 8;

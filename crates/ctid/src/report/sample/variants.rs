@@ -1,4 +1,4 @@
-//! Variants of the sample: a comparison, a partial answer, awkward names and numbers.
+//! Variants of the sample: a comparison, a partial explanation, awkward names and numbers.
 
 use missing_effect::{
     Acceptance, Diagnosis, Effort, HeldOutError, OutputStep, PerOutput, PlaceScore, Rankings,
@@ -7,12 +7,12 @@ use missing_effect::{
 
 use super::{NOISE, PERIOD, named, two_tanks};
 
-/// The same after `compare`: the base model alone, nothing scored, nothing held out.
+/// Sample of `compare`: the base model alone, no scores, no held-out data.
 pub(crate) fn comparison() -> Diagnosis {
     comparison_of(two_tanks())
 }
 
-/// What `compare` has of a diagnosis.
+/// Reduces a diagnosis to the content of `compare`.
 pub(crate) fn comparison_of(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis.verdict = Verdict::Unexplained;
     diagnosis.effects.clear();
@@ -37,13 +37,13 @@ pub(crate) fn comparison_of(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis
 }
 
-/// The overflow alone, as a part of the answer: what the acceptance test, the places, the rankings, the held-out error and the limit
-/// on the time have to say.
+/// The overflow alone, as a partial explanation: texts of the acceptance test, the places, the rankings, the held-out error and the time
+/// limit.
 pub(crate) fn partial() -> Diagnosis {
     partial_of(two_tanks())
 }
 
-/// A part of the answer of a diagnosis that has found the overflow first.
+/// The diagnosis of a partial explanation, with the overflow as the first effect.
 pub(crate) fn partial_of(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis.verdict = Verdict::Partial;
     for list in [&mut diagnosis.effects, &mut diagnosis.ranked] {
@@ -100,7 +100,7 @@ pub(crate) fn partial_of(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis
 }
 
-/// Long records, a name that is markup, gaps, infinite edges and numbers that are not finite.
+/// Long records, a name with markup, gaps, infinite edges and numbers that are not finite.
 pub(crate) fn awkward() -> Diagnosis {
     let mut diagnosis = two_tanks();
     let repeats = 100;

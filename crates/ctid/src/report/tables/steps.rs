@@ -7,7 +7,7 @@ use crate::findings;
 use crate::report::data::step_label;
 use crate::report::text::{code, escape, significant, unit, with_error};
 
-/// The parameters of every step side by side, with what the fit reached.
+/// The parameters of every step side by side, with the error of the fit.
 pub(crate) fn parameters(diagnosis: &Diagnosis) -> String {
     let steps = &diagnosis.steps;
     let heads: String = last_first(steps)
@@ -71,13 +71,13 @@ pub(crate) fn parameters(diagnosis: &Diagnosis) -> String {
         &format!("<tr><th scope=\"col\">Parameter</th><th scope=\"col\">Unit</th>{heads}</tr>"),
         &rows,
         &format!(
-            "The last model first. Estimate ± standard error; * : the data do not determine it, or it sits at a bound. \
+            "The last model first. Estimate ± standard error; * : the data do not determine it, or it is at a bound. \
              A minimum that one start alone has reached may not be the best one.{held_out}"
         ),
     )
 }
 
-/// The rows of the simulation error of an output; its name stands before them where there are several.
+/// Rows with the simulation error of an output; the output's name comes first if there are several.
 fn errors(diagnosis: &Diagnosis, index: usize, name: &str) -> String {
     let steps = &diagnosis.steps;
     let unit = unit(diagnosis.unit_of(index));
@@ -126,7 +126,7 @@ fn errors(diagnosis: &Diagnosis, index: usize, name: &str) -> String {
     rows
 }
 
-/// Every parameter once, with its unit, in the order of the last step, which has the most.
+/// Every parameter once, with its unit, in the order of the last step, which has the most parameters.
 fn names(steps: &[Step]) -> Vec<(&str, &str)> {
     let mut names: Vec<(&str, &str)> = Vec::new();
     for parameter in steps.iter().rev().flat_map(|step| &step.parameters) {
@@ -137,7 +137,7 @@ fn names(steps: &[Step]) -> Vec<(&str, &str)> {
     names
 }
 
-/// The last model first, so that it is seen however many there are; then the others in their order.
+/// The last model first, so that it is visible with any number of models; then the others in their order.
 fn last_first(steps: &[Step]) -> impl Iterator<Item = (usize, &Step)> {
     let all = || steps.iter().enumerate();
     let before = steps.len().saturating_sub(1);

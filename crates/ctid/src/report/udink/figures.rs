@@ -96,7 +96,7 @@ fn cells_figure(study: &Study, number: usize) -> Figure {
     }
 }
 
-/// A gain's colour and dash, the same in both figures.
+/// Colour and dash of a gain, the same in both figures.
 fn look(kind: GainKind) -> (Colour, &'static str) {
     match kind {
         GainKind::BlockDiagonal => (Colour::Of(0), "solid"),
@@ -127,7 +127,7 @@ fn counterexample_figure(gains: &Gains) -> Figure {
     Figure::over_time("counterexample", 660, panels, curves)
 }
 
-/// Errors over time, a panel for each of the bounds; lines of Euler's rule are thin.
+/// Errors over time, a panel for each set of bounds; lines of Euler's rule are thin.
 fn gains_figure(gains: &Gains) -> Figure {
     let titles = [
         "error, no bounds",

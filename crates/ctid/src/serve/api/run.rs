@@ -32,7 +32,7 @@ pub(super) enum Run {
         range: Option<(f64, f64)>,
         slew: Option<f64>,
         duration: Option<f64>,
-        /// Of a model of one's own: what each input may do.
+        /// For a user's own model: the permitted changes of each input.
         #[serde(default)]
         inputs: Vec<AppliedInput>,
     },

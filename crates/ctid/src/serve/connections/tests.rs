@@ -1,4 +1,4 @@
-//! Clients that are slow, greedy or do not know the secret.
+//! Slow clients, clients with large requests, and clients without the access key.
 
 #![allow(clippy::unwrap_used)]
 
@@ -69,7 +69,7 @@ impl Served {
         stream
     }
 
-    /// A request that is asked for as the page asks.
+    /// Sends a request like the page.
     fn answers(&self) -> bool {
         let mut stream = self.begun();
         stream.write_all(b"Connection: close\r\n\r\n").unwrap();
@@ -79,7 +79,7 @@ impl Served {
 
 fn answer(mut stream: TcpStream) -> String {
     let mut text = String::new();
-    // One that is broken off says nothing.
+    // A broken connection gives no answer.
     let _ = stream.read_to_string(&mut text);
     text
 }
@@ -130,7 +130,7 @@ fn who_does_not_know_the_secret_keeps_nobody_out() {
     drop(silent);
 }
 
-/// What it asks for next is not answered.
+/// The next request is not answered.
 #[test]
 fn a_connection_without_the_secret_ends_with_its_refusal() {
     let served = served(PATIENT);
@@ -142,12 +142,12 @@ fn a_connection_without_the_secret_ends_with_its_refusal() {
     assert!(!text.contains("here"), "{text}");
 }
 
-/// Asks for far more than the sockets hold.
+/// Requests far more than the socket buffers hold.
 fn greedy(served: &Served) -> TcpStream {
     let mut stream = served.connect();
     let many = format!("{}\r\n", served.own("/large")).repeat(64);
     stream.write_all(many.as_bytes()).unwrap();
-    // The first of it is here: it knows the secret.
+    // The first byte has arrived: the access key is known.
     stream.read_exact(&mut [0]).unwrap();
     stream
 }
@@ -165,7 +165,7 @@ fn an_answer_that_is_never_taken_ends_its_connection() {
     let silence = Duration::from_millis(200);
     let served = served(Bounds { silence, ..PATIENT });
     let mut stream = greedy(&served);
-    // Written to until the other end is gone.
+    // Written to until the other end is closed.
     let head = format!("{}\r\n", served.own("/large"));
     while stream.write_all(head.as_bytes()).is_ok() {
         std::thread::sleep(Duration::from_millis(20));

@@ -35,7 +35,7 @@ fn every_example_can_be_fitted() {
     assert!(refused.to_string().starts_with("there is no example"));
 }
 
-/// Whatever a model file names, the text is that of the page: no file of the machine is read.
+/// Whatever path a model file names, the text is that of the page: no file of the computer is read.
 #[test]
 fn a_model_file_reads_no_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -76,7 +76,7 @@ fn what_is_wrong_is_said_with_its_place_and_the_records_stay_read() {
     assert!(wrong["own"]["check"].is_null() && wrong["own"]["file_error"].is_null());
     assert!(wrong["records"][0]["read"].is_object(), "{wrong}");
     assert!(Work::new(&mut session).is_err());
-    // Of the model file the same.
+    // The same for the model file.
     write(
         &mut session,
         Some(&text),
@@ -129,7 +129,7 @@ fn late() -> String {
     text
 }
 
-/// What was found beside a group is in the model of its experiment, and the experiment is one of the inputs' units.
+/// The accepted effects outside a group are in the model of its experiment, and the experiment has the inputs' units.
 #[test]
 fn the_experiment_between_two_effects_of_a_group() {
     let mut session = Session::new(None, None, Vec::new());
@@ -215,7 +215,7 @@ fn curves_errors_and_parameters_are_those_of_compare() {
     }
     work.settle(&mut session, &found);
     assert_eq!(state(&mut session)["own"]["fitted"], true);
-    // Of another text it is not.
+    // After a change of the text the result is not valid.
     write(&mut session, Some(TEMPLATE), None);
     let state = state(&mut session);
     assert_eq!(

@@ -1,4 +1,4 @@
-//! What is computed for a model of its user's own: comparison, search and design, and how they end.
+//! Computations for a user's own model: comparison, search and design.
 
 use ct_signals::{ReadOptions, Reading};
 use effect_search::design::{Design, Limits};
@@ -22,7 +22,7 @@ use crate::serve::own_findings::Diagnosed;
 use crate::serve::session::Session;
 use crate::{Error, edit, numbers};
 
-/// What a fit or a diagnosis works on.
+/// Input of a fit or a diagnosis.
 pub(crate) struct Work {
     own: Own,
     pub(super) model: OwnModelFile,
@@ -38,7 +38,7 @@ impl Work {
         Self::of(session, own)
     }
 
-    /// The model that was diagnosed with what was found beside a group: two of the group are to be told apart there.
+    /// The diagnosed model with the accepted effects outside a group: a design distinguishes two effects of the group in addition to these.
     ///
     /// # Errors
     /// Where nothing was diagnosed, or the records are others since.
@@ -102,7 +102,7 @@ impl Work {
         compare(&self.model, &self.records, &options)
     }
 
-    /// Searches what is missing, until the flag is set.
+    /// Searches for missing effects, until the flag is set.
     pub(crate) fn search(
         &self,
         max_effects: Option<NonZeroU8>,
@@ -125,7 +125,7 @@ impl Work {
         })
     }
 
-    /// The experiment within these limits that tells two effects apart, until the flag is set.
+    /// Designs the experiment within these limits that distinguishes two effects, until the flag is set.
     pub(crate) fn design(
         &self,
         between: &[String; 2],
@@ -153,7 +153,7 @@ impl Work {
         )
     }
 
-    /// Puts a design where the page finds it.
+    /// Stores a design for the page.
     pub(crate) fn settle_design(self, session: &mut Session, design: &Design) {
         let id = session.number();
         let designed = Designed::new(id, &self.model, design, self.records.time_unit);
@@ -162,12 +162,13 @@ impl Work {
         }
     }
 
-    /// Puts a diagnosis where the page finds it.
+    /// Stores a diagnosis for the page.
     pub(crate) fn settle_diagnosis(self, session: &mut Session, found: &Diagnosis) {
         let id = session.number();
         let json = serde_json::to_string(found).unwrap_or_default();
         let Ok(findings) = Findings::of_text(&json) else {
-            return session.fail("the diagnosis cannot be kept, which is a fault of ctid".into());
+            return session
+                .fail("the diagnosis cannot be saved because of an error in ctid".into());
         };
         let diagnosed = Diagnosed {
             id,

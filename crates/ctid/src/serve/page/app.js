@@ -10,7 +10,7 @@ import * as chains from "./chains.js";
 import * as unknown from "./unknown.js";
 import * as experiment from "./experiment.js";
 
-const WORK = { compare: "fitting the model", diagnose: "searching what is missing", design: "designing the next experiment" };
+const WORK = { compare: "fitting the model", diagnose: "searching for the missing effect", design: "designing the next experiment" };
 
 let version = null;
 let before = null;
@@ -47,7 +47,7 @@ function next(state) {
   if (own.is(state)) return own.next(state);
   const fitted = state.records.filter((one) => !one.held_out);
   if (!fitted.length) return "drop a record";
-  if (state.records.some((one) => one.error)) return "say which column is what";
+  if (state.records.some((one) => one.error)) return "assign the columns";
   if (!state.text) return "choose the plant that you believe in";
   if (state.current === null) return "";
   const found = state.diagnosis;
@@ -70,7 +70,7 @@ function fall(state) {
   // The error of each output, which has a name where there are several.
   const falls = last.errors.map(({ output }, o) => [o ? "; " : "", output === null ? "" : `${output} `,
     trail.flatMap((one, k) => (k ? [" → ", number(one, k, o)] : [number(one, k, o)])), ` ${unit}`]);
-  const explained = last.adequate && state.current === last.id ? make("span", { className: "explained" }, " What is left looks like noise.") : null;
+  const explained = last.adequate && state.current === last.id ? make("span", { className: "explained" }, " The residual looks like noise.") : null;
   fill($("fall"), "Simulation error ", falls.flat(2), ".", explained);
   if (state.current === last.id) say(`${last.name}: simulation error ${last.errors.map(({ output, text }) => `${output === null ? "" : `${output} `}${text} ${unit}`).join(", ")}`);
 }

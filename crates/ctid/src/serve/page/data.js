@@ -29,7 +29,7 @@ function together(said) {
 /** Another model in place of this one; what stands in a file of the user's goes, so it is asked first. */
 async function replace(file) {
   const { file: old, text: from } = server.current();
-  if (old && !confirm(`Overwrite ${old} with ${file.name}? What stands there is not kept.`)) return;
+  if (old && !confirm(`Overwrite ${old} with ${file.name}? The old content is lost.`)) return;
   await server.send("api/text", { text: await file.text(), from });
 }
 

@@ -17,7 +17,7 @@ export async function ask(what, fail) {
   question = what;
   try {
     const [low, high] = [limit("low"), limit("high")];
-    if ((low === null) !== (high === null)) throw new Error("one end of the range alone says little; give both, or neither");
+    if ((low === null) !== (high === null)) throw new Error("one end of the range alone is not enough; give both, or neither");
     await server.run("design", { ...what, range: low === null ? null : [low, high], slew: limit("slew"), duration: limit("duration") });
   } catch (error) {
     fail(error.message);
@@ -42,7 +42,7 @@ export function show(state) {
     design.twins ? null : figure("experiment", `The best one: ${design.name}`),
     design.twins ? null : make("p", {}, make("a", { className: "button", href: server.link("experiment"), download: "next.csv" }, "Download next.csv")),
     make("div", { className: "scroll", tabIndex: 0, role: "region", ariaLabel: "Experiments" }, sheet),
-    make("p", { className: "caption" }, "Power: by so much the criterion of the wrong one rises on average. Decides: the probability that it ends more than 6 above the right one."));
+    make("p", { className: "caption" }, "Power: expected rise of the criterion of the wrong model. Decides: the probability that it ends more than 6 above the right one."));
   $("experiment-part").focus();
   $("experiment-part").scrollIntoView({ block: "start" });
   shown = design.id;

@@ -45,7 +45,7 @@ function group(state, one, k, fail) {
     const place = state.diagnosis.ranking.find((score) => score.effect === other)?.place ?? null;
     return make("li", {}, make("code", {}, other), " ",
       choice(other, place, `add-other-${k}-${other}`),
-      button("What would tell?", { id: `tell-${k}-${other}`, ariaLabel: `Which experiment tells ${one.effect} from ${other}?` },
+      button("What would tell?", { id: `tell-${k}-${other}`, ariaLabel: `Which experiment distinguishes ${one.effect} from ${other}?` },
         () => experiment.ask({ group: k, between: [one.effect, other] }, fail)));
   });
   return make("li", { className: "found" },
@@ -65,7 +65,7 @@ function row(state, one, k, widest, fail) {
       make("details", {}, make("summary", {}, make("code", {}, named(one))),
         make("p", {}, one.physics), make("p", {}, make("code", {}, one.equation)), one.confirm ? make("p", { className: "caption" }, `To confirm it: ${one.confirm}`) : null),
       toggle(state, one.effect, one.place, fail, `add-ranked-${k}`)),
-    make("p", { className: "figures" }, make("span", {}, "error then ", make("b", {}, units(one.rmse))), make("span", { title: "fall of the Bayesian information criterion; below 6 is no evidence" }, `evidence ${one.evidence}`),
+    make("p", { className: "figures" }, make("span", {}, "error then ", make("b", {}, units(one.rmse))), make("span", { title: "fall of the Bayesian information criterion; below 6 is not significant" }, `evidence ${one.evidence}`),
       one.size ? make("span", {}, units(one.size)) : null, one.visible ? make("span", {}, "visible from ", units(one.visible)) : null),
     make("div", { className: "track" }, bar));
 }
@@ -73,10 +73,10 @@ function row(state, one, k, widest, fail) {
 // Under which names the shape of a diagnosis was kept.
 const kept = new Map();
 
-/** What nothing explains becomes a term of the user's own. */
+/** The unexplained error becomes a term of the user's own. */
 function keep(state, found, fail) {
   const name = kept.get(found.id);
-  if (state.effects.some((one) => one.effect === name)) return make("p", { className: "caption" }, `Kept as ${name}: the fits scale its shape.`);
+  if (state.effects.some((one) => one.effect === name)) return make("p", { className: "caption" }, `Added as ${name}: the fits scale its shape.`);
   const box = make("input", { id: "keep-name", size: 12, autocomplete: "off", placeholder: "its name", spellcheck: false });
   box.setAttribute("aria-label", "Name of the effect of your own");
   const press = async () => {
@@ -86,8 +86,8 @@ function keep(state, found, fail) {
     await server.send("api/effect", { do: "keep", effect: wanted }).catch((e) => { kept.delete(found.id); fail(e.message); });
   };
   box.addEventListener("keydown", (event) => { if (event.key === "Enter") press(); });
-  const alone = found.unknown === "time" ? " It is a function of time, so it says nothing of other records." : "";
-  return [make("p", { className: "caption" }, `Whatever it is, its shape can stand in the model as an effect of your own; the fits scale it. It is drawn under “What nothing explains”.${alone}`),
+  const alone = found.unknown === "time" ? " It is a function of time, so it cannot predict other records." : "";
+  return [make("p", { className: "caption" }, `Its shape can be added to the model as an effect of your own; the fits scale it. It is drawn under “The unexplained error”.${alone}`),
     make("p", { className: "line" }, box, button("Keep the shape", { id: "keep" }, press))];
 }
 
@@ -142,7 +142,7 @@ export function show(state, fail) {
     found.rankings ? rankings(found.rankings) : null,
     found.unknown ? keep(state, found, fail) : null,
     make("h3", {}, "One effect at a time, refitted"),
-    make("p", { className: "caption" }, "The larger the evidence (fall of BIC), the better; below 6 is none, and effects within 6 of each other are not told apart."),
+    make("p", { className: "caption" }, "The larger the fall of BIC, the better; a fall below 6 is not significant, and effects within 6 of each other are not distinguished."),
     make("ol", { className: "ranking" }, found.ranking.slice(0, most).map((one, k) => row(state, one, k, widest, fail))),
     rest > 0 || all ? button(all ? "Show fewer" : `Show ${rest} more`, { id: "more-ranked", className: "quiet" }, () => { all = !all; show(server.current(), fail); }) : null);
   if (asked && shown !== found.id) {

@@ -115,7 +115,7 @@ function words(trail, report) {
     pick.addEventListener("click", () => choose(k));
     return make("li", {}, pick);
   }));
-  $("trail-test").textContent = held ? " Below it the same on the held-out record, which took part in no fit and no choice." : "";
+  $("trail-test").textContent = held ? " Below it the same on the held-out record, which was not used for fits or selection." : "";
   chosenWords();
 }
 
@@ -129,7 +129,7 @@ function chosenWords() {
   fill($("held-out-parts"), units(fit.held_out_error));
   table($("parameters"), [["Parameter"], ["Estimate", true], ["± standard error", true], ["Unit"]],
     fit.parameters.map((one) => [make("code", {}, one.name), one.value, one.error ?? "–", units(one.unit)]));
-  $("parameters-caption").textContent = `${fit.starts_agree === 0 ? `None of ${fit.starts} starts around it came as low` : `${fit.starts_agree} of ${fit.starts} starts ended in this minimum`}. –: the data do not determine it, or it sits at a bound.`;
+  $("parameters-caption").textContent = `${fit.starts_agree === 0 ? `None of ${fit.starts} starts around it came as low` : `${fit.starts_agree} of ${fit.starts} starts ended in this minimum`}. –: the data do not determine it, or it is at a bound.`;
 }
 
 function choose(k) {
@@ -143,7 +143,7 @@ export function draw() {
   if (!drawing || !window.Plotly) return;
   for (const [id, figure] of Object.entries(drawing.figures)) {
     const box = $(`plot-${id}`);
-    // What nothing explains is that of the diagnosis, not of these fits.
+    // The unexplained error is that of the diagnosis, not of these fits.
     if (!box || id.startsWith("unknown-") || !id.startsWith("record-") && !fits.length) continue;
     const made = id === "trail" && fits.length < 2 ? null : figure();
     if (made && id === "trail") {

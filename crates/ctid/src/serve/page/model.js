@@ -95,7 +95,7 @@ function settings() {
     const levels = fields.map(([id], k) => ($(id) ? $(id).value : measuredOf(was)[k]));
     // The choice appears with a further reading.
     if (!fields.every(([id]) => $(id))) knownFields(chosen, server.current(), columns);
-    if (!levels.every(Boolean)) throw new Error(fields.length > 1 ? "Say first of which tanks the readings are the levels." : "Say first of which tank the reading is the level.");
+    if (!levels.every(Boolean)) throw new Error(fields.length > 1 ? "First choose the tanks whose levels are read." : "First choose the tank whose level is read.");
     known.measured = levels.length > 1 ? levels : levels[0];
   } else if (measuredOf(was).length > 1) {
     // Of several readings one is left, and nobody has said which: the level of the reading that stays.
@@ -173,7 +173,7 @@ function chosen() {
   }
   keep();
   $("known").hidden = false;
-  $("equation").textContent = `${known.model}. Say of which tank the reading is the level, and which column is the command of pump 2.`;
+  $("equation").textContent = `${known.model}. Choose the tank whose level is read, and the column of the command of pump 2.`;
   data.columnFields(state, signals(known));
   $("columns").open = true;
   $("known-measured").focus();

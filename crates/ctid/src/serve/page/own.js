@@ -154,7 +154,7 @@ function findings(own) {
       make("p", { className: "figures" }, one.sizes.map((size) => make("span", {}, units(size)))),
       make("p", {}, `${one.physics}.`),
       one.others.length ? [make("p", { className: "caption" }, "These records cannot tell it from:"), make("ul", { className: "others" }, one.others.map((other, l) => make("li", {}, line(other, `own-other-${k}-${l}`),
-        button("What would tell?", { id: `own-tell-${k}-${l}`, ariaLabel: `Which experiment tells ${one.effect} from ${other.effect}?` }, () => experiment.ask({ group: k, between: [one.effect, other.effect] }, fail)))))] : null))) : null,
+        button("What would tell?", { id: `own-tell-${k}-${l}`, ariaLabel: `Which experiment distinguishes ${one.effect} from ${other.effect}?` }, () => experiment.ask({ group: k, between: [one.effect, other.effect] }, fail)))))] : null))) : null,
     found.sentences.map((sentence) => make("p", {}, units(sentence))),
     make("div", { className: "scroll", tabIndex: 0, role: "region", "aria-label": "How the error fell" }, errors),
     make("p", { className: "caption" }, `${found.candidates} candidates in ${found.seconds.toFixed(1)} s. Simulation error, root mean square.`));
@@ -171,15 +171,15 @@ function ports(own) {
 /** What to do next. */
 export function next(state) {
   const { own } = state;
-  if (own.text_error) return "mend the text of the model where the message says";
-  if (own.file_error) return "mend the model file where the message says";
+  if (own.text_error) return "correct the text of the model at the place in the message";
+  if (own.file_error) return "correct the model file at the place in the message";
   if (!state.records.some((one) => !one.held_out)) return "drop a record";
-  if (state.records.some((one) => one.error)) return "say which column is what";
+  if (state.records.some((one) => one.error)) return "assign the columns";
   if (!own.fitted) return "fit the model";
   const term = own.diagnosis?.unknown?.effect;
   const open = (own.diagnosis?.groups || []).find((one) => ![one, ...one.others].some(({ effect }) => own.effects.includes(effect)));
   if (open) return `add ${open.effect}, and watch the error fall`;
-  if (term && own.diagnosis.of_this_model) return `look at what nothing explains, and keep ${term} or write a candidate of your own`;
+  if (term && own.diagnosis.of_this_model) return `look at the unexplained error, and add ${term} or write a candidate of your own`;
   return own.diagnosis ? "" : "diagnose what is missing";
 }
 
@@ -206,7 +206,7 @@ export async function show(state) {
   $("own-check").textContent = own.check || "";
   const unused = (own.unused || []).map((one) => `[${one}]`).join(", ");
   $("own-unused").hidden = !unused && !own.loop;
-  $("own-unused").textContent = [own.loop ? `${own.loop}.` : "", unused ? `No part in a fit has ${unused}.` : ""].join(" ").trim();
+  $("own-unused").textContent = [own.loop ? `${own.loop}.` : "", unused ? `Fits do not use ${unused}.` : ""].join(" ").trim();
   const ready = !own.text_error && !own.file_error && !state.job && state.records.some((one) => !one.held_out) && state.records.every((one) => one.read);
   $("own-fit").disabled = !ready;
   $("own-diagnose").disabled = !ready;
@@ -250,9 +250,9 @@ function words() {
   $("own-weighted").textContent = `Root mean square; the model is simulated, and never corrected by a reading.${body.outputs.length > 1 ? ` Together ${body.weighted} times the noise's innovations.` : ""}`;
   table($("own-parameters"), [["Parameter"], ["Estimate", true], ["± standard error", true], ["Unit"]],
     body.parameters.map((one) => [make("code", {}, one.name), one.value, one.error ?? (one.known ? "known" : "–"), units(one.unit)]));
-  $("own-starts").textContent = `${body.starts_agree} of ${body.starts} starts ended in this minimum. –: the data do not determine it, or it sits at a bound.`;
+  $("own-starts").textContent = `${body.starts_agree} of ${body.starts} starts ended in this minimum. –: the data do not determine it, or it is at a bound.`;
   fill($("own-untold"), body.not_determined.map((of) => make("p", { className: "warning" },
-    of.includes(",") ? `These records do not tell ${of} one without the other: give one of them under [known], or a [prior].` : `${of} leaves no trace in these records: give it under [known], or excite the plant more.`)));
+    of.includes(",") ? `These records determine only a combination of ${of}: give one of them under [known], or a [prior].` : `${of} has no effect on the readings of these records: give it under [known], or excite the plant more.`)));
 }
 
 const inUnit = (name, unit) => plots.named(plots.plain(name), plots.pretty(unit));

@@ -17,7 +17,7 @@ function number(id, what) {
 function limits(signals) {
   return signals.map(({ name }, k) => {
     const [low, high] = [number(`own-low-${k}`, name), number(`own-high-${k}`, name)];
-    if ((low === null) !== (high === null)) throw new Error(`${name}: one end of the range alone says little; give both, or neither`);
+    if ((low === null) !== (high === null)) throw new Error(`${name}: one end of the range alone is not enough; give both, or neither`);
     return { name, apply: $(`own-apply-${k}`).checked, range: low === null ? null : [low, high], slew: number(`own-slew-${k}`, name) };
   });
 }
@@ -64,7 +64,7 @@ export function show(state) {
     design.twins ? null : design.inputs.map(({ name }, k) => figure(`own-input-${k}`, `The best one: ${name}`)),
     design.twins ? null : make("p", {}, make("a", { className: "button", href: server.link("experiment"), download: "next.csv" }, "Download next.csv")),
     make("div", { className: "scroll", tabIndex: 0, role: "region", ariaLabel: "Experiments" }, sheet),
-    make("p", { className: "caption" }, "Power: by so much the criterion of the wrong one rises on average; ~ before it is confirmed by a refit. Decides: the probability that it ends more than 6 above the right one."));
+    make("p", { className: "caption" }, "Power: expected rise of the criterion of the wrong model; ~ before it is confirmed by a refit. Decides: the probability that it ends more than 6 above the right one."));
   $("own-experiment-part").focus();
   $("own-experiment-part").scrollIntoView({ block: "start" });
   shown = design.id;

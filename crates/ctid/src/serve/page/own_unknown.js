@@ -1,4 +1,4 @@
-// What nothing explains in a model of one's own: the function at a port that stands for it, as the report draws it.
+// The unexplained error in a model of one's own: the function at a port that stands for it, as the report draws it.
 import { $, fill, figure, make, plot, table, units } from "./dom.js";
 
 let shown = null;

@@ -1,4 +1,4 @@
-// What nothing explains: against time, and against what it depends on, as the report draws it.
+// The unexplained error: against time, and against what it depends on, as the report draws it.
 import { $, figure, plot } from "./dom.js";
 import * as server from "./server.js";
 
@@ -17,9 +17,9 @@ export async function show(state) {
   if (shown !== found.id) return;
   drawing = diagnosisFigures(report, { chosen: report.steps.length - 1, output: 0, residualRecord: 0, sameAxes: true });
   const last = found.groups.length ? `with ${found.groups.map((one) => one.effect).join(", ")}` : "as it was diagnosed";
-  $("unknown-lead").textContent = `The term that has to be added to the model ${last} so that it meets the data.`;
-  const path = figure("unknown-path", "Against time", "Smoothed, with its 95 % band, on the first fitted record; shaded where the band does not hold zero.");
-  const shape = figure("unknown-shape", `Against the ${VARIABLE[variable] || variable}`, "Fitted with all parameters of the plant, without what those imitate; with its 95 % band.");
+  $("unknown-lead").textContent = `The term that has to be added to the model ${last} so that it fits the data.`;
+  const path = figure("unknown-path", "Against time", "Smoothed, with its 95 % band, on the first fitted record; shaded where the band excludes zero.");
+  const shape = figure("unknown-shape", `Against the ${VARIABLE[variable] || variable}`, "Fitted with all parameters of the plant; the part that these parameters explain as well is removed. With its 95 % band.");
   $("unknown-figures").replaceChildren(path, ...(variable === "time" ? [] : [shape]));
   draw();
 }

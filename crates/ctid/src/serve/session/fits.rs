@@ -1,4 +1,4 @@
-//! The fits that a session keeps, and which of them belong together.
+//! Fits of a session, and which of them belong together.
 
 use axum::body::Bytes;
 use missing_effect::PerOutput;
@@ -12,22 +12,22 @@ use crate::model_file::ModelFile;
 pub(crate) struct Fitted {
     pub id: u64,
     pub model: ModelFile,
-    /// Which state of the records it was fitted to.
+    /// Version of the records that were fitted.
     pub data: u64,
-    /// It ran on the measured command, also where the loop could be simulated.
+    /// Whether the fit uses the measured command although the loop could be simulated.
     pub measured: bool,
     /// Simulation error of each output, on the fitted and on the held-out records.
     pub errors: PerOutput,
     pub errors_test: Option<PerOutput>,
     pub bic: f64,
-    /// What is left of the records looks like noise.
+    /// Whether the residual looks like noise.
     pub adequate: bool,
-    /// What the page draws and says of it, as JSON.
+    /// JSON for the page.
     pub body: Bytes,
 }
 
 impl Session {
-    /// Keeps a fitted model; the oldest goes where there are many.
+    /// Stores a fitted model; drops the oldest one if there are too many.
     pub(crate) fn keep(&mut self, fitted: Fitted) {
         let again =
             |other: &Fitted| other.model == fitted.model && other.measured == fitted.measured;
@@ -48,7 +48,7 @@ impl Session {
         fitted.data == self.data && fitted.measured == self.measured
     }
 
-    /// The fits to these records of models that differ from this one in their effects and terms alone.
+    /// The fits to these records of models that differ from this one in their effects and terms only.
     pub(crate) fn kin(&self, model: &ModelFile) -> Vec<&Arc<Fitted>> {
         let bare = without_effects(model);
         let kin = |fitted: &&Arc<Fitted>| {
@@ -57,8 +57,7 @@ impl Session {
         self.models.iter().filter(kin).collect()
     }
 
-    /// The fits of the model with its first effects, none of them and then one more each time, and then with its first terms, as
-    /// far as they are known.
+    /// The fits of the model with its first effects, from none to all, and then with its first terms, as far as they exist.
     pub(crate) fn trail(&self, model: &ModelFile) -> Vec<&Arc<Fitted>> {
         let kin = self.kin(model);
         let (effects, terms) = (model.effects.as_slice(), model.terms.as_slice());
@@ -76,7 +75,7 @@ impl Session {
     }
 }
 
-/// Whether two files say the same of what is fitted.
+/// Whether two files have the same fitted content.
 pub(crate) fn same(a: &ModelFile, b: &ModelFile) -> bool {
     let bare = |model: &ModelFile| ModelFile {
         waiting: Vec::new(),
@@ -85,7 +84,7 @@ pub(crate) fn same(a: &ModelFile, b: &ModelFile) -> bool {
     bare(a) == bare(b)
 }
 
-/// The model without effects and terms and what is said of their parameters.
+/// The model without effects, terms, and settings of their parameters.
 pub(super) fn without_effects(model: &ModelFile) -> ModelFile {
     let mut bare = model.clone();
     let effects = model.effects.iter().map(|placed| placed.effect.id);

@@ -31,13 +31,13 @@ fn a_form_of_an_older_text_is_refused() {
     assert!(
         matches!(&error, Err(Error::Changed { what, .. }) if what.starts_with("known.area changed"))
     );
-    // What no field of the form speaks of may change: an effect, a comment.
+    // Parts of the file without a field in the form may change: an effect, a comment.
     let other = COMMENTED.replace("\"overflow\"]", "\"overflow\", \"sensor_lag\"] # both");
     let said = form(COMMENTED, &newer)
         .written_into("m.toml", &other)
         .unwrap();
     assert_eq!(said.text, other.replace("154 ", "150.5 "));
-    // What cannot be shown is no change.
+    // Values that cannot be displayed are no change.
     let endless = COMMENTED.replace("154 ", "inf ");
     let error =
         form(&COMMENTED.replace("area = 154 ", ""), COMMENTED).written_into("m.toml", &endless);
@@ -89,7 +89,7 @@ fn an_effect_that_was_taken_out_does_not_stand_in_the_way_of_another_plant() {
     };
     let edited = settings.clone().written_into("m.toml", &of("")).unwrap();
     assert!(!edited.text.contains("where"), "{}", edited.text);
-    // One that is on is not moved in silence.
+    // An effect in the model is not moved silently.
     let refused = settings.written_into("m.toml", &of("\"leak_at_height\""));
     assert!(refused.is_err_and(|error| error.to_string().contains("T1")));
 }

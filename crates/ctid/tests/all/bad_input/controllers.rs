@@ -1,4 +1,4 @@
-//! Controllers that cannot have run.
+//! Controllers that cannot have produced the record.
 
 use super::{both_refuse, model_refused, place};
 use crate::common::{Tanks, bundled};

@@ -106,7 +106,7 @@ fn two_decimal_marks() {
 
 #[test]
 fn a_quote_that_is_never_closed() {
-    // All that follows is then one cell: the message stays short all the same.
+    // The rest of the file is then one cell: the message is short nevertheless.
     let text = Rows::new().with(40, 2, "\"9.5").text();
     let place = place();
     place.write("bad.csv", text);

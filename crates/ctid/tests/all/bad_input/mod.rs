@@ -1,5 +1,5 @@
-//! Bad input, one mistake at a time, through the program: exit code 2, one line that names the place
-//! and the mend, and not a byte on disk changed.
+//! Bad input, one mistake at a time, through the program: exit code 2, one line that names the place and the correction, and not a byte on
+//! disk changed.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 
 use crate::common::{Place, bundled};
 
-/// Results that ctid wrote earlier: a run that fails may not touch them.
+/// Results that ctid wrote earlier: a failed run must not change them.
 fn earlier_results() -> &'static [(&'static str, Vec<u8>); 2] {
     static RESULTS: OnceLock<[(&str, Vec<u8>); 2]> = OnceLock::new();
     RESULTS.get_or_init(|| {
@@ -96,7 +96,7 @@ impl Rows {
         Self(bundled("tour.csv").lines().map(cells).collect())
     }
 
-    /// One cell replaced; column 0 is the time, 1 the input, 2 the output.
+    /// Replaces one cell; column 0 is the time, 1 the input, 2 the output.
     fn with(mut self, row: usize, column: usize, text: &str) -> Self {
         self.0[row - 1][column] = text.to_string();
         self

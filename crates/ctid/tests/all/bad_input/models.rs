@@ -1,4 +1,4 @@
-//! Model files that cannot be.
+//! Invalid model files.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! Records whose cells or numbers cannot be.
+//! Records with invalid cells or numbers.
 
 mod several;
 
@@ -162,7 +162,7 @@ fn a_constant_input() {
     );
 }
 
-/// Beside a record that moves, and held out, it is as good as any: it is simulated and scored.
+/// Together with a record that changes, or held out, a constant record is valid: it is simulated and scored.
 #[test]
 fn a_constant_input_beside_another_record() {
     let place = crate::common::Place::new();

@@ -1,4 +1,4 @@
-//! Results that would overwrite something, or lie nowhere.
+//! Results that would overwrite a file, or whose folder does not exist.
 
 use std::fs;
 
@@ -77,7 +77,7 @@ fn a_result_onto_a_foreign_file() {
         for result in [
             "--json notes.json --report out.html",
             "--json out.json --report notes.html",
-            // What ctid wrote, but not of this kind.
+            // A file of ctid, but of another kind.
             "--json out.html",
             "--report out.json",
         ] {

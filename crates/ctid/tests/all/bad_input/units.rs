@@ -1,4 +1,4 @@
-//! Units that contradict, and columns of no clear role.
+//! Contradictory units, and columns without a clear role.
 
 use super::{Rows, both_refuse, model_with, place, record_refused};
 
@@ -71,7 +71,7 @@ fn a_time_in_no_unit_of_time() {
 fn a_time_in_another_unit_than_the_model_says() {
     let place = place();
     place.write("bad.csv", Rows::new().with(1, 0, "t [min]").text());
-    // The file knows best: its times are minutes, whatever the model calls the column.
+    // The header decides: its times are minutes, whatever the model names the column.
     let said = place.succeeds("compare bad.csv --model tour.toml");
     assert!(said.contains("30.0 h"), "{said}");
 }

@@ -1,4 +1,4 @@
-//! Commands that make no sense.
+//! Invalid commands.
 
 use super::{Rows, model_with, place};
 

@@ -1,4 +1,4 @@
-//! The program from outside: a folder to run it in, what it says there, and what it does to the files.
+//! The program as a process: a folder to run it in, its output, and its changes of files.
 
 #![allow(dead_code, clippy::unwrap_used, clippy::panic)]
 
@@ -15,7 +15,7 @@ use plants::{EffectInfo, Known, Placed, Plant, Scales, Simulator, Structure, Ter
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Far longer than any run of these tests takes.
+/// Far longer than any run of these tests.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The bundled records and their model file.
@@ -32,7 +32,7 @@ pub struct Place {
     folder: TempDir,
 }
 
-/// How a run ended.
+/// End of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// Exit code; `None` where the program was killed.
@@ -83,9 +83,9 @@ impl Place {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
-            // Two cores shared by many runs: one thread each, unless a test is about threads.
+            // Two cores are shared by many runs: one thread each, unless a test is about threads.
             .env("RAYON_NUM_THREADS", "1");
-        // Nor may a result hang on how busy the machine is.
+        // Nor may a result depend on the load of the computer.
         let searches = ["compare ", "diagnose ", "design "]
             .iter()
             .any(|command| words.starts_with(command));
@@ -100,7 +100,7 @@ impl Place {
         outcome(self.command(words))
     }
 
-    /// Runs the program, which has to end well; what it printed.
+    /// Runs the program, which has to end successfully; returns its output.
     pub fn succeeds(&self, words: &str) -> String {
         let outcome = self.ctid(words);
         assert_eq!(outcome.code, Some(0), "ctid {words}: {}", outcome.err);
@@ -108,7 +108,7 @@ impl Place {
         outcome.out
     }
 
-    /// Runs `diagnose` or `compare`; what it wrote as JSON.
+    /// Runs `diagnose` or `compare`; returns the JSON.
     pub fn result(&self, words: &str) -> Value {
         self.succeeds(&format!("{words} --json result.json"));
         let json = self.json("result.json");
@@ -188,7 +188,7 @@ pub fn outcome(mut command: Command) -> Outcome {
     }
 }
 
-/// A pipe that nobody empties would stop the program.
+/// A pipe that is not read would block the program.
 fn drain(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<Vec<u8>> {
     thread::spawn(move || {
         let mut bytes = Vec::new();
@@ -197,7 +197,7 @@ fn drain(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<Vec<u8>> {
     })
 }
 
-/// The exit code; a program that does not end is a failure, not a test that never ends.
+/// The exit code; a program that does not end is a failure after a time limit.
 fn wait(child: &mut Child) -> Option<i32> {
     let began = Instant::now();
     loop {
@@ -212,7 +212,7 @@ fn wait(child: &mut Child) -> Option<i32> {
     }
 }
 
-/// A result without what differs from run to run.
+/// A result without the entries that differ from run to run.
 pub fn lasting(mut result: Value) -> Value {
     let seconds = result.as_object_mut().unwrap().remove("seconds");
     assert!(seconds.is_some_and(|seconds| seconds.is_number()));
@@ -236,7 +236,7 @@ impl Random {
         (self.next() % n.max(1) as u64) as usize
     }
 
-    /// From 0 to 1.
+    /// Uniform from 0 to 1.
     pub fn uniform(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -258,9 +258,9 @@ pub struct Tanks {
     pub theta: Vec<f64>,
     /// Level of each vessel at the beginning \[cm\].
     pub levels: Vec<f64>,
-    /// What is built into them: effect, vessel, parameters; in chain order.
+    /// Hidden effects of the plant: effect, vessel, parameters; in the order of the chain.
     pub hidden: Vec<(&'static str, usize, Vec<f64>)>,
-    /// What is built into them that no effect describes.
+    /// Terms of the plant that no effect describes.
     pub terms: Vec<Term>,
     pub rows: usize,
     /// Standard deviation of the sensor's noise \[cm\].
@@ -341,7 +341,7 @@ impl Tanks {
         csv(&inputs, &outputs)
     }
 
-    /// The model file of the plant as it is without what is hidden.
+    /// The model file of the plant without the hidden effects.
     pub fn model(&self) -> String {
         let known = match self.plant.vessels() {
             1 => "area = 154.0\n",

@@ -1,4 +1,4 @@
-//! The program: what it writes and refuses.
+//! The program: its files and errors.
 
 use ct_signals::{ReadOptions, Reading, read_csv};
 use linear_identification::{Method, Order, Request, identify};
@@ -117,7 +117,7 @@ fn what_cannot_be_is_refused() {
     );
 }
 
-/// What is advised can be done: of the first order there is no lower one.
+/// The advice is possible: there is no order below the first.
 #[test]
 fn no_order_below_the_first_is_advised() {
     let mut record = FIRST.record(4000, 5);
@@ -136,8 +136,8 @@ fn no_order_below_the_first_is_advised() {
     assert!(second.contains("or a lower --order"), "{second}");
 }
 
-/// The measured tanks, where they lie beside the checkout: half an hour at one level in a record of an hour tells no drift, and the
-/// program does not say that there is none.
+/// The measured tanks, if they are next to the checkout: half an hour at one level in a record of one hour shows no drift, and the program
+/// does not claim that there is none.
 #[test]
 fn a_record_too_short_to_tell_is_called_so() {
     let tanks = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -157,7 +157,7 @@ fn a_record_too_short_to_tell_is_called_so() {
     }
 }
 
-/// Records that no file brought along are looked at too.
+/// Records without a file are checked too.
 #[test]
 fn a_record_that_stands_still_is_refused() {
     let mut record = FIRST.record(200, 1);

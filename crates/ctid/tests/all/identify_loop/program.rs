@@ -1,4 +1,4 @@
-//! The program in a loop: what it writes and refuses.
+//! The program in a loop: its files and errors.
 
 use ct_signals::{Channel, Record, excitation};
 use fcloe::{Noise, PlantModel, sampled_loop};
@@ -42,7 +42,10 @@ fn the_program_writes_what_it_prints() {
         let text = place.succeeds(&format!(
             "identify loop.csv --model loop.toml --method {method} --json out.json --report out.html"
         ));
-        assert!(text.contains("The loop, and the way there"), "{text}");
+        assert!(
+            text.contains("The loop, and how it was estimated"),
+            "{text}"
+        );
         for line in text.lines() {
             assert!(line.chars().count() <= 80, "wider than 80: {line}");
         }
@@ -70,7 +73,7 @@ fn the_program_writes_what_it_prints() {
         assert_eq!(has("condition"), method.ends_with("fcloe"));
         assert_eq!(has("trajectory"), method == "recursive-fcloe");
     }
-    // Without the model there is no controller: open loop.
+    // Without the model file there is no controller: open loop.
     let json: Value = place.result("identify loop.csv --method fcloe");
     assert_eq!(json["in_loop"]["r"], serde_json::json!([]));
 }
@@ -91,7 +94,7 @@ fn what_cannot_be_is_refused() {
             &format!("open.csv --model loop.toml --method {method}"),
             &["open.csv", "no reference r"],
         );
-        // one that stands still
+        // one that is constant
         let still = text
             .lines()
             .map(|line| match line.rsplit_once(',').unwrap() {
@@ -153,7 +156,7 @@ fn what_cannot_be_is_refused() {
     );
 }
 
-/// A plant that goes the other way than its controller expects: the signals grow, and no stable loop gives them.
+/// A plant with the opposite sign of the gain: the signals grow, and no stable loop produces them.
 #[test]
 fn a_loop_that_is_not_stable_is_refused() {
     let plant = PlantModel::first_order(-1.0, 110.0).unwrap();

@@ -180,7 +180,7 @@ fn a_prior() {
         parse("plant = \"single-tank\"\n[prior]\nalpha = [2, 0.5]\n[start]\npump_gain = 3.0");
     let prior = model.priors["alpha"];
     assert_eq!((prior.value, prior.std_error), (2.0, 0.5));
-    // The fit begins there, but where a guess says otherwise.
+    // The fit starts there, unless a guess gives another value.
     assert_eq!(model.start["alpha"], 2.0);
     let model = parse("plant = \"single-tank\"\n[prior]\nalpha = [2, 0.5]\n[start]\nalpha = 3.0");
     assert_eq!(model.start["alpha"], 3.0);

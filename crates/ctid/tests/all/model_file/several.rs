@@ -47,7 +47,7 @@ fn what_three_tanks_lack_is_said() {
         ),
         (
             three("pipe_area = 0.5\ngravity = 981"),
-            "tank.toml:4: pipe_area says nothing of the levels without the area of the tanks",
+            "tank.toml:4: pipe_area has no effect on the levels without the area of the tanks",
             "give area too",
         ),
         (
@@ -134,7 +134,7 @@ fn several_levels_and_a_disturbance_are_understood() {
     assert_eq!(model.columns.outputs, ["h1", "h2"]);
     assert_eq!(model.known.measured, [0, 1]);
     assert_eq!(model.known.disturbance, Some(1));
-    // Of several sensors the last one is meant where nobody says which.
+    // With several sensors, the default is the last one.
     assert_eq!(model.effects[0].vessel, 1);
     let at_upper = BOTH.replace("[columns]", "effects = [\"sensor_drift\"]\n[columns]")
         + "[effect.sensor_drift]\nwhere = \"upper\"\n";

@@ -1,4 +1,4 @@
-//! Rows that are not used, and what is said of them.
+//! Rows that are not used, and their messages.
 
 use super::{HEADER, MODEL, assert_says, fed, place, rows, text};
 
@@ -48,8 +48,8 @@ fn bad_rows_are_said_skipped_and_not_flooded_with() {
     assert_says(&outcome, "103 of them with something wrong");
 }
 
-/// Who listens to a running line hears the end of a row first.
-/// Empty, no number, not finite, or a word: the rows' commands count, and the tank is followed.
+/// A reader that connects to a running line receives the end of a row first. Empty, no number, not finite, or a word: the rows' commands
+/// are used, and the simulation continues.
 #[test]
 fn a_row_without_a_reading_is_said_and_its_command_used() {
     let rows = rows(2000, 9999);
@@ -69,7 +69,7 @@ fn a_row_without_a_reading_is_said_and_its_command_used() {
     assert_eq!((outcome.code, outcome.out.as_str()), (Some(0), ""));
     assert_says(
         &outcome,
-        "column \"y [cm]\": the cell is empty; check what writes the rows; the reading is lost, the command of the row is used",
+        "column \"y [cm]\": the cell is empty; check the program that writes the rows; the reading is lost, the command of the row is used",
     );
     assert_says(
         &outcome,
@@ -82,7 +82,7 @@ fn a_row_without_a_reading_is_said_and_its_command_used() {
     assert_says(&outcome, &format!("{lost} of them with something wrong"));
 }
 
-/// Each of the first digits of the state's numbers, changed to another: the file is JSON still, and its numbers are others.
+/// Each of the first digits of the state's numbers, changed to another: the file is valid JSON with other numbers.
 #[test]
 fn a_state_in_which_a_digit_has_changed_is_refused() {
     let place = place();
@@ -106,7 +106,7 @@ fn a_state_in_which_a_digit_has_changed_is_refused() {
         assert_eq!(outcome.code, Some(2));
         assert_says(
             &outcome,
-            "s.json: it is damaged: its numbers do not agree with its checksum; give --state another name, or delete the file to begin anew",
+            "s.json: it is damaged: its numbers do not agree with its checksum; give --state another name, or delete the file to start again",
         );
     }
 }

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::{HEADER, assert_says, events, fed, place, rows, text};
 
-/// The same rows with dates of Berlin, from shortly before its clocks go forward.
+/// The same rows with dates of Berlin, from shortly before the start of summer time.
 pub(super) fn dated(rows: &[[f64; 3]]) -> String {
     let mut text = "time,u [V],y [cm]\n".to_string();
     for [t, u, y] in rows {
@@ -21,7 +21,7 @@ pub(super) fn dated(rows: &[[f64; 3]]) -> String {
 const BERLIN: &str =
     "plant = \"single-tank\"\n[columns]\ntime_zone = \"Europe/Berlin\"\n[known]\narea = 154.0\n";
 
-/// The monitor sees what it sees of times in seconds, says dates, and goes on with the same clock.
+/// The monitor has the same results as with times in seconds, prints dates, and continues with the same clock.
 #[test]
 fn dates_are_read_and_said_also_after_a_restart() {
     let rows = rows(2200, 1600);
@@ -95,12 +95,12 @@ fn dates_that_no_row_can_make_plain_end_it() {
         &outcome,
         "standard input, row 2, column \"time\": \"03/04/2026 10:00\" has two meanings",
     );
-    // A row that begins in the middle says no form.
+    // A row that is cut in the middle does not determine the format.
     let lines = "5:00,4.5,14.8\n2026-03-29 10:00:02,4,12\n2026-03-29 10:00:04,4,12\n";
     let outcome = fed(&place, "", lines);
     assert_eq!(outcome.code, Some(0), "{}", outcome.err);
     assert_says(&outcome, "1 of them with something wrong");
-    // The times go back, and what comes is said as it is written.
+    // The times go back, and the message quotes the time as written.
     let lines = "2026-03-29 10:00:02,4,12\n2026-03-29 10:00:04,4,12\n2026-03-29 10:00:03,4,12\n";
     let outcome = fed(&place, "", lines);
     assert_says(

@@ -1,4 +1,4 @@
-//! A model of the user's own beside a stream.
+//! A user's own model beside a stream.
 
 use serde_json::Value;
 
@@ -20,7 +20,7 @@ equation
 end Block;
 "#;
 
-/// Rows time \[min\], heater, room, block \[degC\], power \[W\], every 30 min; from row `change` on more is lost to the room.
+/// Rows time \[min\], heater, room, block \[degC\], power \[W\], every 30 min; from row `change` on the loss to the room is larger.
 fn block_rows(count: usize, change: usize) -> String {
     let mut random = Random(11);
     let (mut block, mut u, mut until) = (40.0_f64, 50.0_f64, 20);
@@ -31,7 +31,7 @@ fn block_rows(count: usize, change: usize) -> String {
             until += 3 + random.below(40);
         }
         let room = 20.0 + 3.0 * (j as f64 / 15.0).sin();
-        // Every sixth power is lost.
+        // Every sixth power is missing.
         let power = if j % 6 == 2 {
             String::new()
         } else {
@@ -116,7 +116,7 @@ fn a_model_of_ones_own_is_watched_with_its_effects() {
     let estimates = events.iter().rfind(|e| e["event"] == "estimates").unwrap();
     let all = estimates["parameters"].as_array().unwrap();
     let tau = all.iter().find(|p| p["name"] == "lag_y_tau").unwrap();
-    // Its sensor does not lag.
+    // Its sensor has no lag.
     let value = tau["value"].as_f64().unwrap();
     assert!(value.abs() < 0.1 && tau["unit"] == "h", "{tau}");
 }
@@ -138,7 +138,7 @@ fn a_state_of_a_model_of_ones_own_goes_on() {
     let refused = fed(&place, "--state s.json", &all);
     assert_eq!(refused.code, Some(2));
     assert_says(&refused, "the state belongs to another model: model");
-    // Rows in a unit that the model has not.
+    // Rows in a unit that the model does not have.
     let other = own_place();
     let refused = fed(&other, "", all.replace("block [degC]", "block [bar]"));
     assert_eq!(refused.code, Some(2));
@@ -153,7 +153,7 @@ fn a_state_of_a_model_of_ones_own_goes_on() {
     assert_says(&refused, "m.toml: the model uses `time`");
 }
 
-/// Dates of the rows of [`block_rows`] in January and February of 2026, whose weeks have no change of the clocks.
+/// Dates of the rows of [`block_rows`] in January and February of 2026, without a change of the clocks.
 fn block_date(row: usize) -> String {
     let (mut day, minute) = (row / 48, row % 48 * 30);
     let mut month = 1;
@@ -202,7 +202,7 @@ fn dates_are_read_and_said_for_a_model_of_ones_own() {
     assert!(last["since_date"].as_str().unwrap().starts_with("2026-02-"));
     assert!(!dated.err.contains("since t = "), "{}", dated.err);
 
-    // After a restart too; numbers in place of dates are refused.
+    // Also after a restart; numbers in place of dates are rejected.
     let first = fed(&place, "--state s.json", lines[..1800].concat());
     let rest = lines[0].clone() + &lines[1700..].concat();
     let second = fed(&place, "--state s.json", rest);

@@ -64,7 +64,7 @@ fn a_state_goes_on_where_it_was() {
     );
 }
 
-/// Interrupted or terminated while no row comes, it saves its state and ends well; killed, it leaves the last state whole.
+/// Interrupted or terminated without a new row, the program saves its state and ends with success; killed, the last state file is complete.
 #[test]
 #[cfg(unix)]
 fn a_signal_ends_it_with_its_state_saved() {
@@ -104,7 +104,7 @@ fn a_signal_ends_it_with_its_state_saved() {
     }
 }
 
-/// Whoever reads the alarms has gone: it saves and ends.
+/// The reader of the alarms has closed the pipe: the program saves and ends.
 #[test]
 fn a_closed_pipe_ends_it() {
     let place = place();
@@ -123,7 +123,7 @@ fn a_closed_pipe_ends_it() {
     drop(writer.join().unwrap());
 }
 
-/// A line without an end is not kept: the memory stays as it is.
+/// A line without an end is not stored: the memory is constant.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_line_without_an_end_is_thrown_away() {

@@ -142,7 +142,7 @@ fn a_thousand_candidates_end_in_bounded_time() {
     );
     let begun = std::time::Instant::now();
     place.succeeds("diagnose a.csv --model m.toml --effort quick --json found.json");
-    // The limit of this effort is 5 s; what had begun then is ended.
+    // The limit of this effort is 5 s; running steps are ended then.
     assert!(begun.elapsed().as_secs() < 40, "{:?}", begun.elapsed());
     let found = place.json("found.json");
     assert!(found["candidates"].as_u64().unwrap() > 1000);

@@ -1,4 +1,4 @@
-//! Where results go: pipes, files, and what is written beside them.
+//! Destinations of results: pipes, files, and additional files.
 
 use std::fs;
 use std::process::Stdio;
@@ -46,7 +46,7 @@ fn a_reader_that_goes_early_is_no_error() {
         assert_eq!(end.status.code(), Some(0), "{words}: {err}");
         assert_eq!(err, "", "{words}");
     }
-    // What was asked for is there all the same.
+    // The requested result is written nevertheless.
     assert_eq!(place.json("early.json")["verdict"], "effect");
 }
 
@@ -108,12 +108,12 @@ fn a_tour_writes_its_report_and_a_second_one_destroys_nothing() {
     let page = place.read("report.html");
     assert!(page.starts_with(&ctid::report::head()) && page.contains("tour.csv"));
 
-    // Again: its own page, once more.
+    // Again: the page of ctid is overwritten.
     assert_eq!(place.succeeds(""), first);
     assert_eq!(place.snapshot().len(), 1);
     assert!(place.read("report.html") == page);
 
-    // A page that somebody wrote, or that ctid wrote on other data, stays.
+    // A page of another program, or of ctid for other data, is not overwritten.
     let tanks = Tanks::single();
     place.write("my.csv", tanks.csv());
     place.write("my.toml", tanks.model());
@@ -127,7 +127,7 @@ fn a_tour_writes_its_report_and_a_second_one_destroys_nothing() {
     assert!(place.snapshot() == before);
 }
 
-/// A shell's `--model <(...)` is a pipe, which gives its content once.
+/// A shell's `--model <(...)` is a pipe, which can be read once.
 #[cfg(unix)]
 #[test]
 fn a_model_file_may_be_a_pipe() {

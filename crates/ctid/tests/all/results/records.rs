@@ -1,4 +1,4 @@
-//! Several records, held-out ones, and the ways to write them.
+//! Several records, held-out ones, and the options for them.
 
 use serde_json::Value;
 
@@ -38,7 +38,7 @@ fn two_records_are_fitted_together() {
     }
     // An initial level for each record.
     assert_eq!(parameters(&both).len(), parameters(&first).len() + 1);
-    // Which comes first is of no account.
+    // The order of the records does not matter.
     let swapped = steps("tour-test.csv tour.csv");
     for name in ["pump_gain", "alpha", "overflow.rim"] {
         let (a, b) = (value(&both, name), value(&swapped, name));
@@ -83,7 +83,7 @@ fn a_decimal_comma_changes_nothing() {
     let points = lasting(place.result(&format!("{DIAGNOSE} --test tour-test.csv")));
     for name in ["tour.csv", "tour-test.csv"] {
         let text = bundled(name).replace(',', ";").replace('.', ",");
-        // As spreadsheets write it.
+        // In the format of spreadsheets.
         place.write(name, format!("\u{feff}{}", text.replace('\n', "\r\n")));
     }
     let commas = lasting(place.result(&format!("{DIAGNOSE} --test tour-test.csv")));

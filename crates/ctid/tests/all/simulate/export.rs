@@ -21,7 +21,7 @@ fn what_is_exported_reads_back() {
         "{text}"
     );
     place.succeeds("check fitted.mo");
-    // Simulated as it was written it gives the curves of the fit.
+    // A simulation of the exported file gives the curves of the fit.
     place.write("again.toml", FILE.replace("block.mo", "fitted.mo"));
     let inputs = place.read("a.csv");
     let inputs = inputs.lines().map(|line| {
@@ -47,7 +47,7 @@ fn what_is_exported_reads_back() {
             assert!((y - m - r).abs() < 1e-12 * (1.0 + y.abs()));
         }
     }
-    // The curves are a record: the same fit comes of them.
+    // The curves are a record: a fit to it gives the same result.
     place.succeeds("simulate m.toml inputs.csv --fit curves.csv --out of-curves.csv");
     place.succeeds("simulate m.toml inputs.csv --fit a.csv --out of-record.csv");
     assert_eq!(place.read("of-curves.csv"), place.read("of-record.csv"));

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::{BLOCK, FILE, TRUTH, place, record};
 use crate::common::Place;
 
-/// A block in a room that keeps its warmth.
+/// A block in a room with constant temperature.
 fn alone() -> Place {
     let place = place();
     let text = BLOCK.replace("  input Real Ta(unit=\"degC\") \"room\";\n", "");
@@ -16,7 +16,7 @@ fn alone() -> Place {
     let mut t = 20.0;
     let mut text = "t [s],heater [%],block [degC],loss [W]\n".to_string();
     for [time, u, ..] in record(400, 5, 0.0, 20.0) {
-        // A little noise that no generator is needed for.
+        // A small noise without a random generator.
         let v = 0.01 * (time * 0.7).sin() * (time * time).cos();
         writeln!(text, "{time},{u},{},{}", t + v, k * (t - 20.0)).unwrap();
         t = decay * t + (1.0 - decay) * (20.0 + g * u / k);
@@ -51,7 +51,7 @@ fn a_linear_model_is_identified_beside_its_own_transfer_function() {
     // C/k and g/k of the text and of [known].
     assert!((number(&own["a"][1]) - 520.0).abs() < 1e-9, "{own}");
     assert!((number(&own["b"][0]) - 0.2).abs() < 1e-12, "{own}");
-    // What is identified is the plant.
+    // The identified model equals the plant.
     let found = |name: &str| {
         let all = json["parameters"].as_array().unwrap();
         number(&all.iter().find(|p| p["name"] == name).unwrap()["value"])
@@ -67,11 +67,11 @@ fn a_linear_model_is_identified_beside_its_own_transfer_function() {
         "{}",
         found("b0")
     );
-    // The flow of heat has the same pole; other orders are told which one compares.
+    // The heat flow has the same pole; for other orders the program names the comparable one.
     let text =
         place.succeeds("identify a.csv --model m.toml --method srivc --order 2,0 --output y");
     assert!(text.contains("--order 1,0 compares"), "{text}");
-    // In minutes the model is another text, and the transfer function in seconds the same.
+    // In minutes the model has another text, and the transfer function in seconds is the same.
     let minutes = place.read("block.mo").replace("C*der(T)", "C/60*der(T)");
     place.write("block.mo", minutes);
     let header = place.read("a.csv").replacen("t [s]", "t [min]", 1);

@@ -1,4 +1,4 @@
-//! An integration of the loop that shares nothing with the crate's, and a drive that excites it.
+//! An integration of the loop that is independent of the crate's, and a drive that excites the loop.
 #![allow(dead_code)]
 
 use ct_lti::StateSpace;
@@ -7,7 +7,7 @@ use ode_solvers::dop_shared::OutputType;
 use ode_solvers::dopri5::Dopri5;
 use ode_solvers::{DVector, System};
 
-/// A drive that jumps to several levels.
+/// An input with steps to several levels.
 pub fn drive(n: usize) -> Vec<f64> {
     (0..n)
         .map(|k| {
@@ -66,7 +66,7 @@ impl System<f64, DVector<f64>> for &Loop {
     }
 }
 
-/// y and u at the samples, integrated afresh from each to the next.
+/// y and u at the samples, integrated from each sample to the next.
 pub fn integrate(
     plant: &PlantModel,
     controller: &Controller,

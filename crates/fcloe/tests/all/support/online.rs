@@ -83,7 +83,7 @@ pub fn first_order_from_afar(factor: f64, filter: Filter, seeds: Range<u64>) -> 
     good.count()
 }
 
-/// Where the recursion of second order starts.
+/// Start of the recursion of second order.
 #[derive(Debug, Clone, Copy)]
 pub enum From {
     /// Least squares with a filter of 0.04 rad/s on the beginning of the record.
@@ -92,7 +92,7 @@ pub enum From {
     Instruments,
     /// The first candidate of the pipeline on that beginning.
     Pipeline,
-    /// Each parameter off by up to this factor.
+    /// Each parameter is off by up to this factor.
     Factor(f64),
 }
 
@@ -101,11 +101,11 @@ pub enum From {
 pub struct SecondOrder {
     /// \[dB\]
     pub snr: f64,
-    /// Samples that the regressions see.
+    /// Number of samples for the regressions.
     pub beginning: usize,
 }
 
-/// What became of the runs.
+/// Final estimates of the runs.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Ends {
     /// Ends, and starts, within 10 % in all four parameters.
@@ -117,7 +117,7 @@ pub struct Ends {
 }
 
 impl SecondOrder {
-    /// One run for each seed. Where a regression gives no stable loop, it is a start and an end off by 100 %.
+    /// One run for each seed. If a regression gives no stable loop, start and end count as off by 100 %.
     pub fn runs(self, from: From, filter: Filter, seeds: Range<u64>) -> Ends {
         let (plant, controller) = second_order();
         let r = excitation::prbs(10_160, 20, -1.0, 1.0, 7).unwrap();

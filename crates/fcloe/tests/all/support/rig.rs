@@ -23,14 +23,14 @@ pub struct Rig {
     pub in_loop: bool,
     /// Raw levels instead of deviations, to be estimated.
     pub unknown_levels: bool,
-    /// Of white noise, or the correlation of neighbours.
+    /// Standard deviation of white noise, or the correlation of neighbours.
     pub rho: f64,
     /// 30 % of the readings are missing at random, and a block of 10 rows.
     pub missing: bool,
 }
 
 impl Rig {
-    /// The first table's plant and controller, with a set of its unstated conditions that fits it.
+    /// The first table's plant and controller, with assumptions that reproduce it.
     pub fn first_order(in_loop: bool) -> Self {
         let pattern = [0.82, 0.82, -0.82, -0.82, 0.82, -0.82, 0.82];
         Self {
@@ -80,7 +80,7 @@ impl Rig {
         }
     }
 
-    /// A plant that passes its input on at once: so does the loop with the noise.
+    /// A plant with direct feedthrough: the loop passes the noise directly.
     pub fn direct_term(in_loop: bool) -> Self {
         Self {
             name: "n = 1, m = 1, PI, pseudo-random",
@@ -106,7 +106,7 @@ impl Rig {
         }
     }
 
-    /// Without a controller, and coloured noise.
+    /// Without a controller, and with coloured noise.
     pub fn open_loop() -> Self {
         Self {
             name: "n = 2, m = 1, open loop, coloured noise",
@@ -161,7 +161,7 @@ impl Rig {
         LoopRecord::closed_loop(self.step, r, Some(data.u), data.y, offsets)
     }
 
-    /// Estimates and their uncertainty, from a start that is off by a fifth.
+    /// Estimates and their uncertainty, from a start with an error of a fifth.
     pub fn fit(&self, seed: u64) -> (Vec<f64>, Uncertainty) {
         let orders = self.plant.orders();
         let problem = Problem::new(&[self.record(seed)], &self.controller, orders).unwrap();
@@ -210,20 +210,20 @@ impl Rig {
     }
 }
 
-/// What the fits of many runs say of their intervals.
+/// Coverage of the intervals over many runs.
 #[derive(Debug)]
 pub struct Coverage {
-    /// In how many runs the 95 % interval of each parameter holds the truth.
+    /// In how many runs the 95 % interval of each parameter contains the true value.
     pub hits: Vec<usize>,
-    /// The same of intervals for a white residual.
+    /// Coverage of intervals that assume a white residual.
     pub white: Vec<usize>,
-    /// In how many runs the noise was placed where it is.
+    /// Number of runs with the correct path of the noise.
     pub placed: usize,
-    /// Mean of the variances claimed for each parameter over the variance of its estimates.
+    /// Mean of the estimated variances of each parameter over the variance of its estimates.
     pub variance_ratios: Vec<f64>,
 }
 
-/// Estimates and what is known of them.
+/// Estimates and their uncertainty.
 type Run = (Vec<f64>, Uncertainty);
 
 fn variance_ratio(each: &[Run], i: usize) -> f64 {

@@ -43,13 +43,13 @@ fn the_disturbance_of_a_linear_loop_is_the_noise() {
     }
 }
 
-/// Where the controller's command is not all of it, the rest is simulated with the loop.
+/// If the command has a part in addition to the controller's, this part is simulated with the loop.
 #[test]
 fn what_is_added_to_the_command_is_simulated_with_the_loop() {
     let rig = Rig::linear_tank();
     let (record, _) = record(&rig, &pi(), 0.0, 0.0, 5);
     let mut by_hand = record.clone();
-    // The plant ran on the command with the hand's part, which is played to it anew.
+    // The plant ran on the command plus the operator's part, which is repeated in the simulation.
     for (k, u) in by_hand.inputs[0].values.iter_mut().enumerate() {
         *u += if (100..140).contains(&k) { 0.2 } else { 0.0 };
     }
@@ -68,7 +68,7 @@ fn what_is_added_to_the_command_is_simulated_with_the_loop() {
     }
 }
 
-/// What one way of fitting says over many records: bias over spread, and how often its interval holds the truth.
+/// Results of one fitting method over many records: bias over spread, and coverage of its interval.
 fn over_records(rig: &Rig, rho: f64, simulate: bool, metric: bool) -> Vec<(f64, f64)> {
     const RECORDS: u64 = 200;
     let estimates: Vec<Vec<(f64, bool)>> = (0..RECORDS)
@@ -112,8 +112,8 @@ fn over_records(rig: &Rig, rho: f64, simulate: bool, metric: bool) -> Vec<(f64, 
         .collect()
 }
 
-/// Coloured noise in a loop: a fit by simulation error on the measured command is biased and its intervals are not to be
-/// trusted; the same fit of the simulated loop is not and they are.
+/// Coloured noise in a loop: a fit by simulation error on the measured command is biased and its intervals are wrong; the same fit of the
+/// simulated loop is unbiased with correct intervals.
 #[test]
 fn coloured_noise_biases_the_measured_command_and_not_the_loop() {
     let rig = Rig {
@@ -142,8 +142,8 @@ fn coloured_noise_biases_the_measured_command_and_not_the_loop() {
     }
 }
 
-/// A start-up and steps that drive the command from one limit to the other, for long: the disturbance is still the noise that was
-/// added, and a fit finds the truth.
+/// A start-up and steps that drive the command from one limit to the other: the disturbance still equals the added noise, and a fit finds
+/// the truth.
 #[test]
 fn a_command_at_its_limits_is_no_disturbance() {
     let rig = Rig {

@@ -1,4 +1,4 @@
-//! How often the band of a prediction holds the output without noise.
+//! Coverage of the band of a prediction for the output without noise.
 
 use greybox::{
     FitOptions, FitUncertainty, InitialStates, Setup, coloured, fit, levels_from_readings,
@@ -16,7 +16,7 @@ pub(super) fn records() -> u64 {
     std::env::var("RECORDS").map_or(RECORDS, |records| records.parse().unwrap())
 }
 
-/// The pooled share of covered rows is near 95 %: in 93 to 97 % for 200 fits or more, for fewer as much wider as the mean of fewer scatters.
+/// The pooled share of covered rows is near 95 %: within 93 to 97 % for 200 fits or more, and a wider range for fewer fits.
 fn check(name: &str, shares: &[f64]) {
     let n = shares.len() as f64;
     let mean = shares.iter().sum::<f64>() / n;
@@ -32,8 +32,8 @@ fn covered(mean: &[f64], errors: &[f64], clean: &[f64], quantile: f64) -> f64 {
     inside.count() as f64 / mean.len() as f64
 }
 
-/// Fits a record of a text's model, predicts on other inputs; the share of covered rows by output. `first_rows`: to which initial states are
-/// fitted; none where they are those of the text.
+/// Fits a record of a text's model, predicts on other inputs; the share of covered rows by output. `first_rows`: to which initial states
+/// are fitted; none where they are those of the text.
 fn share(
     text: &str,
     truth: &[f64],
@@ -86,7 +86,7 @@ fn share(
     let mean = on_others.simulate(&x).unwrap();
     let each = mean.iter().zip(&errors).zip(&clean);
     let q = known.quantile(LEVEL);
-    // Where a known state begins nothing is uncertain.
+    // With a known initial state the first value is exact.
     let from = usize::from(first_rows.is_none());
     each.map(|((m, e), c)| covered(&m[from..], &e[from..], &c[from..], q))
         .collect()

@@ -9,7 +9,7 @@ use plants::{Command, EffectInfo, Known, Placed, Plant, Scales, Simulator, Struc
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// What is known of a plant: tanks of 154 cm^2, a pump that runs to 10 V.
+/// Known constants of a plant: tanks of 154 cm^2, a pump with a range to 10 V.
 pub fn known(plant: Plant) -> Known {
     let area = match plant {
         Plant::SingleTank => [Some(154.0), None, None],
@@ -161,7 +161,7 @@ impl Rig {
 
     /// Runs the rig under a given command and noise.
     pub fn run(&self, u: &[f64], noise: &[f64]) -> Record {
-        // What the second pump of joined tanks is told: another course of the same.
+        // Command of the second pump of joined tanks: another course of the same kind.
         let second = self.plant.joined().then(|| {
             let n = u.len();
             let mirror = |k| self.command.0 + self.command.1 - u[(k + n / 3) % n];

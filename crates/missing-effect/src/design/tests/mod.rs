@@ -23,7 +23,7 @@ use crate::{
     simulated::{self, INTERVAL, NOISE},
 };
 
-/// A tank that hides an effect, under a command that hardly moves.
+/// A tank with a hidden effect, under a command that is nearly constant.
 fn problem(plant: Plant, hidden: (&str, f64), samples: usize) -> Problem {
     let known = Known {
         area: [(plant == Plant::SingleTank).then_some(154.0), None, None],
@@ -56,7 +56,7 @@ fn between(a: &str, b: &str) -> [Candidacy; 2] {
     })
 }
 
-/// A leak and a nonlinearity of the pump on the records, in the metric of the noise as it is.
+/// A leak and a nonlinearity of the pump on the records, with the given noise model as weighting.
 fn leak_or_curve(problem: &Problem) -> Fitted<'_> {
     let two = between("const_leak", "pump_nonlinearity");
     let mut fitted = fitted(problem, two, &Options::default()).unwrap();
@@ -67,7 +67,7 @@ fn leak_or_curve(problem: &Problem) -> Fitted<'_> {
     fitted
 }
 
-/// Where the time limit has passed nothing is claimed that was not computed.
+/// If the time limit has passed, only computed results are reported.
 #[test]
 fn what_there_is_no_time_for_is_not_claimed() {
     let problem = problem(Plant::SingleTank, ("const_leak", 4.0), 300);
@@ -116,7 +116,7 @@ fn what_there_is_no_time_for_is_not_claimed() {
     );
 }
 
-/// Where nothing is said of what the command can be.
+/// Without a given limit of the command.
 #[test]
 fn a_range_that_cannot_be_computed_with_is_refused() {
     let mut problem = problem(Plant::SingleTank, ("const_leak", 8.0), 100);
@@ -215,7 +215,7 @@ fn a_tank_that_would_overflow_is_left_out() {
     assert!(found.experiment.values.iter().all(within));
 }
 
-/// What is stopped while sequences are applied simulates no more of them, and says that it was stopped.
+/// A design that is stopped while sequences are applied simulates no more of them, and reports that it was stopped.
 #[test]
 fn a_design_that_is_stopped_simulates_nothing_more() {
     let problem = problem(Plant::SingleTank, ("const_leak", 4.0), 300);

@@ -1,4 +1,4 @@
-//! The power that is printed is that of the test.
+//! The printed power is that of the test.
 
 use super::*;
 
@@ -123,7 +123,7 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
     }
 }
 
-/// A small effect, and no record before: the formula of the signatures.
+/// A small effect, and no record before: the formula with the signatures is valid.
 #[test]
 fn for_a_small_effect_the_power_is_that_of_the_signatures() {
     let problem = problem(Plant::SingleTank, ("const_leak", 8.0), 300);
@@ -175,7 +175,7 @@ fn for_a_small_effect_the_power_is_that_of_the_signatures() {
 
 #[test]
 fn exact_twins_have_no_power() {
-    // On a linear tank the two lags make one transfer function in either order.
+    // On a linear tank the two lags give one transfer function in either order.
     let problem = problem(Plant::SingleTankLinear, ("pump_lag", 10.0), 400);
     let found = design(
         &problem,
@@ -197,7 +197,7 @@ fn exact_twins_have_no_power() {
     assert!(most < 1e-2, "{most}");
     let said = found.sentences.join(" ");
     assert!(said.contains("No experiment within these limits"), "{said}");
-    // What a person can do instead.
+    // Possible actions at the plant.
     for alternative in &found.between {
         assert!(said.contains(&alternative.confirm), "{said}");
     }

@@ -1,4 +1,4 @@
-//! What a noise shows of itself, and what is more than that.
+//! Expected residual of a noise model, and significant excess over it.
 //!
 //! A bin fails where its mean square is clearly above what the noise would show there. A coloured noise has fewer
 //! independent samples than samples, and more at some frequencies than at others; with its autocovariance `r(h)` and
@@ -20,16 +20,16 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// A bin fails where its mean square exceeds that of the noise by this factor ...
 const FACTOR: f64 = 3.0;
-/// ... a band by this one, since a noise's spectrum is known less well than its size ...
+/// ... a band by this one, because the spectrum of the noise is less well known than its variance ...
 pub(super) const FACTOR_OF_A_BAND: f64 = 6.0;
-/// ... and where chance would do it less often than this: one in ten thousand over some fifty bins.
+/// ... and if chance would cause it less often than this: one in ten thousand over about fifty bins.
 const CHANCE: f64 = 2e-6;
 
-/// What a noise shows in a record of `n` samples.
+/// Expected statistics of a noise in a record of `n` samples.
 pub(super) struct Expected {
-    /// Its mean square.
+    /// Mean square.
     square: f64,
-    /// Samples for one that is independent.
+    /// Samples per independent sample.
     spacing: f64,
     /// `E |X_k|^2/n` from zero to half the sampling rate.
     pub lines: Vec<f64>,
@@ -67,7 +67,7 @@ impl Expected {
         }
     }
 
-    /// Whether so large a mean square is more than so many samples of the noise would show.
+    /// Whether this mean square is significantly larger than that of the same number of noise samples.
     pub fn exceeded(&self, mean_square: f64, samples: usize) -> bool {
         let ratio = mean_square / self.square.max(f64::MIN_POSITIVE);
         ratio > FACTOR && beyond_chance(ratio, samples as f64 / self.spacing)
@@ -92,7 +92,7 @@ fn autocovariance(noise: &ArModel, n: usize) -> Vec<f64> {
         .collect();
     let plan = RealFftPlanner::<f64>::new().plan_fft_inverse(grid);
     let mut r = plan.make_output_vec();
-    // The lengths are the plan's, and a spectrum that is real throughout is that of a real signal.
+    // The lengths are those of the plan, and a real spectrum belongs to a real signal.
     if plan.process(&mut spectrum, &mut r).is_err() {
         r.fill(0.0);
     }
@@ -100,7 +100,7 @@ fn autocovariance(noise: &ArModel, n: usize) -> Vec<f64> {
     r
 }
 
-/// Whether a mean square over its expectation is too large for chance.
+/// Whether the ratio of a mean square to its expectation is significant.
 pub(super) fn beyond_chance(ratio: f64, independent: f64) -> bool {
     let freedom = independent.max(1.0);
     ChiSquared::new(freedom).is_ok_and(|chi| chi.sf(freedom * ratio) < CHANCE)
@@ -110,7 +110,7 @@ pub(super) fn beyond_chance(ratio: f64, independent: f64) -> bool {
 pub(super) fn transform(x: &[f64]) -> Vec<Complex<f64>> {
     let plan = RealFftPlanner::<f64>::new().plan_fft_forward(x.len());
     let mut output = plan.make_output_vec();
-    // The lengths are the plan's.
+    // The lengths are those of the plan.
     if plan.process(&mut x.to_vec(), &mut output).is_err() {
         output.clear();
     }

@@ -1,4 +1,4 @@
-//! Where a model fails: the residual by time window, level, flow, direction of change and frequency.
+//! Location of model errors: the residual by time window, level, flow, direction of change and frequency.
 //!
 //!
 //! A bin fails where its mean square is clearly above what the noise would show there (`expected.rs`).
@@ -12,27 +12,27 @@ use plants::Domain;
 use self::expected::{Expected, FACTOR_OF_A_BAND, beyond_chance, transform};
 use crate::{Bin, Failures};
 
-/// Windows and bins of one kind.
+/// Number of windows, and of bins of one kind.
 const BINS: usize = 12;
-/// Bins with fewer samples are not judged.
+/// Bins with fewer samples are not tested.
 const FEWEST: usize = 8;
 
-/// One record as a model sees it; all series are as long as `time`.
+/// One record with the signals of a model; all series are as long as `time`.
 #[derive(Debug, Clone, Copy)]
 pub struct Series<'a> {
     /// The record's name.
     pub name: &'a str,
     /// Sampling instants, rising \[s\].
     pub time: &'a [f64],
-    /// The input that the residual is shown against \[`input_unit`\]; empty where the model has none.
+    /// The input for the plots and bins of the residual \[`input_unit`\]; empty if the model has none.
     pub input: &'a [f64],
-    /// What the model gives \[`output_unit`\].
+    /// Output of the model \[`output_unit`\].
     pub model: &'a [f64],
-    /// Measured minus model, NaN where nothing was measured \[`output_unit`\].
+    /// Measured minus model, NaN without a measurement \[`output_unit`\].
     pub residual: &'a [f64],
 }
 
-/// What is judged, against which noise, in which units.
+/// The residual to locate, its noise model, and its units.
 #[derive(Debug, Clone, Copy)]
 pub struct Located<'a> {
     /// At least one record.
@@ -43,9 +43,9 @@ pub struct Located<'a> {
     pub output_unit: &'a str,
     /// Unit of the input.
     pub input_unit: &'a str,
-    /// How times are said.
+    /// Format of times.
     pub clock: &'a Clock,
-    /// What things are called.
+    /// Physical domain, which determines the words.
     pub domain: Domain,
 }
 
@@ -69,7 +69,7 @@ fn bin(from: f64, to: f64, values: impl Iterator<Item = f64>, expected: &Expecte
     }
 }
 
-/// Bins of equal width of the residual by another signal.
+/// Bins of equal width of the residual as a function of another signal.
 fn by(signal: &[f64], residual: &[f64], expected: &Expected) -> Vec<Bin> {
     let (low, high) = signal
         .iter()
@@ -122,10 +122,10 @@ fn by_direction(rate: &[f64], residual: &[f64], expected: &Expected) -> Vec<Bin>
     ]
 }
 
-/// Octave bands of the residual's periodogram, the root mean square in each; the longest record sets the bands, and
-/// each counts by its samples.
+/// Octave bands of the residual's periodogram, the root mean square in each; the longest record determines the bands, and each record is
+/// weighted by its samples.
 fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
-    /// One line of one record: its frequency, its part of the mean square, and the noise's.
+    /// One spectral line of one record: its frequency, its share of the mean square, and that of the noise.
     struct Line(f64, f64, f64);
     let present = |one: &Series| one.residual.iter().filter(|e| !e.is_nan()).count();
     let samples: usize = series.iter().map(present).sum();
@@ -136,9 +136,9 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
         let interval = (one.time[n - 1] - one.time[0]) / (n - 1) as f64;
         let step = 1.0 / (interval * n as f64);
         lowest = lowest.min(step);
-        // Both signs of a frequency count.
+        // Positive and negative frequency are counted.
         let part = 2.0 / samples as f64;
-        // A missing sample shows no line, and what is there stands for it.
+        // Missing samples are left out, and the other samples are scaled accordingly.
         let present = present(one);
         let zeroed: Vec<f64> = one
             .residual
@@ -187,7 +187,7 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
     bands
 }
 
-/// Where the model fails: windows record by record, the rest over all records together.
+/// Regions where the model fails: windows record by record, the others over all records together.
 #[must_use]
 pub fn locate(located: &Located) -> Failures {
     let Located { series, noise, .. } = *located;
@@ -206,7 +206,7 @@ pub fn locate(located: &Located) -> Failures {
                 }),
         );
     }
-    // Where samples of several records come together, those of the longest are tied the most.
+    // For samples from several records, the correlation of the longest record is used.
     let Some(longest) = expected.iter().max_by_key(|expected| expected.lines.len()) else {
         return Failures::default();
     };

@@ -1,4 +1,4 @@
-//! Where a model fails, in sentences.
+//! Sentences about where a model fails.
 
 use super::Located;
 use crate::{Bin, Failures};
@@ -11,7 +11,7 @@ pub(super) fn sentences(located: &Located, residual: &[f64], failures: &Failures
     let level = located.domain.level_words("level");
     let share = |bin: &Bin| bin.rms * bin.rms * bin.count as f64 / total.max(f64::MIN_POSITIVE);
     let mut found: Vec<(f64, String)> = Vec::new();
-    // A bin stands out where it holds more of the error than of the samples.
+    // A bin stands out if its share of the error exceeds its share of the samples.
     let mut worst = |bins: &[Bin], what: &dyn Fn(&Bin) -> String| {
         let samples: usize = bins.iter().map(|bin| bin.count).sum();
         let best = bins
@@ -74,7 +74,7 @@ pub(super) fn sentences(located: &Located, residual: &[f64], failures: &Failures
     }
     if sentences.is_empty() {
         sentences.push(format!(
-            "nowhere in particular: no window, {level}, flow or direction stands out of the noise"
+            "no region stands out: in no window, {level}, flow or direction does the error exceed the noise"
         ));
     }
     sentences

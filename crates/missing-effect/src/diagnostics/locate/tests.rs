@@ -6,7 +6,7 @@ use ct_signals::noise;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Time and a level that swings.
+/// Time and an oscillating level.
 fn rig(n: u32) -> (Vec<f64>, Vec<f64>) {
     let time: Vec<f64> = (0..n).map(f64::from).collect();
     let model = time.iter().map(|t| 10.0 + 5.0 * (t / 40.0).sin()).collect();
@@ -58,7 +58,7 @@ fn a_failure_at_high_level_is_found_where_it_is() {
         .collect();
     let failures = located(&ArModel::white(0.05), &[(&time, &model, &residual)]);
     for bin in &failures.by_level {
-        // The failing range begins at 14; a bin of 0.83 reaches across it.
+        // The failing range begins at 14; a bin of 0.83 extends over this value.
         assert_eq!(bin.fails, bin.to > 14.0 + 0.05, "{bin:?}");
     }
     assert!(
@@ -94,7 +94,7 @@ fn noise_of_any_colour_fails_nowhere() {
     }
 }
 
-/// The same size of noise, but of another spectrum: only the bands show it.
+/// Noise of the same variance, but with another spectrum: only the frequency bands show it.
 #[test]
 fn a_band_that_the_noise_does_not_fill_fails() {
     let (time, model) = rig(1000);
@@ -114,7 +114,7 @@ fn a_band_that_the_noise_does_not_fill_fails() {
     let quick = located(&process, &[(&time, &model, &swing(3.0))]);
     let said = quick.sentences.join("; ");
     assert!(said.contains("most at periods of 2 to 4 s"), "{said}");
-    // Where the noise itself is large a swing of that size is nothing.
+    // Where the noise itself is large an oscillation of that size is nothing.
     assert_eq!(
         failing(&located(&process, &[(&time, &model, &swing(300.0))])),
         0

@@ -1,4 +1,4 @@
-//! The knots of a polyline: where the records hold values of a variable.
+//! Knots of a polyline: distributed over the values of a variable in the records.
 
 use greybox::{at_rest, commands};
 use plants::{Simulator, Variable};
@@ -9,7 +9,7 @@ use crate::{Error, fit::node::Node};
 /// Knots of a polyline.
 const KNOTS: usize = 16;
 
-/// The values that a variable takes along the smoothed path, over all records, in rising order.
+/// Sorted values of a variable along the smoothed path, over all records.
 pub(super) fn visited(
     node: &Node,
     smoothed: &Smoothed,
@@ -55,7 +55,7 @@ pub(super) fn visited(
     Ok(values)
 }
 
-/// Knots over the range that is visited: half way between evenly over the range and evenly over the samples.
+/// Knots over the visited range: a compromise between equal distances and equal numbers of samples.
 pub(super) fn knots(sorted: &[f64]) -> Vec<f64> {
     let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
     let (low, high) = (at(0.002), at(0.998));

@@ -1,4 +1,4 @@
-//! The shape of the unknown: what is missing where the catalogue does not explain it.
+//! The unexplained error: the missing term, if the catalogue does not explain it.
 //!
 //! 1. The missing term as a path in time with its band, at each place of the chain (`smooth.rs`); the likelihood picks the
 //!    place.
@@ -24,17 +24,17 @@ use crate::{Error, PlaceLikelihood, Share, Unknown, Window, fit::node::Node};
 
 /// Half-width of a 95 % band in standard errors.
 const BAND: f64 = 1.96;
-/// A path is shown where its log-likelihood exceeds that of none that moves by this.
+/// A path is shown if its log-likelihood exceeds that of a constant by this.
 const MOVES: f64 = 5.0;
-/// Places whose log-likelihood lies within this of the best are not told apart by it.
+/// Places with log-likelihoods within this distance of the best are not distinguished.
 pub(crate) const SAME_PLACE: f64 = 10.0;
-/// A variable is named where it predicts clearly more than this share of the missing term on unseen data: what depends on it
-/// alone is predicted nearly in full, and a record that holds few values of the command ties each of them to a time ...
+/// A variable is named if it predicts clearly more than this share of the missing term on unseen data: a function of this variable alone is
+/// predicted nearly in full, and in a record with few values of the command each value belongs to a certain time ...
 const NAMED: f64 = 0.8;
-/// ... by so many standard errors.
+/// ... by this number of standard errors.
 const CLEARLY: f64 = 1.64;
 
-/// The name of a place, as files have it.
+/// The name of a place in files.
 fn place_name(structure: &Structure, spot: Spot) -> String {
     let plant = structure.plant;
     match spot.place {
@@ -47,11 +47,11 @@ fn place_name(structure: &Structure, spot: Spot) -> String {
     }
 }
 
-/// What is left out where the time limit has passed.
-pub(crate) const PART: &str = "the shape of what is not explained";
+/// Step that is left out if the time limit has passed.
+pub(crate) const PART: &str = "the shape of the unexplained error";
 
-/// The missing term beside a fitted node; `None` where nothing moves, and where the time limit of its setup passes: what was looked at by
-/// then says nothing of the other places and variables.
+/// The missing term for a fitted model; `None` if no path is significant, or if the time limit passes, because partial results contain no
+/// information about the other places and variables.
 pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
     let structure = &node.setup.structure;
     let mut spots = vec![Spot {
@@ -92,8 +92,8 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
         .iter()
         .flat_map(|path| path.residual.iter().copied())
         .collect();
-    // A function of the level does not move as a random walk does, so the likelihood of one is weak evidence of the place
-    // against a curve that predicts unseen data: every place is tried.
+    // A function of the level is not a random walk, so the likelihood of a random walk is weaker evidence for a place than a curve that
+    // predicts unseen data: every place is tried.
     let candidates: Vec<(&Smoothed, Variable)> = smoothed
         .iter()
         .flat_map(|s| Variable::at(s.spot.place).iter().map(move |v| (s, *v)))
@@ -123,7 +123,7 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
         .into_iter()
         .next()
         .filter(|s| s.share - CLEARLY * s.share_error > NAMED);
-    // The pump and the first vessel are one balance, as far as the likelihood goes: then it is said to be the vessel's.
+    // If the likelihood does not distinguish the pump and the first vessel, the vessel is reported.
     let equal = |s: &&Smoothed| most - s.log_likelihood < SAME_PLACE;
     let Some(chosen) = (match &named {
         Some(shape) => smoothed.iter().find(|s| s.spot == shape.spot),
@@ -138,7 +138,7 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
     Ok(Some(report(node, places, shares, chosen, named)))
 }
 
-/// From the estimates to what is reported.
+/// Report of the estimates.
 fn report(
     node: &Node,
     places: Vec<PlaceLikelihood>,
@@ -220,7 +220,7 @@ fn report(
     }
 }
 
-/// Stretches in which the band does not hold zero, the strongest first.
+/// Intervals in which the band excludes zero, the strongest first.
 fn windows(begin: f64, time: &[f64], value: &[f64], error: &[f64]) -> Vec<Window> {
     let mut windows: Vec<(f64, Window)> = Vec::new();
     let clear = |i: usize| value[i].abs() > BAND * error[i];
@@ -230,7 +230,7 @@ fn windows(begin: f64, time: &[f64], value: &[f64], error: &[f64]) -> Vec<Window
         while i < time.len() && clear(i) && (value[i] > 0.0) == (value[from] > 0.0) {
             i += 1;
         }
-        // A single instant is one in twenty by chance.
+        // A single instant is significant by chance in one of twenty cases.
         if i > from + 1 {
             let sum: f64 = value[from..i].iter().sum();
             let mean = sum / (i - from) as f64;

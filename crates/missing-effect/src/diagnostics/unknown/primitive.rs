@@ -1,13 +1,13 @@
-//! The simple shape that comes nearest to a polyline, and the effects of the catalogue that leave such a shape.
+//! The simple function closest to a polyline, and the effects of the catalogue with such a shape.
 
 use nalgebra::{DMatrix, DVector};
 use plants::{Domain, EffectInfo, Place, Variable};
 
 use crate::{Primitive, result::SHAPES};
 
-/// A simple shape explains a polyline where it leaves less than this share of what the polyline tells.
+/// A simple function explains a polyline if its residual is below this share of the polyline's information.
 const LEFT: f64 = 0.2;
-/// What a location costs in the deviance, as in a likelihood ratio of one degree of freedom at 1 %.
+/// Penalty of a location in the deviance, as in a likelihood ratio test with one degree of freedom at 1 %.
 const LOCATION: f64 = 6.6;
 
 /// A family of shapes: value of the shape at a point, for a location.
@@ -63,8 +63,8 @@ const FAMILIES: [Family; SHAPES.len()] = [
     },
 ];
 
-/// The nearest simple shape in the metric of the information, which does not see what the plant's own parameters imitate;
-/// `None` where none comes near.
+/// The closest simple function, weighted by the information, in which directions that the plant's own parameters explain have no weight;
+/// `None` if none is close.
 pub(super) fn nearest(
     domain: Domain,
     (place, variable): (Place, Variable),
@@ -74,7 +74,7 @@ pub(super) fn nearest(
 ) -> Option<Primitive> {
     let a = DVector::from_row_slice(ordinates);
     let told = a.dot(&(information * &a));
-    // Nothing of it is beyond what the plant's own parameters imitate.
+    // The function is not significant beyond the part that the plant's parameters can explain.
     if told < LOCATION {
         return None;
     }
@@ -82,7 +82,7 @@ pub(super) fn nearest(
     let mut best: Option<(f64, f64, &Family, f64)> = None;
     for family in &FAMILIES {
         let in_time = variable == Variable::Time;
-        // A root or a parabola in time, and a swing in anything else, is no physics of a tank.
+        // A root or a parabola in time, or an oscillation in another variable, is no physics of a tank.
         if match family.name {
             "swing" => !in_time,
             "square root" | "parabola" => in_time,
@@ -110,7 +110,7 @@ pub(super) fn nearest(
             let columns = columns.columns(0, used).into_owned();
             let weighted = information * &columns;
             let normal = columns.tr_mul(&weighted);
-            // What the plant's parameters imitate tells nothing.
+            // The part that the plant's parameters can explain has no weight.
             let Ok(inverse) = normal.clone().pseudo_inverse(1e-9 * normal.amax()) else {
                 continue;
             };
@@ -131,7 +131,7 @@ pub(super) fn nearest(
     })
 }
 
-/// The effects that leave such a shape, of those that the domain offers.
+/// The effects with this shape, among those of the domain.
 fn leaves(domain: Domain, (place, variable): (Place, Variable), shape: &str) -> Vec<&'static str> {
     let known: &[&'static str] = match (place, variable, shape) {
         (Place::Vessel, Variable::Time, "step") => &["valve_step"],
@@ -166,7 +166,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// The nearest shape to a function at 13 knots that are known to 0.05 each.
+    /// The closest simple function to a function at 13 knots with standard errors of 0.05.
     fn of(variable: Variable, range: (f64, f64), f: impl Fn(f64) -> f64) -> Option<Primitive> {
         let knots: Vec<f64> = (0..13)
             .map(|i| range.0 + (range.1 - range.0) * f64::from(i) / 12.0)
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn what_the_plant_imitates_is_not_seen() {
-        // Any line is imitated: what is left of a parabola with a line on it is the parabola.
+        // The plant's parameters explain any straight line: only the parabola of a parabola with a line is left.
         let knots: Vec<f64> = (0..13).map(f64::from).collect();
         let lines = DMatrix::from_fn(13, 2, |i, j| if j == 0 { 1.0 } else { i as f64 });
         let project = DMatrix::identity(13, 13)

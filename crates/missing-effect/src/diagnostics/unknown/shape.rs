@@ -1,5 +1,5 @@
-//! What the missing term depends on: a polyline in each variable, fitted with the plant's parameters, and the share of the
-//! missing term that it predicts where it has not been fitted.
+//! Variable of the missing term: a polyline in each variable, fitted with the plant's parameters, and its share of explained variance on
+//! data that were not fitted.
 //!
 //! A flexible curve fits anything, and a level that drifts makes every function of time one of the level. So the share is
 //! counted on parts of the record that the curve has not seen: a function of the level holds there too, a function of
@@ -27,14 +27,13 @@ use crate::{
 
 /// Parts of the data that are left out in turn, each without a gap.
 const PARTS: usize = 10;
-/// Directions of the ordinates that hold less of the information than this share are the plant's own.
+/// Directions of the ordinates with less than this share of the information are explained by the plant's parameters.
 const DETERMINED: f64 = 1e-4;
-/// Before the fit an ordinate is as large as its neighbour to within the smoothed term's root mean square, and zero to within
-/// so many times that ...
+/// Prior of an ordinate: equal to its neighbour within the smoothed term's root mean square, and zero within this multiple of it ...
 const SIZES: f64 = 3.0;
-/// ... and a parameter of the plant is known to within this part of itself.
+/// ... and a parameter of the plant is known to within this share of its value.
 const LOOSE: f64 = 0.5;
-/// Steps of the fit, and the fall of its cost that is too small for another.
+/// Largest number of steps of the fit, and least fall of its cost for another step.
 const ROUNDS: usize = 30;
 const ENOUGH: f64 = 1e-6;
 
@@ -44,18 +43,18 @@ pub(super) struct Shape {
     pub spot: Spot,
     pub variable: Variable,
     pub knots: Vec<f64>,
-    /// Without what the plant's own parameters imitate.
+    /// Ordinates without the part that the plant's own parameters explain.
     pub ordinates: Vec<f64>,
-    /// The inverse of the ordinates' covariance; singular where the plant's parameters imitate them.
+    /// The inverse of the ordinates' covariance; singular in directions that the plant's parameters explain.
     pub information: DMatrix<f64>,
     pub covariance: DMatrix<f64>,
-    /// Share of the missing term that it predicts on unseen data, with its standard error.
+    /// Share of the missing term that the polyline predicts on unseen data, with its standard error.
     pub share: f64,
     pub share_error: f64,
 }
 
-/// The polyline in a variable at the place of a smoothed forcing; `None` where the variable hardly moves or the fit fails.
-/// `possible`: what the most likely forcing leaves of the residual.
+/// The polyline in a variable at the place of a smoothed forcing; `None` if the variable hardly changes or the fit fails. `possible`: the
+/// residual with the most likely forcing.
 pub(super) fn shape(
     node: &Node,
     smoothed: &Smoothed,
@@ -88,7 +87,7 @@ pub(super) fn shape(
         .with_structure(node.setup.structure.with_term(term)?)?;
     let mut start = node.fit.x.clone();
     start.splice(own..own, vec![0.0; k]);
-    // An ordinate is as large as the smoothed term is, give or take.
+    // An ordinate has about the size of the smoothed term.
     let (mut sum, mut count) = (0.0, 0.0);
     for value in smoothed.paths.iter().flat_map(|path| &path.value) {
         sum += value * value;
@@ -106,7 +105,7 @@ pub(super) fn shape(
         .iter()
         .filter(|&&i| i < setup.parameter_count())
         .count();
-    // The ordinates' columns, and those of everything else.
+    // The ordinates' columns, and the other columns.
     let (mut at, mut others) = (Vec::new(), Vec::new());
     for (column, &position) in setup.free().iter().enumerate() {
         if (own..own + k).contains(&position) {
@@ -162,7 +161,7 @@ pub(super) fn shape(
     }))
 }
 
-/// A matrix that rounding alone would leave singular.
+/// A matrix that is singular up to rounding.
 fn regularised(mut normal: DMatrix<f64>) -> DMatrix<f64> {
     for i in 0..normal.nrows() {
         normal[(i, i)] *= 1.0 + 1e-9;
@@ -176,7 +175,7 @@ fn x_free(setup: &Setup, x: &[f64]) -> DVector<f64> {
     DVector::from_iterator(setup.free().len(), setup.free().iter().map(|&i| x[i]))
 }
 
-/// What is known of the free entries beside the records, each with its column.
+/// Priors of the free entries, each with its column.
 fn priors(setup: &Setup) -> Vec<(usize, PriorValue)> {
     let known = setup.prior_values();
     let column = |(column, &entry): (usize, &usize)| {
@@ -191,13 +190,13 @@ pub(super) struct Fit {
     pub x: Vec<f64>,
     j: DMatrix<f64>,
     residual: DVector<f64>,
-    /// Mean and weights of what is known of the free entries before: an ordinate is near zero and nearer to its neighbours,
-    /// a parameter of the plant near the believed model's fit, and near its side measurement where there is one.
+    /// Mean and weights of the priors of the free entries: an ordinate is near zero and nearer to its neighbours, a parameter of the plant
+    /// near the believed model's fit, and near its side measurement if there is one.
     prior: (DVector<f64>, DMatrix<f64>),
 }
 
-/// Least squares with a prior, by Levenberg and Marquardt's steps. Without a prior the plant's parameters and the ordinates
-/// would run off together, since the ones imitate the others. `None` too where the time limit passes.
+/// Least squares with a prior, by the Levenberg-Marquardt method. Without a prior the plant's parameters and the ordinates would diverge
+/// together, because they are collinear. `None` also if the time limit passes.
 pub(super) fn fit(
     setup: &Setup,
     start: Vec<f64>,
@@ -218,7 +217,7 @@ pub(super) fn fit(
     let mut x = start;
     let (mut j, mut residual) = rows(&x)?;
     let mut damping = 1e-2;
-    // What is known before, as a weight on the squares of the departures, in units of the residual's variance.
+    // Prior weights on the squared deviations, in units of the residual's variance.
     let known = {
         let count = setup.parameter_count();
         let mut known = DMatrix::zeros(mean.len(), mean.len());
@@ -238,7 +237,7 @@ pub(super) fn fit(
                 known[(column, column)] += inverse(LOOSE * mean[column].abs());
             }
         }
-        // Two Gaussian readings of an entry are one, at their weighted mean.
+        // Two Gaussian measurements of an entry are equivalent to one at their weighted mean.
         for (column, prior) in priors(setup) {
             let (loose, weight) = (known[(column, column)], inverse(prior.std_error));
             mean[column] = (loose * mean[column] + weight * prior.value) / (loose + weight);
@@ -296,10 +295,10 @@ pub(super) fn fit(
     })
 }
 
-/// The share of the missing term that is predicted on parts that are left out in turn, and its standard error.
+/// The predicted share of the missing term on parts that are left out in turn, and its standard error.
 ///
 /// The model is linear about its fit. An ordinate that only the left-out part has visited is near its neighbours'; initial
-/// states stay. A part counts for nothing at worst: what no other part has visited is no evidence against a variable.
+/// states stay. A part counts as zero at worst: values that no other part has visited are no evidence against a variable.
 /// `possible`: the residual with the most likely forcing; `states`: from which column on there are initial states.
 fn unseen(
     node: &Node,
@@ -325,8 +324,8 @@ fn unseen(
     for part in 0..PARTS {
         let (from, to) = (n * part / PARTS, n * (part + 1) / PARTS);
         let (rows, wanted) = (j.rows(from, to - from), target.rows(from, to - from));
-        // Nothing next to the part is used either: the process remembers, and a command that is held is one visit, however
-        // many samples it lasts.
+        // The neighbourhood of the part is left out too: the process has memory, and a command that is held is a single observation,
+        // however many samples it lasts.
         let margin = (to - from) / 2;
         let (first, last) = (from.saturating_sub(margin), (to + margin).min(n));
         let (hidden, unknown) = (

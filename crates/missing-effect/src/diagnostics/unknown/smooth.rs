@@ -5,10 +5,10 @@
 //! slow. The parameters stay at their fit; `w(t_0)` and the initial states are free.
 //!
 //! **Estimate** This is the extended Kalman filter with the Rauch-Tung-Striebel smoother, written for the whole record at
-//! once: the smoothed states of a linear system with Gaussian noise are the solution of one least squares problem, and
-//! the filter is a way to solve it. Here it is solved by Cholesky, linearised anew about each solution. So dead
-//! times, lags and hystereses keep their memory, for which a filter of the levels alone has no state, and the derivatives are
-//! those of the simulation. `lambda = sigma^2/q` maximises the restricted likelihood, `sigma` in closed form.
+//! once: the smoothed states of a linear system with Gaussian noise are the solution of one least squares problem, and the filter is a way
+//! to solve it. Here it is solved by Cholesky, linearised again about each solution. So dead times, lags and hystereses keep their memory,
+//! for which a filter of the levels alone has no state, and the derivatives are those of the simulation. `lambda = sigma^2/q` maximises the
+//! restricted likelihood, `sigma` in closed form.
 //!
 //! **Cost** `O(N M)` for the sensitivities and `O(N M^2)` for the normal matrix, `M` instants.
 //!
@@ -27,12 +27,12 @@ use crate::{
     fit::node::{Node, in_time},
 };
 
-/// Instants of a path: at most so many, and so many samples for each at least.
+/// Largest number of instants of a path, and least number of samples for each.
 const INSTANTS: usize = 96;
 const SAMPLES_PER_INSTANT: usize = 4;
-/// Times that the model is linearised about the path.
+/// Number of linearisations of the model about the path.
 const ROUNDS: usize = 3;
-/// The likelihood is searched over so many decades of lambda either way.
+/// Number of decades of lambda in either direction of the likelihood search.
 const DECADES: i32 = 8;
 
 /// A place of the chain.
@@ -51,7 +51,7 @@ pub(super) struct Path {
     pub covariance: DMatrix<f64>,
     /// Initial states with the path.
     pub states: Vec<f64>,
-    /// Measured minus model with the path, samples that are there in the order of time, times the weight of their output.
+    /// Measured minus model with the path: present samples in the order of time, times the weight of their output.
     pub residual: Vec<f64>,
 }
 
@@ -66,7 +66,7 @@ pub(super) struct Smoothed {
     pub variance: f64,
     /// Restricted log-likelihood at its largest.
     pub log_likelihood: f64,
-    /// By how much it exceeds that of a forcing that does not change.
+    /// Excess over the likelihood of a constant forcing.
     pub gain: f64,
 }
 
@@ -83,7 +83,7 @@ pub(super) fn carrier(spot: Spot, time: &[f64], value: &[f64]) -> Term {
     }
 }
 
-/// A record's normal equations in the steps of the path and the initial states.
+/// A record's normal equations for the steps of the path and the initial states.
 struct Block {
     normal: DMatrix<f64>,
     right: DVector<f64>,
@@ -94,7 +94,7 @@ struct Block {
 }
 
 impl Block {
-    /// The steps of the path, whose variance is limited: all but the first.
+    /// The steps of the path with a prior variance: all but the first.
     fn steps(&self) -> std::ops::Range<usize> {
         1..self.time.len()
     }
@@ -129,11 +129,11 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
         with.substeps = setup.substeps;
         let mut x = node.fit.x[..count].to_vec();
         x.extend(std::iter::repeat_n(0.0, m));
-        // The path is looked for on the measured command, which needs no controller.
+        // The path is estimated on the measured command, which needs no controller.
         x.extend(&node.fit.x[setup.plant_states_of(r)]);
         runs.push((with, x, time));
     }
-    // Noise is as large beside the path as it is beside the node, output by output.
+    // The noise is as large as for the node, output by output.
     let weights = &node.fit.weights;
     let mut best = None;
     for _ in 0..ROUNDS {
@@ -206,7 +206,7 @@ pub(super) fn smooth(node: &Node, spot: Spot) -> Result<Option<Smoothed>, Error>
     Ok(best)
 }
 
-/// The normal equations about `x`, in steps of the path and in states as they are (not as changes).
+/// The normal equations about `x`, for steps of the path and for values (not changes) of the states.
 fn block(
     setup: &greybox::Setup,
     x: &[f64],
@@ -225,7 +225,7 @@ fn block(
     let mut target = j.column(columns).into_owned();
     j = j.remove_column(columns);
     target += &j * DVector::from_vec(free);
-    // A step moves the path from its instant on.
+    // A step changes the path from its instant on.
     for i in (0..m - 1).rev() {
         let after = j.column(i + 1).into_owned();
         j.column_mut(i).zip_apply(&after, |a, b| *a += b);
@@ -239,7 +239,7 @@ fn block(
     })
 }
 
-/// Minus twice the restricted log-likelihood at a lambda, its constants left out, and the factors of the normal equations.
+/// Minus twice the restricted log-likelihood at a lambda, up to constants, and the factors of the normal equations.
 fn at(blocks: &[Block], lambda: f64) -> Option<Solution> {
     let (mut determinant, mut squares, mut freedom) = (0.0, 0.0, 0.0);
     let mut factors = Vec::with_capacity(blocks.len());
@@ -250,7 +250,7 @@ fn at(blocks: &[Block], lambda: f64) -> Option<Solution> {
             normal[(i, i)] += weight;
             determinant -= weight.ln();
         }
-        // Rounding alone keeps a column apart that nothing determines.
+        // A column that nothing determines is independent only by rounding.
         let trace = block.normal.diagonal().max();
         for i in 0..normal.nrows() {
             normal[(i, i)] += 1e-13 * trace;
@@ -275,7 +275,7 @@ fn at(blocks: &[Block], lambda: f64) -> Option<Solution> {
     })
 }
 
-/// The lambda of the largest likelihood: over the decades, then by golden section.
+/// The lambda of the largest likelihood: first over the decades, then by golden section.
 fn most_likely(blocks: &[Block]) -> Option<(f64, Solution)> {
     let scale: f64 = blocks
         .iter()

@@ -38,7 +38,7 @@ fn record(forcing: &[f64], rng: &mut ChaCha8Rng) -> Record {
     run(carrier(VESSEL, &instants, forcing), u, rng)
 }
 
-/// A record of a linear tank with a term, all of whose ordinates are as they stand.
+/// A record of a linear tank with a term that has fixed ordinates.
 fn run(term: Term, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
     let time: Vec<f64> = (0..N).map(|k| H * k as f64).collect();
     let e = noise::white(N, NOISE, rng);
@@ -50,7 +50,7 @@ fn run(term: Term, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
         references: Vec::new(),
         calendar: None,
     };
-    // Any output will do to have a structure; what is simulated on it does not depend on it.
+    // Any output suffices for a structure; the simulation does not depend on it.
     record.outputs[0].values = (0..N).map(|k| 10.0 + (k % 7) as f64).collect();
     let records = [record.clone()];
     let setup = setup(&records);
@@ -182,7 +182,7 @@ fn it_is_the_kalman_smoother() {
     let smoothed = smooth(&node, VESSEL).unwrap().unwrap();
     let residual = node.setup.residuals(&node.fit.x).unwrap().remove(0);
     let q = smoothed.variance / smoothed.lambda;
-    // A larger first covariance would be lost in the filter's rounding, a smaller one be seen.
+    // A larger first covariance would be lost by rounding in the filter, a smaller one would affect the result.
     let reference = kalman(&residual, q, smoothed.variance, 1e3);
     let path = &smoothed.paths[0];
     assert_eq!(reference.len(), path.value.len());
@@ -204,8 +204,8 @@ fn it_is_the_kalman_smoother() {
 #[test]
 fn the_band_holds_the_truth_as_often_as_it_says() {
     use rayon::prelude::*;
-    // A forcing that is a random walk, and two that are not: for what is smoother the band is wide, for a jump it is short of
-    // it at the jump alone.
+    // A forcing that is a random walk, and two that are not: for a smoother forcing the band is too wide; for a step it is too narrow only
+    // at the step.
     let forcings: [(&str, RangeInclusive<f64>, Forcing); 3] = [
         ("random walk", 0.92..=0.98, |rng| walk(0.002, rng)),
         ("swing", 0.92..=1.0, |_| {
@@ -274,7 +274,7 @@ fn the_band_of_a_shape_holds_the_truth_as_often_as_it_says() {
             let shape = shape(&node, &smoothed, Variable::Level, path)
                 .unwrap()
                 .unwrap();
-            // The truth too without what the plant's own parameters imitate.
+            // The true function too without the part that the plant's own parameters explain.
             let truth = nalgebra::DVector::from_iterator(
                 shape.knots.len(),
                 shape.knots.iter().map(|h| wave(*h)),
@@ -297,8 +297,8 @@ fn the_band_of_a_shape_holds_the_truth_as_often_as_it_says() {
     assert!(named >= 22, "{named}");
 }
 
-/// A side measurement counts in the fit of a polyline too: an ordinate of an unknown in the balance imitates the offset, which only the side
-/// measurement tells.
+/// A side measurement is included in the fit of a polyline too: an ordinate of an unknown term in the balance has the same effect as the
+/// offset, and only the side measurement distinguishes them.
 #[test]
 fn a_side_measurement_holds_its_parameter_in_the_fit_of_a_shape() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);

@@ -42,7 +42,7 @@ fn gaps_are_said_and_bridged_or_waited_out() {
     assert!(matches!(monitor.progress(), Progress::Watching { .. }));
 }
 
-/// A row whose time lies far ahead, or a clock that begins anew, makes the monitor deaf for a hundred rows and no longer.
+/// A row whose time lies far ahead, or a clock that starts again, makes the monitor deaf for a hundred rows and no longer.
 #[test]
 fn a_clock_that_goes_back_is_followed() {
     let rows = Tank {
@@ -83,7 +83,7 @@ fn another_sampling_interval_is_learned_anew() {
         ..Tank::default()
     }
     .run();
-    // From row 2000 on every third row only.
+    // From row 2000 on, every third row only.
     let kept: Vec<Row> = rows
         .iter()
         .enumerate()

@@ -5,7 +5,7 @@ use monitor::{Alarm, Monitor, Notice, Progress, Row, Settings, State, Step};
 use super::{Tank, first_and_last, model};
 use crate::support::{alarms, all, new, notices};
 
-/// The rows without the readings in which the command steps, and so many behind each.
+/// The rows without the readings at steps of the command, and a number after each.
 fn without_steps(rows: &[Row], behind: usize) -> Vec<Row> {
     let mut lost = rows.to_vec();
     for k in 1..rows.len() {
@@ -31,7 +31,7 @@ fn the_command_of_a_row_counts_where_its_reading_is_lost() {
         assert_eq!(alarms(&steps), Vec::<&Alarm>::new());
         let lost = steps.iter().filter(|step| step.lost[0].is_some()).count();
         assert!(lost > 100, "{lost}");
-        // What was learned and what is said of the readings that are left is what it was with all of them.
+        // The learned model and the messages about the other readings are the same as with all readings.
         let whole = all(&mut new(model()), &rows);
         for (step, whole) in steps.iter().zip(&whole).skip(2000) {
             let (Some(said), Some(of_all)) = (step.innovations[0], whole.innovations[0]) else {
@@ -103,7 +103,7 @@ fn a_state_with_lost_readings_goes_on_where_it_was() {
         let text = serde_json::to_string(&before.state()).unwrap();
         let state: State = serde_json::from_str(&text).unwrap();
         let mut restored = Monitor::restore(model(), Settings::default(), state).unwrap();
-        // A NaN in what is said is unlike itself: in words.
+        // A NaN differs from itself, so the comparison uses text.
         let words = |steps: &[Step]| format!("{steps:?}");
         assert_eq!(words(&all(&mut restored, &rows[at..])), words(&steps[at..]));
     }

@@ -47,7 +47,7 @@ fn bad_rows_change_nothing() {
     assert_eq!(monitor.state(), clean.state());
 }
 
-/// Why a first row of input and output is refused, beside one that is taken.
+/// Reason why a first row of input and output is rejected, next to an accepted one.
 pub(super) fn refused(model: Model, row: [f64; 2], taken: [f64; 2]) -> Refused {
     let mut monitor = new(model);
     let row_of = |[input, output]: [f64; 2]| Row::new(0.0, input, &[output]);

@@ -5,7 +5,7 @@ use monitor::{Error, Monitor, Settings, State};
 use super::{Tank, model};
 use crate::support::{alarms, all, new};
 
-/// Saved and restored in every phase, by way of text, it goes on bit for bit.
+/// Saved and restored in every phase as text, the monitor continues bit for bit.
 #[test]
 fn a_restored_monitor_goes_on_as_if_nothing_had_happened() {
     let tank = Tank {
@@ -56,7 +56,7 @@ fn a_state_of_another_model_or_a_damaged_one_is_refused() {
     else {
         panic!("another area was taken");
     };
-    // Each number that counts something, spoilt.
+    // Each count in the state, corrupted.
     let text = serde_json::to_value(&state).unwrap();
     for (pointer, value) in [
         ("/checkpoint/judged", 1_000_000.into()),

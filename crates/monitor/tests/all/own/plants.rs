@@ -115,7 +115,7 @@ impl Plant {
 
 pub(super) const HEATERS_TRUE: [f64; 6] = [20.0, 0.25, 0.4, 0.3, 0.6, 0.55];
 
-/// What is known of the block: without its capacity the other parameters have no scale.
+/// Known constants of the block: without its capacity the other parameters have no scale.
 pub(crate) fn own(model: &Model) -> OwnModel<'_> {
     let mut own = OwnModel::new(model);
     if model.spec().name == "HeatedBlock" {
@@ -138,7 +138,7 @@ pub(crate) fn alarms(steps: &[Step]) -> Vec<&monitor::Alarm> {
     steps.iter().filter_map(|s| s.alarm.as_ref()).collect()
 }
 
-/// How many of the estimates hold the truth in their 95 % band.
+/// Number of estimates whose 95 % band contains the true value.
 pub(super) fn held(monitor: &Monitor, truth: &[f64]) -> usize {
     let estimates = monitor.estimates();
     let fitted: Vec<_> = estimates

@@ -25,7 +25,7 @@ impl Limits {
     /// All.
     pub const ALL: [Self; 3] = [Self::None, Self::Wide, Self::Sure];
 
-    /// Its name in tables.
+    /// Name in tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -51,7 +51,7 @@ pub struct Checked {
     pub bounds: Limits,
     /// Whether `C^/A0 - gamma/(2 c)` is strictly positive real inside them for all plants within 10 % of the true one.
     pub hold: bool,
-    /// The same in a sentence, with the place where they fail.
+    /// The result in a sentence, with the frequency of failure.
     pub says: String,
 }
 
@@ -89,7 +89,7 @@ mod tests {
             "{wide:?}"
         );
         assert!(sure.hold, "{sure:?}");
-        // nor are the wide ones for the constant gain, and this very plant
+        // nor are the wide ones for the constant gain, with this plant
         let plant = Bounds::new([1.0; 2], [1.0; 2]).unwrap();
         let wide = Limits::Wide.bounds().unwrap().unwrap();
         assert!(!check_filter_bounds(&wide, &plant, 0.0).unwrap().hold());

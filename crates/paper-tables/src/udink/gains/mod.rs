@@ -26,7 +26,7 @@ use crate::{Error, Progress, Stage};
 /// `a_1` (s), `a_2` (s^2), `b_0` of the plant.
 pub const TRUTH: [f64; 3] = [1.0, 1.0, 1.0];
 
-/// How many noises there are.
+/// Number of noises.
 const NOISES: usize = 20;
 
 /// Step and end of the runs without noise, s.
@@ -42,15 +42,15 @@ const NOISY: Grid = Grid {
 /// Points of a curve over time, about.
 const DRAWN: usize = 400;
 
-/// What multiplies the regressor and the filtered error.
+/// Gain of the regressor and the filtered error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum GainKind {
     /// The paper's (4.11): one matrix for theta^, another for c^.
     BlockDiagonal,
-    /// One matrix over theta^ and c^ (4.9b).
+    /// One matrix for theta^ and c^ (4.9b).
     Full,
-    /// A matrix that keeps its initial value.
+    /// A constant matrix.
     Constant,
 }
 
@@ -69,7 +69,7 @@ impl GainKind {
     }
 }
 
-/// One way to run the experiment.
+/// A variant of the experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Variant {
     /// The gain.
@@ -80,7 +80,7 @@ pub struct Variant {
     pub bounds: Limits,
 }
 
-/// All of them, the paper's gain first.
+/// All variants, the paper's gain first.
 #[must_use]
 pub fn variants() -> Vec<Variant> {
     let mut variants = Vec::new();
@@ -100,9 +100,9 @@ pub struct Row {
     /// The variant.
     #[serde(flatten)]
     pub variant: Variant,
-    /// Without noise: theta^ = (a_1 (s), a_2 (s^2), b_0) at 2000 s; `null` where the run failed.
+    /// Without noise: theta^ = (a_1 (s), a_2 (s^2), b_0) at 2000 s; `null` if the run failed.
     pub quiet_end: Option<[f64; 3]>,
-    /// With noise: largest error of theta^, mean over the last quarter of 1000 s; median of the noises, NaN (`null`) where all runs failed.
+    /// With noise: largest error of theta^, mean over the last quarter of 1000 s; median of the noises, NaN (`null`) if all runs failed.
     pub noisy_error: f64,
     /// 5 % of the noises lie below.
     pub noisy_q05: f64,
@@ -131,13 +131,13 @@ pub struct Gains {
     pub noises: usize,
     /// Result of the check of the wide and the sure bounds on c^.
     pub checked: Vec<Checked>,
-    /// One for each variant.
+    /// One row for each variant.
     pub rows: Vec<Row>,
     /// The counterexample to the paper's theorem.
     pub counterexample: Vec<Counterexample>,
 }
 
-/// Runs all variants on the same records; `seed`: what the noises are drawn from.
+/// Runs all variants on the same records; `seed`: seed of the noises.
 ///
 /// # Errors
 /// None in practice: all settings are fixed and sound.

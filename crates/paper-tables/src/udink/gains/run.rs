@@ -1,4 +1,4 @@
-//! One run of the stabilized output error with one of the gains.
+//! One run of the stabilised output error method with one of the gains.
 
 use ct_rls::{ContinuousRls, Euler, ExactHold, RecursiveEstimator, Weights};
 use nalgebra::{SMatrix, SVector};
@@ -22,7 +22,7 @@ const ETA: f64 = 0.01;
 pub(super) trait Watch: FnMut(usize, &[f64; 3], &dyn Fn() -> f64) {}
 impl<F: FnMut(usize, &[f64; 3], &dyn Fn() -> f64)> Watch for F {}
 
-/// One run; false where it failed: an update was refused, or P was no longer positive definite at the end.
+/// One run; false if it failed: an update was rejected, or P was no longer positive definite at the end.
 pub(super) fn run(
     variant: Variant,
     samples: &[Sample],

@@ -67,7 +67,7 @@ pub(super) fn samples(grid: Grid, noise_of: Option<(u64, usize)>) -> Result<Vec<
     Ok(samples)
 }
 
-/// `u` and `y, y', y''` at `t`, in closed form: each sine's stationary response, and what dies out.
+/// `u` and `y, y', y''` at `t`, in closed form: each sine's stationary response, and the transient.
 fn plant(t: f64) -> (f64, [f64; 3]) {
     let (decay, w0) = (0.5_f64, 0.75_f64.sqrt());
     let (mut u, mut y, mut slope) = (0.0, 0.0, 0.0);

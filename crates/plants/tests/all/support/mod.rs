@@ -10,16 +10,16 @@ use plants::{
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A plant at a set of believable numbers.
+/// A plant with realistic parameters.
 #[derive(Clone)]
 pub struct Case {
     pub structure: Structure,
     /// The plant's own parameters, then each effect's.
     pub theta: Vec<f64>,
-    /// Of each vessel, then what stood behind each lag.
+    /// Level of each vessel, then the output of each lag.
     pub levels: Vec<f64>,
     pub at_rest: f64,
-    /// What the second input is while the first one is this.
+    /// Second input for a given first input.
     pub second: fn(Command) -> Command,
     /// Nominal sampling interval \[s\].
     pub h: f64,
@@ -55,7 +55,7 @@ pub fn base(plant: Plant) -> Case {
             3.0,
         ),
         Plant::FirstOrder => (vec![2.2, 80.0], vec![11.0], [None; 3], 11.0, 3.0),
-        // T3 is measured; the heads stay a few centimetres either way.
+        // T3 is measured; the heads are a few centimetres in either direction.
         Plant::ThreeTank => (
             vec![3.4, 3.1, 9.1, 8.7, 12.0],
             vec![15.0, 11.5, 8.2],
@@ -84,7 +84,7 @@ pub fn base(plant: Plant) -> Case {
     }
 }
 
-/// The plant with a measured disturbance into a vessel: a quarter of what the pump brings, but for sign.
+/// The plant with a measured disturbance into a vessel: a quarter of the pump's flow, with either sign.
 pub fn disturbed(plant: Plant, vessel: usize, sign: f64) -> Case {
     let mut case = base(plant);
     let mut scales = case.structure.scales.clone();
@@ -125,8 +125,8 @@ pub fn placements(plant: Plant) -> Vec<Placed> {
 /// Effects whose output is a staircase of some parameter: its slope at a point says nothing, so they carry that of a chord.
 pub const STEPPED: [&str; 2] = ["stiction_backlash", "coarse_quantisation"];
 
-/// An effect that begins with a root at a level: a Runge-Kutta step across it is of order one and a half, and a difference
-/// across it is no derivative.
+/// An effect that begins with a root at a level: a Runge-Kutta step across the level is of order one and a half, and a difference across it
+/// is no derivative.
 pub fn begins_with_a_root(effects: &[Placed]) -> bool {
     effects.iter().any(|p| p.effect.id == "leak_at_height")
 }
@@ -184,7 +184,7 @@ pub fn interior(case: &Case, placed: Placed, info: &ParameterInfo) -> f64 {
     }
 }
 
-/// The same value, or the one that switches the effect off: absent for what has one, else the first start.
+/// The absent value of the parameter, or its first start if it has none.
 pub fn absent(info: &ParameterInfo) -> f64 {
     if info.absent.is_nan() {
         info.starts[0]
@@ -194,7 +194,7 @@ pub fn absent(info: &ParameterInfo) -> f64 {
 }
 
 impl Case {
-    /// With effects, their parameters as `value` says.
+    /// The case with effects and their parameters from `value`.
     pub fn with(
         &self,
         effects: &[Placed],
@@ -271,7 +271,7 @@ impl Case {
     }
 }
 
-/// What a second pump is told while the first one is told this.
+/// Second pump's command for a given first command.
 pub fn mirrored(command: Command) -> Command {
     let mirror = |u: f64| 9.8 - u;
     Command {
@@ -302,7 +302,7 @@ pub fn simulate<T: SimulatorNumber>(
         .collect()
 }
 
-/// How a record is sampled and driven.
+/// Sampling and input of a record.
 #[derive(Debug, Clone, Copy)]
 pub struct Drive {
     pub ramped: bool,
@@ -372,7 +372,7 @@ pub fn difference(a: &[f64], b: &[f64]) -> f64 {
         / scale
 }
 
-/// Random sets of `size` effects that may be on together.
+/// Random permitted sets of `size` effects.
 pub fn random_sets(plant: Plant, size: usize, count: usize, seed: u64) -> Vec<Vec<Placed>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let all = placements(plant);

@@ -11,7 +11,7 @@ use plants::Command;
 use self::equations::{Equations, PUMPS, SENSOR, SIDE};
 use super::Case;
 
-/// What a rate depends on beside the state: the time, whether each valve has made its step, whether each vessel spills.
+/// Discrete state of the rates: the time, whether each valve has stepped, whether each vessel overflows.
 #[derive(Clone, Copy)]
 struct Instant {
     t: f64,
@@ -22,7 +22,7 @@ struct Instant {
 /// The commands as functions of time, delayed and shaped, with their corners.
 struct Signal<'a> {
     equations: &'a Equations,
-    /// Of each pump: beginning, length and command of each interval.
+    /// For each pump: start, length and command of each interval.
     pieces: [Vec<(f64, f64, Command)>; 2],
 }
 
@@ -67,7 +67,7 @@ impl Signal<'_> {
         all
     }
 
-    /// The piece that arrives in the middle of a stretch.
+    /// The interval of the command that arrives in the middle of a step.
     fn piece(&self, pump: usize, middle: f64) -> Option<usize> {
         let t = middle - self.equations.pumps[pump].delay;
         let after = self.pieces[pump].partition_point(|&(begin, _, _)| begin <= t);
@@ -78,7 +78,7 @@ impl Signal<'_> {
 struct Stretch<'a, 'b> {
     signal: &'a Signal<'b>,
     piece: [Option<usize>; 2],
-    /// Each valve has made its step.
+    /// Whether each valve has stepped.
     late: [bool; 3],
 }
 
@@ -135,7 +135,7 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
         x[at] = e.command(pump, e.rests(pump));
     }
     x[SENSOR] = x[e.measured];
-    // What stood behind a lag decays for a sample before the record begins.
+    // The initial state of a lag decays for a sample before the record begins.
     let lags = [
         (PUMPS[0], e.pumps[0].lag),
         (PUMPS[1], e.pumps[1].lag),
@@ -201,7 +201,7 @@ pub fn run(case: &Case, input: &[(Command, f64)]) -> Vec<f64> {
 
 fn smooth(stretch: Stretch, x: [f64; 7], from: f64, to: f64) -> [f64; 7] {
     if to - from < 1e-9 {
-        // Two corners that rounding has parted: one Euler step is exact here.
+        // Two corners separated only by rounding: one Euler step is exact here.
         let (rates, _) = stretch.rates(&x, from, [false; 3]);
         return std::array::from_fn(|i| x[i] + rates[i] * (to - from));
     }
@@ -241,7 +241,7 @@ fn bisected(e: &Equations, stretch: &Stretch, mut x: [f64; 7], from: f64, to: f6
         }
         spilling
     };
-    // Whether the modes have been left by a state.
+    // Whether a state has left the present modes.
     let left = |x: [f64; 7], t: f64, spilling: [bool; 3]| {
         let net = stretch.rates(&x, t, spilling).1;
         (0..e.n).any(|i| {

@@ -1,4 +1,4 @@
-//! What several tests share.
+//! Shared parts of several tests.
 #![allow(dead_code, clippy::unwrap_used)]
 
 pub mod plant;

@@ -62,7 +62,7 @@ impl<const N: usize, const U: usize> Plant<N, U> {
         let u: [f64; U] = core::array::from_fn(|k| all(k as i32, false));
         let mut derivatives: [f64; N] = core::array::from_fn(|k| all(k as i32 + 1, true));
         let y = all(0, true);
-        // what is left of the model's equation by rounding goes to the highest one
+        // the rounding error of the model's equation is assigned to the highest derivative
         let mut rest = -y;
         rest += self.b.iter().zip(&u).map(|(b, u)| b * u).sum::<f64>();
         rest -= self.a[..N - 1]

@@ -32,7 +32,7 @@ pub struct State {
 pub struct Equations<'a> {
     pub entries: &'a [Entry],
     pub eta: [f64; 2],
-    /// What stands beside `P1` and `P2` where they multiply `M' W eps`: `(c_lambda/c_p) Lambda`.
+    /// Matrices added to `P1` and `P2` as factors of `M' W eps`: `(c_lambda/c_p) Lambda`.
     pub lambda: (Theta, Filter),
 }
 
@@ -55,7 +55,7 @@ impl Equations<'_> {
         slope
     }
 
-    /// After `dt` seconds in `steps`.
+    /// State after `dt` seconds in `steps`.
     pub fn after(&self, start: &State, dt: f64, steps: u32) -> State {
         let (mut at, h) = (*start, dt / f64::from(steps));
         for _ in 0..steps {

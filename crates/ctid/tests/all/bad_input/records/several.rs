@@ -50,7 +50,7 @@ fn an_output_without_any_sample() {
     }
 }
 
-/// Whatever the column is: the reading, the command or the time.
+/// For each column: the reading, the command or the time.
 #[test]
 fn a_record_of_missing_samples_alone() {
     for (column, header) in ["t [s]", "u [V]", "y [cm]"].iter().enumerate() {
@@ -107,7 +107,7 @@ fn a_clock_that_runs_backwards_between_files() {
         ],
     );
     place.succeeds("compare early.csv late.csv --model m.toml");
-    // A model of the user's own.
+    // A user's own model.
     place.write(
         "block.mo",
         "model Block\n  parameter Real k(min=0) = 0.1;\n  input Real u;\n  output Real y = x;\n  Real x(start=1);\nequation\n  der(x) = u - k*x;\nend Block;\n",
@@ -125,7 +125,7 @@ fn a_clock_that_runs_backwards_between_files() {
     );
 }
 
-/// Whether the record has dates or not: the model file is wrong.
+/// The model file is wrong, for records with and without dates.
 #[test]
 fn a_time_zone_that_does_not_exist() {
     let place = place();

@@ -5,13 +5,13 @@ use plants::{Command, Outlet, Plant};
 use super::super::Case;
 use super::Instant;
 
-/// A pump, and what acts on its command.
+/// A pump, and the effects on its command.
 #[derive(Clone, Copy)]
 pub(super) struct Pump {
     gain: f64,
     /// Change and time constant.
     warm_up: (f64, f64),
-    /// Width, jump and where in its band it begins.
+    /// Width, slip, and initial state of the stiction band.
     sticks: (f64, f64, f64),
     pub(super) delay: f64,
     pub(super) threshold: f64,
@@ -37,7 +37,7 @@ impl Default for Pump {
     }
 }
 
-/// Places of the states behind the levels: the pumps', the sensor's, a side tank's.
+/// Places of the states after the levels: the pumps', the sensor's, a side tank's.
 pub(super) const PUMPS: [usize; 2] = [3, 6];
 
 pub(super) const SENSOR: usize = 4;
@@ -201,7 +201,7 @@ impl Equations {
         limited + pump.bend * limited * (limited - self.input_range) / self.input_range
     }
 
-    /// The outflow of vessel `i` at a time, its level and the next vessel's given; `late`: after the step of its valve.
+    /// The outflow of vessel `i` at a time, for its level and the next vessel's; `late`: after the step of its valve.
     fn outflow(&self, i: usize, levels: &[f64], t: f64, late: bool) -> f64 {
         let feels = if i + 1 < self.n { self.backflow } else { 0.0 };
         let level = if self.width > 0.0 && i + 1 < self.n {
@@ -230,7 +230,7 @@ impl Equations {
         };
         let step = if late { self.step[i].0 } else { 0.0 };
         let valve = (1.0 + self.drift[i] * t / self.duration) * (1.0 + step);
-        // Linear and curved part are one outflow.
+        // Linear and nonlinear part form one outflow.
         valve * (own + self.laminar[i] * level + self.curvature[i] * curved)
     }
 
@@ -240,7 +240,7 @@ impl Equations {
         self.pumps[pump].gain * (1.0 + change * done(t) / done(self.duration))
     }
 
-    /// Where what a pump moves stands before the record begins.
+    /// Initial state of a pump's actuator.
     pub(super) fn rests(&self, pump: usize) -> f64 {
         let Pump {
             at_rest, sticks, ..
@@ -249,7 +249,7 @@ impl Equations {
         at_rest + begin * 0.5 * width * (1.0 + jump)
     }
 
-    /// The commands that act behind what sticks.
+    /// The commands after stiction.
     pub(super) fn moved(&self, pump: usize, input: &[(Command, f64)]) -> Vec<(Command, f64)> {
         let (width, jump, _) = self.pumps[pump].sticks;
         let (breaks, left) = (0.5 * width * (1.0 + jump), 0.5 * width * (1.0 - jump));

@@ -37,13 +37,8 @@
 //!     levels
 //! };
 //! let y = response(30.0).iter().zip(&noise).map(|(y, v)| y + v).collect();
-//! let record = Record {
-//!     name: "simulated".into(),
-//!     time: (0..n).map(|k| k as f64).collect(),
-//!     inputs: vec![Channel::new("u", "V", u.clone())],
-//!     outputs: vec![Channel::new("y", "cm", y)],
-//!     ..Record::default()
-//! };
+//! let (u, y) = (Channel::new("u", "V", u.clone()), Channel::new("y", "cm", y));
+//! let record = Record::sampled("simulated", 1.0, vec![u], vec![y]);
 //! record.validate()?;
 //!
 //! let residual = |time_constant| -> Vec<f64> {

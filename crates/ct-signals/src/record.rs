@@ -147,6 +147,24 @@ pub struct Record {
 }
 
 impl Record {
+    /// A record of evenly sampled channels that starts at time zero; `interval` in seconds. It has as many samples as the first input.
+    #[must_use]
+    pub fn sampled(
+        name: impl Into<String>,
+        interval: f64,
+        inputs: Vec<Channel>,
+        outputs: Vec<Channel>,
+    ) -> Self {
+        let samples = inputs.first().map_or(0, |input| input.values.len());
+        Self {
+            name: name.into(),
+            time: (0..samples).map(|k| interval * k as f64).collect(),
+            inputs,
+            outputs,
+            ..Self::default()
+        }
+    }
+
     /// The number of samples.
     pub fn len(&self) -> usize {
         self.time.len()

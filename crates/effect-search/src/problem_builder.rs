@@ -35,12 +35,9 @@ impl Problem {
     ///        C*der(T) = u - k*(T - 20);
     ///      end Block;",
     /// )?;
-    /// let record = Record {
-    ///     time: (0..100).map(f64::from).collect(),
-    ///     inputs: vec![Channel::new("u", "W", vec![10.0; 100])],
-    ///     outputs: vec![Channel::new("y", "degC", vec![20.0; 100])],
-    ///     ..Record::default()
-    /// };
+    /// let u = Channel::new("u", "W", vec![10.0; 100]);
+    /// let y = Channel::new("y", "degC", vec![20.0; 100]);
+    /// let record = Record::sampled("block", 1.0, vec![u], vec![y]);
     /// let problem = Problem::builder(spec.clone(), [record.clone()]).known("C", 48.0).build()?;
     /// assert_eq!(problem.known["C"], 48.0);
     ///

@@ -60,13 +60,8 @@
 //!     y.push(20.0 + decay * (y[k] - 20.0) + 2.0 * (1.0 - decay) * u[k]);
 //! }
 //! let v = noise::white(y.len(), 0.1, &mut ChaCha8Rng::seed_from_u64(1));
-//! let record = Record {
-//!     name: "tank".to_owned(),
-//!     time: (0..u.len()).map(|k| k as f64).collect(),
-//!     outputs: vec![Channel::new("y", "cm", y.iter().zip(v).map(|(y, v)| y + v).collect())],
-//!     inputs: vec![Channel::new("u", "V", u)],
-//!     ..Record::default()
-//! };
+//! let y = y.iter().zip(v).map(|(y, v)| y + v).collect();
+//! let record = Record::sampled("tank", 1.0, vec![Channel::new("u", "V", u)], vec![Channel::new("y", "cm", y)]);
 //!
 //! let found = identify(&record, &Request::new(Method::Srivc, Order { n: 1, m: 0 }))?;
 //! let a1 = &found.parameters[0];

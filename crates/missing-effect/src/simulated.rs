@@ -73,16 +73,16 @@ pub(crate) fn two_levels(seed: u64) -> Problem {
         simulator.advance(Command::held(u[k]), INTERVAL);
     }
     let [upper, lower] = levels;
-    let record = Record {
-        name: "simulated".to_string(),
-        time: (0..samples).map(|k| k as f64 * INTERVAL).collect(),
-        inputs: vec![Channel::new("u", "V", u)],
-        outputs: vec![
-            Channel::new("upper", "cm", upper),
-            Channel::new("lower", "cm", lower),
-        ],
-        ..Record::default()
-    };
+    let levels = vec![
+        Channel::new("upper", "cm", upper),
+        Channel::new("lower", "cm", lower),
+    ];
+    let record = Record::sampled(
+        "simulated",
+        INTERVAL,
+        vec![Channel::new("u", "V", u)],
+        levels,
+    );
     problem(plant, known, vec![record])
 }
 

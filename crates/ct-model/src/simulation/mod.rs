@@ -17,10 +17,12 @@ mod explicit;
 mod implicit;
 mod interval;
 mod memory;
+mod model;
 mod numbers;
 mod sliding;
 mod step;
 
+pub use self::model::Model;
 pub use self::numbers::SimulationNumber;
 
 use self::delays::{Delay, Delays};
@@ -30,8 +32,6 @@ use self::interval::MOST_STEPS;
 use self::step::{Drive, Interval, Step};
 use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
-use crate::spec::ModelSpec;
-use crate::tape::Tape;
 
 /// How a model is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,55 +52,6 @@ pub enum Method {
 pub struct NoSolution {
     /// When \[unit of the record's time\].
     pub time: f64,
-}
-
-/// A model that is ready to be simulated.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Model {
-    spec: ModelSpec,
-    tape: Tape,
-    exact: ExactSteps,
-}
-
-impl Model {
-    /// Compiles a model.
-    #[must_use]
-    pub fn new(spec: ModelSpec) -> Self {
-        let tape = Tape::compile(&spec);
-        let exact = if tape.delays.is_empty() && !spec.states.is_empty() {
-            spec.exact_steps()
-        } else {
-            ExactSteps::No
-        };
-        Self { spec, tape, exact }
-    }
-
-    /// What it was compiled from.
-    #[must_use]
-    pub fn spec(&self) -> &ModelSpec {
-        &self.spec
-    }
-
-    /// Its operations.
-    pub(crate) fn tape(&self) -> &Tape {
-        &self.tape
-    }
-
-    /// The values of its parameters as the text has them, in the order of [`ModelSpec::parameters`].
-    #[must_use]
-    pub fn parameters(&self) -> Vec<f64> {
-        let parameters = self.spec.parameters.iter();
-        parameters.map(|parameter| parameter.value).collect()
-    }
-
-    /// The initial values of the states as the text has them, of these parameters.
-    #[must_use]
-    pub fn starts<T: Scalar>(&self, parameters: &[T]) -> Vec<T> {
-        let mut registers = self.tape.registers(parameters);
-        self.tape.evaluate_with_guards(&mut registers);
-        let starts = self.tape.starts.iter();
-        starts.map(|&register| registers.values[register]).collect()
-    }
 }
 
 /// A simulation in progress.

@@ -20,13 +20,8 @@ fn record() -> Record {
             level += 0.1 * (4.0 * u - level - loss) / 60.0;
         }
     }
-    Record {
-        name: "record".to_string(),
-        time: (0..400).map(|k| 2.0 * f64::from(k)).collect(),
-        inputs: vec![Channel::new("u", "V", u)],
-        outputs: vec![Channel::new("y", "cm", y)],
-        ..Record::default()
-    }
+    let (u, y) = (Channel::new("u", "V", u), Channel::new("y", "cm", y));
+    Record::sampled("record", 2.0, vec![u], vec![y])
 }
 
 #[test]

@@ -1,0 +1,88 @@
+//! A compiled model.
+
+use super::{NoSolution, Simulation};
+use crate::linearity::ExactSteps;
+use crate::scalar::Scalar;
+use crate::spec::ModelSpec;
+use crate::tape::Tape;
+
+/// A model that is ready to be simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    spec: ModelSpec,
+    pub(super) tape: Tape,
+    pub(super) exact: ExactSteps,
+}
+
+impl Model {
+    /// Compiles a model.
+    #[must_use]
+    pub fn new(spec: ModelSpec) -> Self {
+        let tape = Tape::compile(&spec);
+        let exact = if tape.delays.is_empty() && !spec.states.is_empty() {
+            spec.exact_steps()
+        } else {
+            ExactSteps::No
+        };
+        Self { spec, tape, exact }
+    }
+
+    /// What it was compiled from.
+    #[must_use]
+    pub fn spec(&self) -> &ModelSpec {
+        &self.spec
+    }
+
+    /// Its operations.
+    pub(crate) fn tape(&self) -> &Tape {
+        &self.tape
+    }
+
+    /// The values of its parameters as the text has them, in the order of [`ModelSpec::parameters`].
+    #[must_use]
+    pub fn parameters(&self) -> Vec<f64> {
+        let parameters = self.spec.parameters.iter();
+        parameters.map(|parameter| parameter.value).collect()
+    }
+
+    /// The initial values of the states as the text has them, of these parameters.
+    #[must_use]
+    pub fn starts<T: Scalar>(&self, parameters: &[T]) -> Vec<T> {
+        let mut registers = self.tape.registers(parameters);
+        self.tape.evaluate_with_guards(&mut registers);
+        let starts = self.tape.starts.iter();
+        starts.map(|&register| registers.values[register]).collect()
+    }
+
+    /// Simulates the model from its initial values, with evenly sampled inputs that are held; returns a series for each output.
+    ///
+    /// `parameters`: in the order of [`ModelSpec::parameters`]. `interval` \[the model's unit of time\]. `inputs`: a series for each input, of
+    /// equal length.
+    ///
+    /// # Errors
+    /// Where the simulation cannot go on.
+    ///
+    /// # Panics
+    /// Where the number of parameters or inputs is not the model's.
+    pub fn simulate(
+        &self,
+        parameters: &[f64],
+        interval: f64,
+        inputs: &[&[f64]],
+    ) -> Result<Vec<Vec<f64>>, NoSolution> {
+        assert_eq!(inputs.len(), self.spec.inputs.len(), "inputs");
+        let samples = inputs.iter().map(|input| input.len()).min().unwrap_or(0);
+        let mut simulation = Simulation::new(self, parameters, &self.starts(parameters), 0.0);
+        let mut read = vec![0.0; self.spec.outputs.len()];
+        let mut outputs = vec![Vec::with_capacity(samples); read.len()];
+        for k in 0..samples {
+            let row: Vec<f64> = inputs.iter().map(|input| input[k]).collect();
+            simulation.read(&row, &mut read);
+            for (output, reading) in outputs.iter_mut().zip(&read) {
+                output.push(*reading);
+            }
+            simulation.advance(&row, &row, interval * (k + 1) as f64)?;
+        }
+        Ok(outputs)
+    }
+}

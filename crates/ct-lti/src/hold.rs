@@ -2,6 +2,7 @@
 
 /// What a signal does between two samples. Sampling is exact for a signal that does just that.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Hold {
     /// `u[k]` stands from `t[k]` to `t[k+1]`: what a D/A converter puts out.
     #[default]
@@ -12,6 +13,7 @@ pub enum Hold {
 
 /// The past of a filter or a simulation before its first sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Start {
     /// All states are 0. Right where the process was at rest at 0; otherwise a jump at the first sample.
     #[default]

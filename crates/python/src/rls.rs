@@ -1,139 +1,17 @@
 //! Recursive least squares in continuous time.
 
-use ct_rls::{
-    ContinuousRls as Fixed, DynamicRls, Innovation, Outcome, RecursiveEstimator, Sample, Weights,
-};
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+mod online;
+
+use ct_rls::{Outcome, Weights};
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray,
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyBytes, PyTuple};
 
+use self::online::{Online, Others, online, restored};
 use crate::error;
-
-/// An estimator of any number of parameters; of few the crate's own for a number that is known when it is compiled, which is faster.
-trait Online: Send + Sync {
-    fn update(&mut self, phi: &[f64], y: f64, dt: f64) -> Innovation;
-    /// Over whole arrays; the estimates after each sample go to `theta`, where it is not empty, and the innovations to `epsilon`.
-    fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]);
-    fn theta(&self) -> Vec<f64>;
-    /// Row by row.
-    fn covariance(&self) -> Vec<Vec<f64>>;
-    fn health(&self) -> Result<ct_rls::Health, ct_rls::Error>;
-    fn boxed(&self) -> Box<dyn Online>;
-}
-
-impl<const P: usize> Online for Fixed<P> {
-    fn update(&mut self, phi: &[f64], y: f64, dt: f64) -> Innovation {
-        // Whoever calls this has counted them.
-        let phi = phi.first_chunk::<P>().copied().unwrap_or([f64::NAN; P]);
-        RecursiveEstimator::update(self, &Sample::new(phi, y), dt)
-    }
-
-    fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]) {
-        // A copy of its own, which the compiler keeps in registers where it can.
-        let mut own = self.clone();
-        let mut rows = theta.as_chunks_mut::<P>().0.iter_mut();
-        let samples = phi.as_chunks::<P>().0.iter().zip(y).zip(epsilon);
-        for (k, ((phi, y), epsilon)) in samples.enumerate() {
-            let step = if dt.len() > 1 { dt[k] } else { dt[0] };
-            let sample = Sample::new(*phi, *y);
-            *epsilon = RecursiveEstimator::update(&mut own, &sample, step).epsilon;
-            if let Some(row) = rows.next() {
-                row.copy_from_slice(RecursiveEstimator::theta(&own).as_slice());
-            }
-        }
-        *self = own;
-    }
-
-    fn theta(&self) -> Vec<f64> {
-        RecursiveEstimator::theta(self).as_slice().to_vec()
-    }
-
-    fn covariance(&self) -> Vec<Vec<f64>> {
-        let p = RecursiveEstimator::covariance(self);
-        let rows = p.row_iter().map(|row| row.iter().copied().collect());
-        rows.collect()
-    }
-
-    fn health(&self) -> Result<ct_rls::Health, ct_rls::Error> {
-        RecursiveEstimator::health(self)
-    }
-
-    fn boxed(&self) -> Box<dyn Online> {
-        Box::new(self.clone())
-    }
-}
-
-/// Of many parameters.
-#[derive(Clone)]
-struct Many(DynamicRls, Weights);
-
-impl Online for Many {
-    fn update(&mut self, phi: &[f64], y: f64, dt: f64) -> Innovation {
-        self.0.update_with(phi, y, dt, &self.1)
-    }
-
-    fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]) {
-        let p = self.theta().len();
-        let mut rows = theta.chunks_exact_mut(p);
-        let samples = phi.chunks_exact(p).zip(y).zip(epsilon).enumerate();
-        for (k, ((phi, y), epsilon)) in samples {
-            let step = if dt.len() > 1 { dt[k] } else { dt[0] };
-            *epsilon = self.0.update_with(phi, *y, step, &self.1).epsilon;
-            if let Some(row) = rows.next() {
-                row.copy_from_slice(self.0.theta().as_slice());
-            }
-        }
-    }
-
-    fn theta(&self) -> Vec<f64> {
-        self.0.theta().as_slice().to_vec()
-    }
-
-    fn covariance(&self) -> Vec<Vec<f64>> {
-        let p = self.0.covariance();
-        let rows = p.row_iter().map(|row| row.iter().copied().collect());
-        rows.collect()
-    }
-
-    fn health(&self) -> Result<ct_rls::Health, ct_rls::Error> {
-        self.0.health()
-    }
-
-    fn boxed(&self) -> Box<dyn Online> {
-        Box::new(self.clone())
-    }
-}
-
-/// The estimator of so many parameters.
-fn online(theta: &[f64], p: &[Vec<f64>], weights: Weights) -> PyResult<Box<dyn Online>> {
-    fn fixed<const P: usize>(
-        theta: &[f64],
-        p: &[Vec<f64>],
-        weights: Weights,
-    ) -> Result<Box<dyn Online>, ct_rls::Error> {
-        let matrix = SMatrix::<f64, P, P>::from_fn(|i, j| p[i][j]);
-        let theta = SVector::from_column_slice(theta);
-        Ok(Box::new(Fixed::<P>::new(theta, matrix, weights)?))
-    }
-    let made = match theta.len() {
-        1 => fixed::<1>(theta, p, weights),
-        2 => fixed::<2>(theta, p, weights),
-        3 => fixed::<3>(theta, p, weights),
-        4 => fixed::<4>(theta, p, weights),
-        5 => fixed::<5>(theta, p, weights),
-        6 => fixed::<6>(theta, p, weights),
-        n => {
-            let matrix = DMatrix::from_fn(n, n, |i, j| p[i][j]);
-            let many = DynamicRls::new(DVector::from_column_slice(theta), &matrix, weights);
-            many.map(|rls| Box::new(Many(rls, weights)) as Box<dyn Online>)
-        }
-    };
-    made.map_err(error::of_model)
-}
 
 /// Recursive least squares in continuous time with forgetting, whose matrix stays positive definite.
 ///
@@ -333,23 +211,40 @@ impl ContinuousRls {
         self.__copy__()
     }
 
-    /// What it is made of again, its matrix to rounding.
-    #[allow(clippy::type_complexity)]
-    fn __getnewargs_ex__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(
-        (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, f64),
-        Bound<'py, pyo3::types::PyDict>,
-    )> {
-        let weights = pyo3::types::PyDict::new(py);
-        weights.set_item("c", self.weights.c())?;
-        weights.set_item("gamma", self.weights.gamma())?;
-        let own = (self.theta(py), self.covariance(py)?, self.weights.eta());
-        Ok((own, weights))
+    /// As it stands, to be pickled; restored it goes on to the bit.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let others = Others {
+            size: self.size,
+            weights: self.weights,
+            outcome: self.outcome,
+        };
+        Ok(PyBytes::new(py, &self.rls.bytes(others)?))
     }
 
-    fn __getstate__(&self) {}
+    #[staticmethod]
+    fn from_bytes(content: &[u8]) -> PyResult<Self> {
+        let (others, rls) = restored(content)?;
+        let Others {
+            size,
+            weights,
+            outcome,
+        } = others;
+        Ok(Self {
+            rls,
+            size,
+            weights,
+            outcome,
+        })
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let restore = py.get_type::<Self>().getattr("from_bytes")?;
+        Ok((restore, (self.to_bytes(py)?,)))
+    }
 
     fn __repr__(&self) -> String {
         format!("<ctid.ContinuousRls theta = {:?}>", self.rls.theta())

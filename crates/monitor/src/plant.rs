@@ -21,7 +21,7 @@ const BEYOND: f64 = 1.01;
 /// A reading above so many times the tank's height is in another unit, or none; below it a sensor may be off, which is to be seen.
 const ABOVE: f64 = 1.5;
 
-impl<'a> From<Model> for Watched<'a> {
+impl From<Model> for Watched {
     fn from(model: Model) -> Self {
         Self(Arc::new(model))
     }
@@ -37,7 +37,7 @@ impl Model {
     }
 }
 
-impl<'a> Believed<'a> for Model {
+impl Believed for Model {
     fn check(&self) -> Result<(), Error> {
         if self.plant.pumps() > 1 {
             return Err(Error::TwoPumps {
@@ -121,12 +121,7 @@ impl<'a> Believed<'a> for Model {
         lanes(parameters)
     }
 
-    fn run(
-        &self,
-        learned: &Learned,
-        states: &[f64],
-        at_rest: f64,
-    ) -> Option<Box<dyn Running + 'a>> {
+    fn run(&self, learned: &Learned, states: &[f64], at_rest: f64) -> Option<Box<dyn Running>> {
         let structure = self.structure(learned.scales.clone()?).ok()?;
         let levels = states.get(..structure.plant.vessels())?;
         let (substeps, theta) = (learned.substeps, &learned.theta);

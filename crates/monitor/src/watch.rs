@@ -14,8 +14,8 @@ use crate::{
 };
 
 /// The running model; what it holds is rebuilt from rows, and never saved.
-pub(crate) struct Watch<'a> {
-    model: Box<dyn Model + 'a>,
+pub(crate) struct Watch {
+    model: Box<dyn Model>,
     /// The noise of each output: what whitens it, and one over its standard deviation.
     noises: Vec<(Whitener, f64)>,
     hold: Hold,
@@ -67,10 +67,10 @@ impl Said {
     }
 }
 
-impl<'a> Watch<'a> {
+impl Watch {
     /// From given states on; `None` where the learned numbers do not make a model.
     pub(crate) fn new(
-        model: &Watched<'a>,
+        model: &Watched,
         learned: &Learned,
         hold: Hold,
         states: &[f64],

@@ -15,7 +15,7 @@ use crate::{
 
 /// A model that can be watched; from a [`Model`](crate::Model) or an [`OwnModel`](crate::OwnModel).
 #[derive(Clone)]
-pub struct Watched<'a>(pub(crate) Arc<dyn Believed<'a> + 'a>);
+pub struct Watched(pub(crate) Arc<dyn Believed>);
 
 /// An alarm as it was raised, and when it is looked at again.
 #[derive(Debug, Clone, Copy)]
@@ -32,8 +32,8 @@ pub(crate) struct Raised {
     pub output: usize,
 }
 
-/// What the monitor asks of a model. States and simulations of its user's own model live as long as that, `'a`.
-pub(crate) trait Believed<'a>: Send + Sync {
+/// What the monitor asks of a model.
+pub(crate) trait Believed: Send + Sync {
     /// Why it cannot be watched.
     fn check(&self) -> Result<(), Error>;
     fn inputs(&self) -> usize;
@@ -55,8 +55,7 @@ pub(crate) trait Believed<'a>: Send + Sync {
     /// By how many of so many parameters, the first ones, derivatives are taken.
     fn lanes(&self, parameters: usize) -> usize;
     /// The learned model from these states on; `at_rest`: the first input before.
-    fn run(&self, learned: &Learned, states: &[f64], at_rest: f64)
-    -> Option<Box<dyn Running + 'a>>;
+    fn run(&self, learned: &Learned, states: &[f64], at_rest: f64) -> Option<Box<dyn Running>>;
     /// Puts the states that are read where they are read.
     fn put_readings(&self, states: &mut Each<f64>, readings: &Readings);
     /// The name of an output, of several.

@@ -18,10 +18,12 @@ mod implicit;
 mod interval;
 mod memory;
 mod numbers;
+mod shared;
 mod sliding;
 mod step;
 
 pub use self::numbers::SimulationNumber;
+pub use self::shared::SharedSimulation;
 
 use self::delays::{Delay, Delays};
 use self::exact::Exact;

@@ -16,7 +16,7 @@ use crate::{
     watch::as_learned,
 };
 
-impl Core<'_> {
+impl Core {
     /// Begins to learn anew.
     pub(super) fn begin(&mut self, every: usize) {
         self.now.phase = Phase::Learning {

@@ -154,7 +154,10 @@ impl Found for Proposal {
 }
 
 /// The effect of one of the two names, and the tank that it is to act in.
-pub(crate) fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Candidacy, Error> {
+///
+/// # Errors
+/// For a name that is no effect's, a tank that there is not, and an effect that is in the model, which stands in `file`.
+pub fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Candidacy, Error> {
     let (id, place) = match name.split_once(':') {
         Some((id, place)) => (id, Some(place)),
         None => (name, None),

@@ -107,7 +107,7 @@ def test_memory_of_monitors_stays_flat():
         pickle.loads(pickle.dumps(model.monitor())).update(*row)
         if k % 100 == 99:
             sizes.append(resident())
-    assert sizes[-1] - sizes[1] < 4 << 20, sizes
+    assert sizes[-1] - sizes[1] < 2 << 20, sizes
 
 
 @pytest.mark.parametrize("parameters", [1, 2, 3, 5, 8])

@@ -35,7 +35,7 @@ enum Of {
     Own {
         /// The model, its effects in it, with its values.
         text: String,
-        settings: OwnSettings,
+        settings: Box<OwnSettings>,
         time_unit: f64,
     },
     Tank {
@@ -163,7 +163,7 @@ impl Monitor {
         let spec = model.valued().map_err(|error| error::of(&error))?;
         let of = Of::Own {
             text: spec.to_string(),
-            settings: model.file.settings(),
+            settings: Box::new(model.file.settings()),
             time_unit,
         };
         Self::of(of, rows_between_false_alarms, learning_rows)

@@ -43,7 +43,7 @@ fn rows() -> Vec<Row> {
         .collect()
 }
 
-fn learned(rows: &[Row]) -> Monitor<'static> {
+fn learned(rows: &[Row]) -> Monitor {
     let model = Model::new(Plant::SingleTank, known());
     let mut monitor = Monitor::new(model, Settings::default(), Units::default()).unwrap();
     for row in &rows[..LEARNED] {

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from typing_extensions import Self
 
-    from ._tank import Known, Plant
+    from ._tank_model import Known, Plant
 
 #: How much time a search may take: 5 s, 40 s, 10 min.
 Effort = Literal["quick", "normal", "thorough"]
@@ -198,7 +198,7 @@ class Model:
         `known`, `start`, `priors` and `hold` are what a model file has under these names: `known={"area": 154.0}`. `effects` are in the model
         already, in the vessel that `where` names. Raises `ModelError`.
         """
-        from ._tank import tank
+        from ._tank_model import tank
 
         return tank(plant, known, effects=effects, where=where, start=start, priors=priors, hold=hold)
 

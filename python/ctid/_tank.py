@@ -1,187 +1,22 @@
-"""Tanks, and what is linear like them: the plants of the program, with its catalogue of effects for them."""
+"""A plant of the program that was fitted, and what it is missing."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _ctid
-from ._ctid import DataError, ModelError
-from ._frames import Array, Data, Records, as_list, index_of, series, table, to_frame, to_frames
-from ._linear import _guess
-from ._model import _SEED, Diagnosis, Effort, Fit, Hold, Model, Progress, _clear, _rows, _teller
+from ._ctid import ModelError
+from ._frames import Array, Data, Records, index_of, table, to_frame, to_frames
+from ._model import _SEED, Design, Diagnosis, Effort, Fit, Model, Progress, _clear, _teller
+from ._tank_model import TankModel
+from ._tank_plant import designed
 
 if TYPE_CHECKING:
     import pandas as pd
-
-#: What a side measurement of a plant is: a number, or names.
-Known = float | str | Sequence[str]
-
-
-def _toml(value: object) -> str:
-    """A value as a model file writes it."""
-    if isinstance(value, str):
-        return json.dumps(value)
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_toml(one) for one in value) + "]"
-    if isinstance(value, (bool, np.bool_)):
-        return "true" if value else "false"
-    if isinstance(value, (int, np.integer)):
-        return str(int(value))
-    if isinstance(value, (float, np.floating)):
-        return repr(float(value))
-    raise ModelError(f"{value!r} is neither a number nor a name")
-
-
-class TankModel(Model):
-    """A plant of the program; it never changes."""
-
-    __slots__ = ("_parts", "_values")
-
-    def __init__(self, parts: dict[str, Any], values: Mapping[str, float] | None = None) -> None:
-        self._parts = parts
-        self._values = dict(values or {})
-        # The program's parser checks it.
-        self._native: Any = _ctid.Tank(self._text(parts))
-
-    @staticmethod
-    def _text(parts: dict[str, Any]) -> str:
-        """The model file that says the same."""
-        lines = [f"plant = {_toml(parts['plant'])}", f"effects = {_toml(parts['effects'])}"]
-        if parts["hold"] is not None:
-            lines.append(f"hold = {_toml(parts['hold'])}")
-        for name in ("columns", "known", "start", "prior"):
-            if parts[name]:
-                lines.append(f"[{name}]")
-                lines += [f"{_toml(str(key))} = {_toml(value)}" for key, value in parts[name].items()]
-        for effect, place in parts["places"].items():
-            lines += [f"[effect.{effect}]", f"where = {_toml(place)}"]
-        return "\n".join(lines) + "\n"
-
-    @property
-    def name(self) -> str:
-        """The plant."""
-        return str(self._native.name)
-
-    @property
-    def text(self) -> str:
-        """The model file that says the same."""
-        return str(self._native.text)
-
-    @property
-    def effects(self) -> list[str]:
-        """The effects that were added, in order."""
-        return list(self._native.effects)
-
-    @property
-    def inputs(self) -> list[str]:
-        """Columns of the inputs, where they are named."""
-        return list(self._native.columns[0])
-
-    @property
-    def outputs(self) -> list[str]:
-        """Columns of the outputs, where they are named."""
-        return list(self._native.columns[1])
-
-    @property
-    def states(self) -> list[str]:
-        """Names of the initial states that were fitted."""
-        return [name for name in self._values if name.endswith("(0)")]
-
-    @property
-    def params(self) -> pd.Series[float]:
-        """Fitted values, where the model comes from a fit or a diagnosis; else empty, as a plant has none of its own."""
-        result: pd.Series[float] = series(list(self._values), list(self._values.values()), "value")
-        return result
-
-    def fit(
-        self,
-        data: Records,
-        inputs: Sequence[str] | Mapping[str, str] | None = None,
-        outputs: Sequence[str] | Mapping[str, str] | None = None,
-        known: Mapping[str, Any] | None = None,
-        priors: Mapping[str, tuple[float, float]] | None = None,
-        *,
-        hold: Hold | None = None,
-        starts: int = 12,
-        seed: int = _SEED,
-        noise_order: int = 6,
-        progress: Progress = False,
-    ) -> Fit:
-        """Fits the plant to records by simulation error, as `ctid compare` does.
-
-        `inputs`: the column of the command, and of a second one; `outputs`: those of the levels; without them the first that begin with u and with y.
-        `known`: what a model file has under `[known]`, areas say; `priors`: `{name: (value, standard error)}`. `starts`, `seed` and `noise_order`
-        are those of the program and cannot be chosen here.
-
-        Raises `DataError` and `ModelError`.
-        """
-        if isinstance(inputs, Mapping) or isinstance(outputs, Mapping):
-            raise ModelError(f"{self.name} has no signals of its own names: give lists of columns")
-        if (starts, seed, noise_order) != (12, _SEED, 6):
-            raise ModelError(f"starts, seed and noise_order of {self.name} are the program's: leave them out")
-        records = as_list(data)
-        if not records:
-            raise DataError("no record: give a frame, or a list of them")
-        u = _guess(records[0], inputs if inputs is not None else self.inputs or None, "u", "input")
-        y = _guess(records[0], outputs if outputs is not None else self.outputs or None, "y", "output")
-        parts = {
-            **self._parts,
-            "columns": {"input": u if len(u) > 1 else u[0], "output": y if len(y) > 1 else y[0]},
-            "known": {**self._parts["known"], **(known or {})},
-            "prior": {**self._parts["prior"], **{n: [float(v), float(e)] for n, (v, e) in (priors or {}).items()}},
-            "hold": self._parts["hold"] if hold is None else hold,
-        }
-        model = TankModel(parts)
-        frames = to_frames(records, "data", [*u, *y])
-        try:
-            fitted = model._native.fit(frames, progress=_teller(progress))
-        finally:
-            _clear(progress)
-        return TankFit(fitted, [index_of(record, _rows(record)) for record in records], parts)
-
-    def to_modelica(self) -> str:
-        """A plant of the program has no text: raises `ModelError`."""
-        raise ModelError(f"{self.name} is a plant of the program and has no text: write its balance as a model of your own")
-
-    def linearize(self, at: Mapping[str, float] | None = None) -> Any:
-        """Raises `ModelError`: write the balance as a model of your own."""
-        return self.to_modelica()
-
-    def monitor(self, *, false_alarm_every: float = 1e6, learn: int = 1000, time_unit: float = 1.0) -> Any:
-        """Raises `ModelError`: the program watches plants, `ctid monitor`."""
-        raise ModelError(f"{self.name} is a plant of the program: watch it with `ctid monitor`")
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return TankModel, (self._parts, self._values)
-
-
-def tank(
-    plant: str,
-    known: Mapping[str, Known] | None = None,
-    *,
-    effects: Sequence[str] = (),
-    where: Mapping[str, str] | None = None,
-    start: Mapping[str, float] | None = None,
-    priors: Mapping[str, tuple[float, float]] | None = None,
-    hold: Hold | None = None,
-) -> TankModel:
-    """See `Model.tank`."""
-    parts: dict[str, Any] = {
-        "plant": plant,
-        "effects": list(effects),
-        "places": dict(where or {}),
-        "columns": {},
-        "known": {k: list(v) if isinstance(v, tuple) else v for k, v in (known or {}).items()},
-        "start": {k: float(v) for k, v in (start or {}).items()},
-        "prior": {n: [float(v), float(e)] for n, (v, e) in (priors or {}).items()},
-        "hold": hold,
-    }
-    return TankModel(parts)
-
 
 class TankFit(Fit):
     """A plant that was fitted; it never changes."""
@@ -198,7 +33,7 @@ class TankFit(Fit):
     @property
     def model(self) -> Model:
         """The plant with its fitted values."""
-        return TankModel(self._parts, {e[0]: e[1] for e in self._tank.estimates})
+        return TankModel(self._parts, {e[0]: e[1] for e in self._tank.estimates}, self._tank.units)
 
     @property
     def _not_determined(self) -> list[list[str]]:
@@ -274,7 +109,8 @@ class TankFit(Fit):
             )
         finally:
             _clear(progress)
-        return TankDiagnosis(found.json(), found.sentences, found.html(), (found.series, found.output_units), self._parts)
+        kept = (self._tank.to_bytes(), self._tank.units)
+        return TankDiagnosis(found.json(), found.sentences, found.html(), (found.series, found.output_units), self._parts, kept)
 
     def to_modelica(self) -> str:
         """Raises `ModelError`: a plant has no text."""
@@ -291,15 +127,25 @@ def _tank_fit_of(content: bytes, indexes: list[Any], parts: dict[str, Any]) -> T
 class TankDiagnosis(Diagnosis):
     """What a plant is missing; it never changes."""
 
-    __slots__ = ("_html", "_json", "_parts", "_sentences", "_series_of", "_units_of")
+    __slots__ = ("_html", "_json", "_kept", "_parts", "_sentences", "_series_of", "_units_of")
 
-    def __init__(self, text: str, sentences: list[str], html: str, outputs: tuple[Any, list[str]], parts: dict[str, Any]) -> None:
+    def __init__(
+        self,
+        text: str,
+        sentences: list[str],
+        html: str,
+        outputs: tuple[Any, list[str]],
+        parts: dict[str, Any],
+        kept: tuple[bytes, tuple[str, str]],
+    ) -> None:
         self._json = text
         self._found = json.loads(text)
         self._sentences = sentences
         self._html = html
         self._series_of, self._units_of = outputs
         self._parts = parts
+        # The plant with its records, as a fit is pickled, and the units of its command and its readings.
+        self._kept = kept
 
     @property
     def ranking(self) -> pd.DataFrame:
@@ -337,7 +183,7 @@ class TankDiagnosis(Diagnosis):
             "effects": [*self._parts["effects"], *effects],
             "places": {**self._parts["places"], **places},
         }
-        return TankModel(parts, {p["name"]: p["value"] for p in steps[-1]["parameters"]})
+        return TankModel(parts, {p["name"]: p["value"] for p in steps[-1]["parameters"]}, self._kept[1])
 
     def summary(self) -> str:
         """The finding, in sentences."""
@@ -348,9 +194,37 @@ class TankDiagnosis(Diagnosis):
         result: dict[str, Any] = json.loads(self._json)
         return result
 
-    def design(self, *between: Any, **limits: Any) -> Any:
-        """Raises `ModelError`: the program designs experiments for plants, `ctid design`."""
-        raise ModelError(f"{self._parts['plant']} is a plant of the program: use `ctid design`")
+    def design(
+        self,
+        between: tuple[str, str],
+        ranges: Mapping[str, tuple[float, float]] | None = None,
+        *,
+        slews: Mapping[str, float] | None = None,
+        inputs: Sequence[str] | None = None,
+        duration: float | None = None,
+        effort: Effort = "normal",
+        time_limit: float | None = None,
+        seed: int = _SEED,
+        progress: Progress = True,
+    ) -> Design:
+        """Proposes the next experiment, which tells two effects apart, as `ctid design` does; see `Diagnosis.design`.
+
+        Effects are those of `ctid effects`; of several tanks `overflow:upper` says which. The only input has a range and a slew.
+        """
+        return designed(
+            self._kept[0],
+            self._title,
+            TankModel(self._parts).inputs[0],
+            between,
+            ranges or {},
+            slews or {},
+            inputs or [],
+            duration=duration,
+            effort=effort,
+            time_limit=time_limit,
+            seed=seed,
+            progress=progress,
+        )
 
     @property
     def _title(self) -> str:
@@ -369,8 +243,5 @@ class TankDiagnosis(Diagnosis):
         return self._html
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return TankDiagnosis, (self._json, self._sentences, self._html, (self._series_of, self._units_of), self._parts)
-
-
-#: Plants that there are.
-Plant = Literal["single-tank", "single-tank-linear", "cascaded-tanks", "cascaded-tanks-linear", "first-order", "three-tank"]
+        outputs = (self._series_of, self._units_of)
+        return TankDiagnosis, (self._json, self._sentences, self._html, outputs, self._parts, self._kept)

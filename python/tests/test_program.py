@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pandas as pd
-from conftest import MODELS, RECORDS
+from conftest import MODELS, RECORDS, read_csv
 
 import ctid
 
@@ -29,7 +29,7 @@ def own(found: dict[str, object]) -> dict[str, object]:
 
 
 def read(path: Path, index: str) -> pd.DataFrame:
-    return pd.read_csv(path, index_col=index, float_precision="round_trip")
+    return read_csv(path, index_col=index)
 
 
 def test_a_model_of_ones_own(program, tmp_path):
@@ -46,7 +46,7 @@ def test_a_model_of_ones_own(program, tmp_path):
 
 def test_several_outputs_and_the_mended_model(program, tmp_path):
     toml, csv = MODELS / "coupled-heaters.toml", MODELS / "coupled-heaters.csv"
-    frame = pd.read_csv(csv, float_precision="round_trip")
+    frame = read_csv(csv)
     frame = frame.set_index(frame.columns[0])
     fit = ctid.Model.from_file(toml).fit(frame)
     assert own(fit.to_dict()) == results(program, tmp_path, "compare", csv, "--model", toml)
@@ -69,7 +69,7 @@ def test_a_simulation(program, tmp_path):
     toml, csv = MODELS / "heated-block.toml", MODELS / "heated-block.csv"
     command = [program, "simulate", str(toml), str(csv), "--fit", str(csv), "--out", "y.csv"]
     subprocess.run(command, check=True, capture_output=True, cwd=tmp_path)
-    by_program = pd.read_csv(tmp_path / "y.csv", float_precision="round_trip")
+    by_program = read_csv(tmp_path / "y.csv")
     band = ctid.Model.from_file(toml).fit(read(csv, "t [s]")).simulate(read(csv, "t [s]"))
     assert band["y", "mean"].tolist() == by_program.iloc[:, 1].tolist()
     assert band["y", "lower"].tolist() == by_program.iloc[:, 2].tolist()

@@ -1,5 +1,8 @@
 //! A box of bounds on the estimates, enforced at every step: by projection (hard), or by penalties (soft).
 
+#[cfg(feature = "serde")]
+mod saved;
+
 use ct_rls::{ContinuousRls, Integrator, RecursiveEstimator};
 use nalgebra::SVector;
 
@@ -23,7 +26,7 @@ pub enum Keep {
     },
 }
 
-/// The box `lower <= theta <= upper`, entry by entry, and how it is kept to. Infinite bounds are none.
+/// The box `lower <= theta <= upper`, entry by entry, and how it is kept to. Infinite bounds are none, and written as none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds<const P: usize> {
     lower: SVector<f64, P>,

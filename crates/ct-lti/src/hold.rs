@@ -2,6 +2,7 @@
 
 /// Hold: the course of a signal between two samples. Sampling is exact for a signal with this course.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Hold {
     /// `u[k]` is held from `t[k]` to `t[k+1]`: the output of a D/A converter.
     #[default]
@@ -12,6 +13,7 @@ pub enum Hold {
 
 /// The past of a filter or a simulation before its first sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Start {
     /// All states are 0. Correct if the process was at rest at time 0; otherwise the filtered signal starts with a step at the first
     /// sample.

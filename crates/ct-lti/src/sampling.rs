@@ -114,6 +114,11 @@ impl Sampler {
         }
     }
 
+    #[cfg(feature = "serde")]
+    pub(crate) fn hold(&self) -> Hold {
+        self.hold
+    }
+
     pub(crate) fn advance(
         &mut self,
         x: &mut [f64],

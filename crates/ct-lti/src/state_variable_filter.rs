@@ -21,6 +21,9 @@
 //! Cost: n^2 products a sample, 20 to 30 ns for n = 2 to 6; a new step 0.6 to 3 us. Nothing is allocated after
 //! construction.
 
+#[cfg(feature = "serde")]
+mod saved;
+
 use alloc::{vec, vec::Vec};
 
 use crate::error::finite;

@@ -169,30 +169,26 @@ impl State {
     }
 }
 
-/// A monitor; `'a` is the lifetime of a user's own model.
-pub struct Monitor<'a> {
-    model: Watched<'a>,
+/// A monitor; it owns its model.
+pub struct Monitor {
+    model: Watched,
     intake: Intake,
-    core: Core<'a>,
+    core: Core,
     fingerprint: Fingerprint,
     units: Units,
 }
 
-impl<'a> Monitor<'a> {
+impl Monitor {
     /// A new monitor of a [`Model`](crate::Model) of a plant or an [`OwnModel`](crate::OwnModel).
     ///
     /// `units` are those of a plant's rows; a user's own model has units itself.
     ///
     /// # Errors
-    /// [`Error::Setting`]; of a plant [`Error::TwoPumps`], [`Error::Disturbance`], [`Error::ByClock`] for an effect in the model that
-    /// follows the time since a record began, [`Error::Structure`]; of a user's own model [`Error::Time`], [`Error::NoParameters`].
-    pub fn new(
-        model: impl Into<Watched<'a>>,
-        settings: Settings,
-        units: Units,
-    ) -> Result<Self, Error> {
+    /// [`Error::Setting`]; of a plant [`Error::TwoPumps`], [`Error::Disturbance`], [`Error::ByClock`] for an effect in the model that follows
+    /// the time since a record began, [`Error::Structure`]; of a user's own model [`Error::Time`], [`Error::NoParameters`].
+    pub fn new(model: impl Into<Watched>, settings: Settings, units: Units) -> Result<Self, Error> {
         settings.check()?;
-        let model: Watched<'a> = model.into();
+        let model: Watched = model.into();
         model.0.check()?;
         Ok(Self {
             intake: Intake::new(model.0.inputs(), model.0.outputs()),
@@ -208,7 +204,7 @@ impl<'a> Monitor<'a> {
     /// # Errors
     /// As [`Monitor::new`], and [`Error::Version`], [`Error::OtherModel`], [`Error::Damaged`].
     pub fn restore(
-        model: impl Into<Watched<'a>>,
+        model: impl Into<Watched>,
         settings: Settings,
         state: State,
     ) -> Result<Self, Error> {

@@ -22,7 +22,7 @@ const BEYOND: f64 = 1.01;
 /// monitor should detect.
 const ABOVE: f64 = 1.5;
 
-impl<'a> From<Model> for Watched<'a> {
+impl From<Model> for Watched {
     fn from(model: Model) -> Self {
         Self(Arc::new(model))
     }
@@ -38,7 +38,7 @@ impl Model {
     }
 }
 
-impl<'a> Believed<'a> for Model {
+impl Believed for Model {
     fn check(&self) -> Result<(), Error> {
         if self.plant.pumps() > 1 {
             return Err(Error::TwoPumps {
@@ -122,12 +122,7 @@ impl<'a> Believed<'a> for Model {
         lanes(parameters)
     }
 
-    fn run(
-        &self,
-        learned: &Learned,
-        states: &[f64],
-        at_rest: f64,
-    ) -> Option<Box<dyn Running + 'a>> {
+    fn run(&self, learned: &Learned, states: &[f64], at_rest: f64) -> Option<Box<dyn Running>> {
         let structure = self.structure(learned.scales.clone()?).ok()?;
         let levels = states.get(..structure.plant.vessels())?;
         let (substeps, theta) = (learned.substeps, &learned.theta);

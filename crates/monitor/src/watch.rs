@@ -14,8 +14,8 @@ use crate::{
 };
 
 /// The running model; it is rebuilt from rows, and never saved.
-pub(crate) struct Watch<'a> {
-    model: Box<dyn Model + 'a>,
+pub(crate) struct Watch {
+    model: Box<dyn Model>,
     /// The noise of each output: what whitens it, and one over its standard deviation.
     noises: Vec<(Whitener, f64)>,
     hold: Hold,
@@ -67,10 +67,10 @@ impl Said {
     }
 }
 
-impl<'a> Watch<'a> {
+impl Watch {
     /// Starts from given states; `None` if the learned numbers do not make a model.
     pub(crate) fn new(
-        model: &Watched<'a>,
+        model: &Watched,
         learned: &Learned,
         hold: Hold,
         states: &[f64],

@@ -15,7 +15,7 @@ use crate::{
 
 /// A model that can be watched; from a [`Model`](crate::Model) or an [`OwnModel`](crate::OwnModel).
 #[derive(Clone)]
-pub struct Watched<'a>(pub(crate) Arc<dyn Believed<'a> + 'a>);
+pub struct Watched(pub(crate) Arc<dyn Believed>);
 
 /// An alarm, and the times of its evaluations.
 #[derive(Debug, Clone, Copy)]
@@ -32,8 +32,8 @@ pub(crate) struct Raised {
     pub output: usize,
 }
 
-/// Interface of a model for the monitor. States and simulations of a user's own model have the lifetime `'a`.
-pub(crate) trait Believed<'a>: Send + Sync {
+/// Interface of a model for the monitor.
+pub(crate) trait Believed: Send + Sync {
     /// Reason why the model cannot be monitored.
     fn check(&self) -> Result<(), Error>;
     fn inputs(&self) -> usize;
@@ -55,8 +55,7 @@ pub(crate) trait Believed<'a>: Send + Sync {
     /// Number of the first parameters for which derivatives are computed.
     fn lanes(&self, parameters: usize) -> usize;
     /// The learned model from these states on; `at_rest`: the input before the first row.
-    fn run(&self, learned: &Learned, states: &[f64], at_rest: f64)
-    -> Option<Box<dyn Running + 'a>>;
+    fn run(&self, learned: &Learned, states: &[f64], at_rest: f64) -> Option<Box<dyn Running>>;
     /// Sets the measured states to their readings.
     fn put_readings(&self, states: &mut Each<f64>, readings: &Readings);
     /// The name of an output, of several.

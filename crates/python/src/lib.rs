@@ -7,7 +7,7 @@
 //! | frames as the program reads its records | `frame.rs` |
 //! | a user's own model, its fit, its diagnosis | `model.rs`, `fit.rs`, `diagnosis.rs` |
 //! | the matrices of a model about a point | `linear.rs` |
-//! | one of the plants | `tank.rs` |
+//! | one of the plants, its fit, its next experiment, its text | `tank_model.rs`, `tank.rs`, `tank_design.rs`, `tank_text.rs` |
 //! | a model beside a running plant | `monitor.rs` |
 //! | linear models from records | `identify.rs` |
 //! | recursive estimators, and output error in a loop | `rls.rs`, `oe.rs` |
@@ -29,6 +29,9 @@ mod oe;
 mod rls;
 mod tables;
 mod tank;
+mod tank_design;
+mod tank_model;
+mod tank_text;
 mod work;
 
 use pyo3::prelude::*;
@@ -57,5 +60,9 @@ mod _ctid {
     #[pymodule_export]
     use crate::tables::udink_tables;
     #[pymodule_export]
-    use crate::tank::{Tank, TankFit};
+    use crate::tank::TankFit;
+    #[pymodule_export]
+    use crate::tank_design::tank_design;
+    #[pymodule_export]
+    use crate::tank_model::Tank;
 }

@@ -219,7 +219,7 @@ impl Model {
         rows_between_false_alarms: f64,
         learning_rows: usize,
     ) -> PyResult<Monitor> {
-        Monitor::of(&self.0, time_unit, rows_between_false_alarms, learning_rows)
+        Monitor::of_model(&self.0, time_unit, rows_between_false_alarms, learning_rows)
     }
 
     #[getter]

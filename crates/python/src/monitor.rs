@@ -1,10 +1,10 @@
-//! A monitor: the model run in parallel with a plant.
+//! A model beside a running plant.
 
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ct_model::effects::{apply, own_candidates};
 use ct_model::{Model as Compiled, ModelSpec};
+use ctid::model_file::ModelFile;
 use ctid::own_model::OwnSettings;
 use monitor::{CandidateModel, Notice, OwnModel, Row, Settings, State, Units};
 use pyo3::prelude::*;
@@ -12,74 +12,83 @@ use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
 use crate::model::Inner;
-use crate::{bytes, error};
+use crate::{bytes, error, tank};
 
-/// A watched model, and with each candidate of its user's own.
-struct Models {
-    model: Compiled,
-    candidates: Vec<CandidateModel>,
+/// Watches a plant row by row.
+#[pyclass(frozen, module = "ctid._ctid")]
+pub struct Monitor {
+    watched: Watched,
+    monitor: Mutex<monitor::Monitor>,
 }
 
-/// Monitored models live as long as the interpreter, because a monitor borrows its model. Each text is stored once with the same
-/// candidates.
-static MODELS: Mutex<Option<HashMap<String, &'static Models>>> = Mutex::new(None);
+/// What is watched, as it is pickled.
+#[derive(Clone, Serialize, Deserialize)]
+struct Watched {
+    of: Of,
+    rows_between_false_alarms: f64,
+    learning_rows: usize,
+}
 
-fn kept(spec: ModelSpec, settings: &OwnSettings) -> PyResult<&'static Models> {
+/// A model as text, or one of the plants.
+#[derive(Clone, Serialize, Deserialize)]
+enum Of {
+    Own {
+        /// The model, its effects in it, with its values.
+        text: String,
+        settings: Box<OwnSettings>,
+        time_unit: f64,
+    },
+    Tank {
+        /// The model file that says the same.
+        text: String,
+        /// Those of the command and of the readings; empty where they are not known.
+        units: (String, String),
+    },
+}
+
+/// The watched model with each candidate of its user's own.
+fn candidates(spec: &ModelSpec, settings: &OwnSettings) -> PyResult<Arc<[CandidateModel]>> {
     let mut own = settings.candidates.clone();
     own.retain(|id, _| !settings.effects.contains(id));
-    let key = format!("{spec}{own:?}");
-    let mut models = MODELS.lock().unwrap_or_else(PoisonError::into_inner);
-    let models = models.get_or_insert_default();
-    if let Some(known) = models.get(&key) {
-        return Ok(known);
-    }
-    let candidates = own_candidates(&spec, &own).map_err(error::of_model)?;
+    let candidates = own_candidates(spec, &own).map_err(error::of_model)?;
     let is_on = |id: &String| settings.effects.contains(id);
     let candidates = candidates
         .into_iter()
         // Alone it is the same as what it repeats.
         .filter(|candidate| candidate.repeats.as_ref().is_none_or(is_on))
         .map(|candidate| {
-            let with = apply(&spec, &[&candidate]).map_err(error::of_model)?;
+            let with = apply(spec, &[&candidate]).map_err(error::of_model)?;
             let model = Compiled::new(with);
             Ok(CandidateModel { candidate, model })
         });
-    let candidates = candidates.collect::<PyResult<_>>()?;
-    let model = Compiled::new(spec);
-    let all = Box::leak(Box::new(Models { model, candidates }));
-    models.insert(key, all);
-    Ok(all)
-}
-
-/// Watches a plant row by row.
-#[pyclass(frozen, module = "ctid._ctid")]
-pub struct Monitor {
-    watched: Watched,
-    monitor: Mutex<monitor::Monitor<'static>>,
-}
-
-/// The monitored model in its pickled form.
-#[derive(Clone, Serialize, Deserialize)]
-struct Watched {
-    /// The model, its effects in it, with its values.
-    text: String,
-    settings: OwnSettings,
-    time_unit: f64,
-    rows_between_false_alarms: f64,
-    learning_rows: usize,
+    candidates.collect()
 }
 
 impl Watched {
-    fn begin(&self, state: Option<State>) -> PyResult<monitor::Monitor<'static>> {
-        let spec = ModelSpec::parse_to_simulate(&self.text).map_err(error::of_model)?;
-        let models = kept(spec, &self.settings)?;
-        let model = OwnModel {
-            model: &models.model,
-            known: self.settings.known.clone(),
-            priors: self.settings.priors.clone(),
-            hold: self.settings.hold,
-            time_unit: self.time_unit,
-            candidates: &models.candidates,
+    fn begin(&self, state: Option<State>) -> PyResult<monitor::Monitor> {
+        let (model, units): (monitor::Watched, Units) = match &self.of {
+            Of::Own {
+                text,
+                settings,
+                time_unit,
+            } => {
+                let spec = ModelSpec::parse_to_simulate(text).map_err(error::of_model)?;
+                let own = OwnModel {
+                    known: settings.known.clone(),
+                    priors: settings.priors.clone(),
+                    hold: settings.hold,
+                    time_unit: *time_unit,
+                    candidates: candidates(&spec, settings)?,
+                    model: Arc::new(Compiled::new(spec)),
+                };
+                (own.into(), Units::default())
+            }
+            Of::Tank { text, units } => {
+                let file = tank::parsed(text).map_err(|error| error::of(&error))?;
+                let (input, output) = units.clone();
+                let believed = ctid::monitor::believed(&file);
+                (believed.into(), Units { output, input })
+            }
         };
         let settings = Settings {
             rows_between_false_alarms: self.rows_between_false_alarms,
@@ -87,25 +96,53 @@ impl Watched {
             ..Settings::default()
         };
         let monitor = match state {
-            None => monitor::Monitor::new(model, settings, Units::default()),
+            None => monitor::Monitor::new(model, settings, units),
             Some(state) => monitor::Monitor::restore(model, settings, state),
         };
         monitor.map_err(error::of_model)
     }
+
+    /// Names of the inputs and the outputs.
+    fn signals(&self) -> PyResult<(Vec<String>, Vec<String>)> {
+        match &self.of {
+            Of::Own { text, .. } => {
+                let spec = ModelSpec::parse_to_simulate(text).map_err(error::of_model)?;
+                let inputs = spec.inputs.iter().map(|u| u.about.name.clone());
+                let outputs = spec.outputs.iter();
+                let outputs = outputs.map(|output| spec.about(output.variable).name.clone());
+                Ok((inputs.collect(), outputs.collect()))
+            }
+            Of::Tank { text, .. } => {
+                let file = tank::parsed(text).map_err(|error| error::of(&error))?;
+                Ok(signals_of_tank(&file))
+            }
+        }
+    }
+}
+
+/// The columns of a plant's command and readings; without them `u`, and `y` or the names of the levels that are read.
+fn signals_of_tank(file: &ModelFile) -> (Vec<String>, Vec<String>) {
+    let read = file.known.outputs(file.plant);
+    let name = |column: &String| tank::heading(column).0;
+    let inputs = match &file.columns.inputs[..] {
+        [] => vec!["u".to_string()],
+        columns => columns.iter().map(name).collect(),
+    };
+    let outputs = match (&file.columns.outputs[..], &read[..]) {
+        ([], [_]) => vec!["y".to_string()],
+        ([], _) => {
+            let names = read.iter().map(|vessel| file.plant.level_name(*vessel));
+            names.map(str::to_string).collect()
+        }
+        (columns, _) => columns.iter().map(name).collect(),
+    };
+    (inputs, outputs)
 }
 
 impl Monitor {
-    pub fn of(
-        model: &Arc<Inner>,
-        time_unit: f64,
-        rows_between_false_alarms: f64,
-        learning_rows: usize,
-    ) -> PyResult<Self> {
-        let spec = model.valued().map_err(|error| error::of(&error))?;
+    fn of(of: Of, rows_between_false_alarms: f64, learning_rows: usize) -> PyResult<Self> {
         let watched = Watched {
-            text: spec.to_string(),
-            settings: model.file.settings(),
-            time_unit,
+            of,
             rows_between_false_alarms,
             learning_rows,
         };
@@ -116,7 +153,35 @@ impl Monitor {
         })
     }
 
-    fn monitor(&self) -> MutexGuard<'_, monitor::Monitor<'static>> {
+    /// Of a model as text.
+    pub fn of_model(
+        model: &Arc<Inner>,
+        time_unit: f64,
+        rows_between_false_alarms: f64,
+        learning_rows: usize,
+    ) -> PyResult<Self> {
+        let spec = model.valued().map_err(|error| error::of(&error))?;
+        let of = Of::Own {
+            text: spec.to_string(),
+            settings: Box::new(model.file.settings()),
+            time_unit,
+        };
+        Self::of(of, rows_between_false_alarms, learning_rows)
+    }
+
+    /// Of one of the plants.
+    pub fn of_tank(
+        text: &str,
+        units: (String, String),
+        rows_between_false_alarms: f64,
+        learning_rows: usize,
+    ) -> PyResult<Self> {
+        let text = text.to_string();
+        let of = Of::Tank { text, units };
+        Self::of(of, rows_between_false_alarms, learning_rows)
+    }
+
+    fn monitor(&self) -> MutexGuard<'_, monitor::Monitor> {
         self.monitor.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -181,12 +246,12 @@ fn notice<'py>(py: Python<'py>, notice: &Notice) -> PyResult<Bound<'py, PyDict>>
     Ok(all)
 }
 
-/// Residual, and innovation in standard deviations; none without a reading, and during learning.
+/// Residual, the same in standard deviations; none without a reading, and while it learns.
 type Innovation = Option<(f64, f64)>;
 
 #[pymethods]
 impl Monitor {
-    /// Processes a row: innovations, the alarm and those of the noise as JSON, notices, reasons for missing readings.
+    /// Takes in a row: innovations, the alarm and those of the scatter as JSON, notices, why readings are lost.
     #[allow(clippy::type_complexity)]
     fn update<'py>(
         &self,
@@ -226,7 +291,7 @@ impl Monitor {
         ))
     }
 
-    /// Name, unit, learned value, present value, half the width of its 95 % interval.
+    /// Name, unit, value as learned, value now, half the width of its 95 % interval.
     #[getter]
     fn estimates(&self) -> Vec<(String, String, f64, f64, Option<f64>)> {
         let all = self.monitor().estimates().into_iter();
@@ -234,7 +299,7 @@ impl Monitor {
             .collect()
     }
 
-    /// `learning`, `watching` or `alarmed`, and the number of rows, or the largest score and its threshold.
+    /// `learning`, `watching` or `alarmed`, and rows, or the largest score and its threshold.
     #[getter]
     fn progress(&self) -> (&'static str, f64, f64) {
         match self.monitor().progress() {
@@ -252,11 +317,7 @@ impl Monitor {
     /// Names of the inputs and the outputs.
     #[getter]
     fn signals(&self) -> PyResult<(Vec<String>, Vec<String>)> {
-        let spec = ModelSpec::parse_to_simulate(&self.watched.text).map_err(error::of_model)?;
-        let inputs = spec.inputs.iter().map(|u| u.about.name.clone());
-        let outputs = spec.outputs.iter();
-        let outputs = outputs.map(|output| spec.about(output.variable).name.clone());
-        Ok((inputs.collect(), outputs.collect()))
+        self.watched.signals()
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {

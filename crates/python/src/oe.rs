@@ -6,10 +6,11 @@ use fcloe::{Controller, LoopRecord, Offsets, Orders, Problem, Settings, start};
 use nalgebra::{SMatrix, SVector};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
+use serde::{Deserialize, Serialize};
 use stabilized_oe::{BlockDiagonal, IoSample, StabilizedOe as Estimator, StateVariableFilters};
 
-use crate::error;
+use crate::{bytes, error};
 
 /// An estimator of the crate with orders that are known at compile time.
 trait Oe: Send + Sync {
@@ -18,7 +19,11 @@ trait Oe: Send + Sync {
     fn filter(&self) -> Vec<f64>;
     fn model_output(&self) -> f64;
     fn boxed(&self) -> Box<dyn Oe>;
+    fn bytes(&self, kind: Kind) -> PyResult<Vec<u8>>;
 }
+
+/// Orders n and m, and whether there is an offset: which of the types it is.
+type Kind = (usize, usize, bool);
 
 type Own<const N: usize, const P: usize> =
     Estimator<N, P, BlockDiagonal<N, P>, StateVariableFilters<N>>;
@@ -43,6 +48,32 @@ impl<const N: usize, const P: usize> Oe for Own<N, P> {
     fn boxed(&self) -> Box<dyn Oe> {
         Box::new(self.clone())
     }
+
+    fn bytes(&self, kind: Kind) -> PyResult<Vec<u8>> {
+        bytes::of(&Kept {
+            kind,
+            estimator: self.clone(),
+        })
+    }
+}
+
+/// An estimator as it is pickled.
+#[derive(Serialize, Deserialize)]
+struct Kept<T> {
+    kind: Kind,
+    estimator: T,
+}
+
+/// The type of an estimator alone.
+#[derive(Deserialize)]
+struct KeptKind {
+    kind: Kind,
+}
+
+/// An estimator from its bytes.
+fn kept<const N: usize, const P: usize>(content: &[u8]) -> PyResult<Box<dyn Oe>> {
+    let kept: Kept<Own<N, P>> = bytes::read(content)?;
+    Ok(Box::new(kept.estimator))
 }
 
 /// Arguments of an estimator.
@@ -80,6 +111,26 @@ fn with_offset<const N: usize, const P: usize>(
     Ok(Box::new(own::<N, P>(start)?.with_offset()))
 }
 
+/// Calls the first function without an offset, the second with one, for the orders of an estimator and its number of parameters.
+macro_rules! of_kind {
+    ($kind:expr, $plain:ident($argument:expr), $offset:ident($other:expr)) => {
+        match $kind {
+            (1, _, false) => $plain::<1, 2>($argument),
+            (1, _, true) => $offset::<1, 3>($other),
+            (2, 0, false) => $plain::<2, 3>($argument),
+            (2, 0, true) => $offset::<2, 4>($other),
+            (2, _, false) => $plain::<2, 4>($argument),
+            (2, _, true) => $offset::<2, 5>($other),
+            (_, 0, false) => $plain::<3, 4>($argument),
+            (_, 0, true) => $offset::<3, 5>($other),
+            (_, 1, false) => $plain::<3, 5>($argument),
+            (_, 1, true) => $offset::<3, 6>($other),
+            (_, _, false) => $plain::<3, 6>($argument),
+            (_, _, true) => $offset::<3, 7>($other),
+        }
+    };
+}
+
 /// Recursive output error in continuous time, `A(s) y = B(s) u`, with a filter of its error that is adapted beside it.
 ///
 /// `order`: `(n, m)`, n from 1 to 3 and m below n. `theta0`: `a_1..a_n, b_0..b_m`, and an offset where there is one; A has to be stable.
@@ -88,7 +139,10 @@ fn with_offset<const N: usize, const P: usize>(
 ///
 /// Raises `ctid.ModelError`.
 #[pyclass(module = "ctid._ctid")]
-pub struct StabilizedOe(Box<dyn Oe>);
+pub struct StabilizedOe {
+    oe: Box<dyn Oe>,
+    kind: Kind,
+}
 
 #[pymethods]
 impl StabilizedOe {
@@ -144,26 +198,17 @@ impl StabilizedOe {
             bandwidth,
             hold,
         };
-        let made = match (n, m, offset) {
-            (1, _, false) => made::<1, 2>(&start),
-            (1, _, true) => with_offset::<1, 3>(&start),
-            (2, 0, false) => made::<2, 3>(&start),
-            (2, 0, true) => with_offset::<2, 4>(&start),
-            (2, _, false) => made::<2, 4>(&start),
-            (2, _, true) => with_offset::<2, 5>(&start),
-            (_, 0, false) => made::<3, 4>(&start),
-            (_, 0, true) => with_offset::<3, 5>(&start),
-            (_, 1, false) => made::<3, 5>(&start),
-            (_, 1, true) => with_offset::<3, 6>(&start),
-            (_, _, false) => made::<3, 6>(&start),
-            (_, _, true) => with_offset::<3, 7>(&start),
-        };
-        Ok(Self(made.map_err(error::of_model)?))
+        let kind = (n, m, offset);
+        let made = of_kind!(kind, made(&start), with_offset(&start));
+        Ok(Self {
+            oe: made.map_err(error::of_model)?,
+            kind,
+        })
     }
 
     /// Processes a sample that is held over `dt` seconds. Returns the innovation before the update.
     fn update(&mut self, u: f64, y: f64, dt: f64) -> f64 {
-        self.0.update(u, y, dt)
+        self.oe.update(u, y, dt)
     }
 
     /// Processes many samples, one `dt` in s for all. Returns the estimates after each, a row for each sample.
@@ -183,7 +228,7 @@ impl StabilizedOe {
             )));
         }
         let rows = u.len();
-        let own = &mut self.0;
+        let own = &mut self.oe;
         let columns = own.theta().len();
         let all = py.detach(|| {
             let mut all = Vec::with_capacity(rows * columns);
@@ -199,27 +244,55 @@ impl StabilizedOe {
     /// `a_1..a_n, b_0..b_m`, and the offset.
     #[getter]
     fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.0.theta())
+        PyArray1::from_vec(py, self.oe.theta())
     }
 
     /// Coefficients of the filter of the error.
     #[getter]
     fn filter<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.0.filter())
+        PyArray1::from_vec(py, self.oe.filter())
     }
 
     /// Present output of the model.
     #[getter]
     fn model_output(&self) -> f64 {
-        self.0.model_output()
+        self.oe.model_output()
     }
 
     fn __copy__(&self) -> Self {
-        Self(self.0.boxed())
+        Self {
+            oe: self.oe.boxed(),
+            ..*self
+        }
     }
 
     fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
         self.__copy__()
+    }
+
+    /// As it stands, to be pickled; restored it goes on to the bit.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.oe.bytes(self.kind)?))
+    }
+
+    #[staticmethod]
+    fn from_bytes(content: &[u8]) -> PyResult<Self> {
+        let KeptKind { kind } = bytes::read(content)?;
+        let oe = of_kind!(kind, kept(content), kept(content))?;
+        Ok(Self { oe, kind })
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let restore = py.get_type::<Self>().getattr("from_bytes")?;
+        Ok((restore, (self.to_bytes(py)?,)))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<ctid.StabilizedOe theta = {:?}>", self.oe.theta())
     }
 }
 

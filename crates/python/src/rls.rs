@@ -1,144 +1,22 @@
 //! Recursive least squares in continuous time.
 
-use ct_rls::{
-    ContinuousRls as Fixed, DynamicRls, Innovation, Outcome, RecursiveEstimator, Sample, Weights,
-};
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+mod online;
+
+use ct_rls::{Outcome, Weights};
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray,
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyBytes, PyTuple};
 
+use self::online::{Online, Others, online, restored};
 use crate::error;
-
-/// An estimator of any number of parameters; of few the crate's own for a number that is known when it is compiled, which is faster.
-trait Online: Send + Sync {
-    fn update(&mut self, phi: &[f64], y: f64, dt: f64) -> Innovation;
-    /// Over whole arrays; the estimates after each sample go to `theta`, where it is not empty, and the innovations to `epsilon`.
-    fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]);
-    fn theta(&self) -> Vec<f64>;
-    /// Row by row.
-    fn covariance(&self) -> Vec<Vec<f64>>;
-    fn health(&self) -> Result<ct_rls::Health, ct_rls::Error>;
-    fn boxed(&self) -> Box<dyn Online>;
-}
-
-impl<const P: usize> Online for Fixed<P> {
-    fn update(&mut self, phi: &[f64], y: f64, dt: f64) -> Innovation {
-        // The caller has checked the length.
-        let phi = phi.first_chunk::<P>().copied().unwrap_or([f64::NAN; P]);
-        RecursiveEstimator::update(self, &Sample::new(phi, y), dt)
-    }
-
-    fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]) {
-        // A local copy, which the compiler can keep in registers.
-        let mut own = self.clone();
-        let mut rows = theta.as_chunks_mut::<P>().0.iter_mut();
-        let samples = phi.as_chunks::<P>().0.iter().zip(y).zip(epsilon);
-        for (k, ((phi, y), epsilon)) in samples.enumerate() {
-            let step = if dt.len() > 1 { dt[k] } else { dt[0] };
-            let sample = Sample::new(*phi, *y);
-            *epsilon = RecursiveEstimator::update(&mut own, &sample, step).epsilon;
-            if let Some(row) = rows.next() {
-                row.copy_from_slice(RecursiveEstimator::theta(&own).as_slice());
-            }
-        }
-        *self = own;
-    }
-
-    fn theta(&self) -> Vec<f64> {
-        RecursiveEstimator::theta(self).as_slice().to_vec()
-    }
-
-    fn covariance(&self) -> Vec<Vec<f64>> {
-        let p = RecursiveEstimator::covariance(self);
-        let rows = p.row_iter().map(|row| row.iter().copied().collect());
-        rows.collect()
-    }
-
-    fn health(&self) -> Result<ct_rls::Health, ct_rls::Error> {
-        RecursiveEstimator::health(self)
-    }
-
-    fn boxed(&self) -> Box<dyn Online> {
-        Box::new(self.clone())
-    }
-}
-
-/// Estimator for many parameters.
-#[derive(Clone)]
-struct Many(DynamicRls, Weights);
-
-impl Online for Many {
-    fn update(&mut self, phi: &[f64], y: f64, dt: f64) -> Innovation {
-        self.0.update_with(phi, y, dt, &self.1)
-    }
-
-    fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]) {
-        let p = self.theta().len();
-        let mut rows = theta.chunks_exact_mut(p);
-        let samples = phi.chunks_exact(p).zip(y).zip(epsilon).enumerate();
-        for (k, ((phi, y), epsilon)) in samples {
-            let step = if dt.len() > 1 { dt[k] } else { dt[0] };
-            *epsilon = self.0.update_with(phi, *y, step, &self.1).epsilon;
-            if let Some(row) = rows.next() {
-                row.copy_from_slice(self.0.theta().as_slice());
-            }
-        }
-    }
-
-    fn theta(&self) -> Vec<f64> {
-        self.0.theta().as_slice().to_vec()
-    }
-
-    fn covariance(&self) -> Vec<Vec<f64>> {
-        let p = self.0.covariance();
-        let rows = p.row_iter().map(|row| row.iter().copied().collect());
-        rows.collect()
-    }
-
-    fn health(&self) -> Result<ct_rls::Health, ct_rls::Error> {
-        self.0.health()
-    }
-
-    fn boxed(&self) -> Box<dyn Online> {
-        Box::new(self.clone())
-    }
-}
-
-/// The estimator of so many parameters.
-fn online(theta: &[f64], p: &[Vec<f64>], weights: Weights) -> PyResult<Box<dyn Online>> {
-    fn fixed<const P: usize>(
-        theta: &[f64],
-        p: &[Vec<f64>],
-        weights: Weights,
-    ) -> Result<Box<dyn Online>, ct_rls::Error> {
-        let matrix = SMatrix::<f64, P, P>::from_fn(|i, j| p[i][j]);
-        let theta = SVector::from_column_slice(theta);
-        Ok(Box::new(Fixed::<P>::new(theta, matrix, weights)?))
-    }
-    let made = match theta.len() {
-        1 => fixed::<1>(theta, p, weights),
-        2 => fixed::<2>(theta, p, weights),
-        3 => fixed::<3>(theta, p, weights),
-        4 => fixed::<4>(theta, p, weights),
-        5 => fixed::<5>(theta, p, weights),
-        6 => fixed::<6>(theta, p, weights),
-        n => {
-            let matrix = DMatrix::from_fn(n, n, |i, j| p[i][j]);
-            let many = DynamicRls::new(DVector::from_column_slice(theta), &matrix, weights);
-            many.map(|rls| Box::new(Many(rls, weights)) as Box<dyn Online>)
-        }
-    };
-    made.map_err(error::of_model)
-}
 
 /// Recursive least squares in continuous time with forgetting, whose matrix stays positive definite.
 ///
-/// `theta0`: first guess, one number for each parameter. `P0`: how little is known, symmetric and positive definite. `forgetting`: rate in
-/// 1/s, the memory is its inverse; `c` and `gamma`: weights of the step and of the information, 1 of least squares.
+/// `theta0`: first guess, one number for each parameter. `P0`: how little is known, symmetric and positive definite. `forgetting`: rate in 1/s, the
+/// memory is its inverse; `c` and `gamma`: weights of the step and of the information, 1 of least squares.
 ///
 /// Raises `ctid.ModelError` where these do not go together.
 #[pyclass(module = "ctid._ctid")]
@@ -196,8 +74,8 @@ impl ContinuousRls {
         Self::made(&theta0.as_array().to_vec(), &rows_of(&P0), weights)
     }
 
-    /// Processes a sample: the regressor, the output, and the time in s over which they are held. Returns the innovation `y - theta' phi`
-    /// before the update. A sample that cannot be used, such as a NaN, changes nothing; `outcome` gives the reason.
+    /// Takes in a sample: the regressor, the output, and the time in s over which they are held. Returns the innovation `y - theta' phi` before
+    /// it. A sample that cannot be used, a NaN say, changes nothing; `outcome` says why.
     fn update(&mut self, phi: &Bound<'_, PyAny>, y: f64, dt: f64) -> PyResult<f64> {
         let innovation = if let Ok(phi) = phi.cast::<PyArray1<f64>>() {
             // A few numbers are copied faster than it is noted that they are read.
@@ -213,7 +91,7 @@ impl ContinuousRls {
         } else {
             let other =
                 || error::of_data("phi is a list of numbers, or an array of floats with one axis");
-            // Numpy converts an array with one entry to a number.
+            // Numpy makes a number of an array that holds one.
             if phi
                 .cast::<PyUntypedArray>()
                 .is_ok_and(|phi| phi.ndim() != 1)
@@ -230,8 +108,8 @@ impl ContinuousRls {
         Ok(innovation.epsilon)
     }
 
-    /// Takes in many samples: `phi` a row for each, `y` and `dt` a number for each, or one `dt` for all. Returns the estimates after each,
-    /// a row for each sample, and the innovations; without `trajectory` the innovations alone.
+    /// Takes in many samples: `phi` a row for each, `y` and `dt` a number for each, or one `dt` for all. Returns the estimates after each, a row
+    /// for each sample, and the innovations; without `trajectory` the innovations alone.
     #[pyo3(signature = (phi, y, dt, *, trajectory=true))]
     fn run<'py>(
         &mut self,
@@ -296,14 +174,14 @@ impl ContinuousRls {
         PyArray1::from_vec(py, self.rls.theta())
     }
 
-    /// The covariance matrix of the estimator.
+    /// The matrix that stands for their covariance.
     #[getter]
     #[pyo3(name = "P")]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         PyArray2::from_vec2(py, &self.rls.covariance()).map_err(error::of_data)
     }
 
-    /// Outcome of the last sample of `update`.
+    /// What was done with the last sample of `update`.
     #[getter]
     fn outcome(&self) -> String {
         format!("{:?}", self.outcome)
@@ -315,7 +193,7 @@ impl ContinuousRls {
         self.outcome.used()
     }
 
-    /// Smallest eigenvalue of the information matrix: the information on the least well determined combination of parameters.
+    /// Smallest eigenvalue of the information matrix: how well the combination of parameters is known that is known worst.
     #[getter]
     fn excitation(&self) -> PyResult<f64> {
         let health = self.rls.health().map_err(error::of_model)?;
@@ -333,23 +211,40 @@ impl ContinuousRls {
         self.__copy__()
     }
 
-    /// Arguments for restoring the estimator; its matrix is exact up to rounding.
-    #[allow(clippy::type_complexity)]
-    fn __getnewargs_ex__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(
-        (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, f64),
-        Bound<'py, pyo3::types::PyDict>,
-    )> {
-        let weights = pyo3::types::PyDict::new(py);
-        weights.set_item("c", self.weights.c())?;
-        weights.set_item("gamma", self.weights.gamma())?;
-        let own = (self.theta(py), self.covariance(py)?, self.weights.eta());
-        Ok((own, weights))
+    /// As it stands, to be pickled; restored it goes on to the bit.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let others = Others {
+            size: self.size,
+            weights: self.weights,
+            outcome: self.outcome,
+        };
+        Ok(PyBytes::new(py, &self.rls.bytes(others)?))
     }
 
-    fn __getstate__(&self) {}
+    #[staticmethod]
+    fn from_bytes(content: &[u8]) -> PyResult<Self> {
+        let (others, rls) = restored(content)?;
+        let Others {
+            size,
+            weights,
+            outcome,
+        } = others;
+        Ok(Self {
+            rls,
+            size,
+            weights,
+            outcome,
+        })
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let restore = py.get_type::<Self>().getattr("from_bytes")?;
+        Ok((restore, (self.to_bytes(py)?,)))
+    }
 
     fn __repr__(&self) -> String {
         format!("<ctid.ContinuousRls theta = {:?}>", self.rls.theta())

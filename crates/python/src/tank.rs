@@ -1,10 +1,10 @@
-//! A built-in plant: tanks, and linear processes.
+//! One of the plants, fitted to records, and diagnosed.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use ct_signals::{ReadOptions, Reading};
+use ct_signals::{Heading, ReadOptions, Reading};
 use ctid::effort::EffortLevel;
 use ctid::input;
 use ctid::model_file::{self, ModelFile};
@@ -21,37 +21,30 @@ use crate::frame::{Content, Frame};
 use crate::model::contents;
 use crate::{bytes, error, work};
 
-/// Name of the model in messages, instead of a file name.
-const NAME: &str = "the model";
-
-/// A plant, from the text of a model file; it never changes.
-#[pyclass(frozen, module = "ctid._ctid")]
-pub struct Tank {
-    text: String,
-    file: ModelFile,
-}
+/// What stands for the model file in messages.
+pub const NAME: &str = "the model";
 
 /// A plant that was fitted to frames, or diagnosed; it never changes.
 #[pyclass(frozen, module = "ctid._ctid")]
 pub struct TankFit {
     text: String,
     frames: Arc<Vec<Content>>,
-    /// Number of fitted parameters.
+    /// So many of them are fitted.
     fitted: usize,
     problem: Problem,
     found: Found,
     known: Known,
 }
 
-/// Uncertainty of the parameters: names, covariance, degrees of freedom.
+/// How well the parameters are known: names, covariance, degrees of freedom.
 type Known = Option<(Vec<String>, Vec<Vec<f64>>, f64)>;
 
-fn parsed(text: &str) -> Result<ModelFile, ctid::Error> {
+pub fn parsed(text: &str) -> Result<ModelFile, ctid::Error> {
     model_file::parse(NAME, text)
 }
 
 /// The records of a plant as the program checks them.
-fn problem(file: ModelFile, frames: &[Content], fitted: usize) -> Result<Problem, ctid::Error> {
+pub fn problem(file: ModelFile, frames: &[Content], fitted: usize) -> Result<Problem, ctid::Error> {
     let options = ReadOptions::from(file.hold);
     let read = |frame: &Content| frame.record(&file.columns, &options);
     let all = frames
@@ -64,8 +57,14 @@ fn problem(file: ModelFile, frames: &[Content], fitted: usize) -> Result<Problem
     input::problem(NAME, file, records, test)
 }
 
+/// Name and unit of a column.
+pub fn heading(column: &str) -> (String, String) {
+    let Heading { name, unit, .. } = Heading::of(column);
+    (name, unit)
+}
+
 /// Ctrl-C ends a search; of a fit the result is dropped.
-fn options(limit: std::time::Duration, stop: &AtomicBool) -> Options<'_> {
+pub fn options(limit: std::time::Duration, stop: &AtomicBool) -> Options<'_> {
     Options {
         time_limit: Some(limit),
         interrupt: Some(stop),
@@ -73,62 +72,21 @@ fn options(limit: std::time::Duration, stop: &AtomicBool) -> Options<'_> {
     }
 }
 
-#[pymethods]
-impl Tank {
-    #[new]
-    fn new(text: String) -> PyResult<Self> {
-        let file = parsed(&text).map_err(|error| error::of(&error))?;
-        Ok(Self { text, file })
-    }
-
-    #[getter]
-    fn text(&self) -> &str {
-        &self.text
-    }
-
-    #[getter]
-    fn name(&self) -> &'static str {
-        self.file.plant.id()
-    }
-
-    #[getter]
-    fn effects(&self) -> Vec<&'static str> {
-        self.file.effects.iter().map(|e| e.effect.id).collect()
-    }
-
-    /// The columns of the inputs and of the outputs, where they are named.
-    #[getter]
-    fn columns(&self) -> (Vec<String>, Vec<String>) {
-        let columns = &self.file.columns;
-        (columns.inputs.clone(), columns.outputs.clone())
-    }
-
-    /// Number of inputs and outputs.
-    #[getter]
-    fn signals(&self) -> (usize, usize) {
-        let inputs = match self.file.plant.joined() || self.file.known.disturbance.is_some() {
-            true => 2,
-            false => 1,
-        };
-        (inputs, self.file.known.outputs(self.file.plant).len())
-    }
-
-    #[pyo3(signature = (frames, progress=None))]
-    fn fit(
-        &self,
+impl TankFit {
+    /// The plant of a text fitted to frames.
+    pub fn of(
         py: Python<'_>,
-        frames: Vec<Bound<'_, Frame>>,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<TankFit> {
-        let frames = contents(&frames);
+        text: String,
+        frames: Vec<Content>,
+        progress: Option<&Py<PyAny>>,
+    ) -> PyResult<Self> {
         if frames.is_empty() {
             return Err(error::of_data("no record: give a frame, or a list of them"));
         }
-        let (text, file) = (self.text.clone(), self.file.clone());
-        work::run(py, progress.as_ref(), |stop, phases| {
+        work::run(py, progress, |stop, phases| {
             phases.tell("fitting the model");
             let fitted = frames.len();
-            let problem = problem(file, &frames, fitted)?;
+            let problem = problem(parsed(&text)?, &frames, fitted)?;
             let options = options(EffortLevel::Normal.limit(), stop);
             let found = compare(&problem, &options)?;
             let known = missing_effect::fitted(&problem, &options, |fitted| {
@@ -140,7 +98,7 @@ impl Tank {
                 let covariance = known.covariance.clone();
                 Some((names.collect(), covariance, known.freedom))
             })?;
-            Ok(TankFit {
+            Ok(Self {
                 text,
                 frames: Arc::new(frames),
                 fitted,
@@ -163,7 +121,7 @@ impl TankFit {
             .collect()
     }
 
-    /// Half the width of the interval that contains each of them with probability `level`; none for the initial states.
+    /// Half the width of the interval that holds each of them with probability `level`; none of the initial states.
     fn half_widths(&self, level: f64) -> PyResult<Vec<Option<f64>>> {
         if !(level > 0.0 && level < 1.0) {
             return Err(error::of_model(format!(
@@ -192,7 +150,7 @@ impl TankFit {
         units_of(&self.problem.records)
     }
 
-    /// Series as in a diagnosis of a user's own model.
+    /// As of a diagnosis of a model of the user's own.
     #[getter]
     #[allow(clippy::type_complexity)]
     fn series<'py>(
@@ -245,6 +203,18 @@ impl TankFit {
             )
         })
         .collect()
+    }
+
+    /// The units of the input and of the outputs; empty where no record says them.
+    #[getter]
+    fn units(&self) -> (String, String) {
+        let record = self.problem.records.first();
+        let unit = |channels: &[ct_signals::Channel]| {
+            channels
+                .first()
+                .map_or_else(String::new, |c| c.unit.clone())
+        };
+        record.map_or_else(Default::default, |r| (unit(&r.inputs), unit(&r.outputs)))
     }
 
     #[getter]
@@ -306,7 +276,7 @@ impl TankFit {
         simulation(py, &found)
     }
 
-    /// The same fit with held-out records, for their scores.
+    /// The same fit with records that are held out, for their scores.
     fn with_test(&self, py: Python<'_>, test: Vec<Bound<'_, Frame>>) -> PyResult<Self> {
         let mut frames = self.frames[..self.fitted].to_vec();
         frames.extend(contents(&test));
@@ -325,9 +295,9 @@ impl TankFit {
         })
     }
 
-    /// Diagnoses the plant.
+    /// What the plant is missing.
     #[pyo3(signature = (test, *, effort, time_limit, max_effects, seed, progress=None))]
-    #[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
+    #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
     fn diagnose(
         &self,
         py: Python<'_>,
@@ -358,7 +328,7 @@ impl TankFit {
         })
     }
 
-    /// Arguments for restoring the fit: the text and the records; the fit is repeated.
+    /// What it is made of again: the text and the records, with the fit repeated.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let kept = KeptTank {
             text: self.text.clone(),
@@ -370,15 +340,13 @@ impl TankFit {
     #[staticmethod]
     fn from_bytes(py: Python<'_>, content: &[u8]) -> PyResult<Self> {
         let KeptTank { text, frames } = bytes::read(content)?;
-        let tank = Tank::new(text)?;
-        let frames = frames.into_iter().map(|frame| Bound::new(py, Frame(frame)));
-        tank.fit(py, frames.collect::<PyResult<_>>()?, None)
+        Self::of(py, text, frames, None)
     }
 }
 
 /// A fit of a plant as it is pickled.
 #[derive(Serialize, Deserialize)]
-struct KeptTank {
-    text: String,
-    frames: Vec<Content>,
+pub struct KeptTank {
+    pub text: String,
+    pub frames: Vec<Content>,
 }

@@ -21,6 +21,8 @@
 //! linear systems by a stabilized output error method*, WP-85-54, IIASA, Laxenburg, 1985, sections 4 and 5.
 
 mod keep;
+#[cfg(feature = "serde")]
+mod saved;
 
 use ct_constrained::Bounds;
 use ct_rls::{Health, Innovation, Outcome, RecursiveEstimator};
@@ -70,6 +72,8 @@ const LARGEST: f64 = 1e100;
 /// assert!((estimator.theta()[1] - 2.0).abs() < 0.01);
 /// # Ok::<(), stabilized_oe::Error>(())
 /// ```
+///
+/// With the feature `serde` an estimator without rows is saved as it stands, and goes on to the bit when restored.
 #[derive(Clone, Debug)]
 pub struct StabilizedOe<const N: usize, const P: usize, G, D, const R: usize = 0> {
     gain: G,

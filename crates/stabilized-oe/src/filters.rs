@@ -21,6 +21,7 @@ use crate::{Derivatives, Error, IoSample};
 
 /// State variable filters for a model of order `N`.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StateVariableFilters<const N: usize> {
     u: StateVariableFilter,
     y: StateVariableFilter,

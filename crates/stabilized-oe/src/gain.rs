@@ -70,6 +70,8 @@ pub trait Gain<const N: usize, const P: usize> {
 /// Adaptive, it has no proof of convergence, and examples without noise where it ends elsewhere: see the crate's front page.
 /// Constant (`gamma = 0`, `eta = 0`), `V = delta' P^-1 delta` falls, `dV/dt = -2 c eps~^2`.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "I: ct_rls::FactoredIntegrator"))]
 pub struct BlockDiagonal<const N: usize, const P: usize, I: Integrator = ExactHold> {
     theta: ContinuousRls<P, I>,
     filter: ContinuousRls<N, I>,
@@ -205,6 +207,8 @@ impl<const N: usize, const P: usize, I: Integrator> Gain<N, P> for BlockDiagonal
 /// The adaptive gain with a proof: `dV/dt = -eta V - (2 c - gamma) eps~^2` without noise. With noise the paper expects bias, as
 /// `eps~` and `e1` are correlated: prefer it where noise is low.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "I: ct_rls::FactoredIntegrator"))]
 pub struct Full<const N: usize, const P: usize, const T: usize, I: Integrator = ExactHold> {
     rls: ContinuousRls<T, I>,
     /// As in [`BlockDiagonal`].

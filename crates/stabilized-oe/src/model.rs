@@ -13,15 +13,16 @@ use crate::integrator::sealed::ModelRule;
 pub(crate) struct Model<const N: usize, const P: usize> {
     /// `y_m` to `y_m^(n-1)`
     pub state: [f64; N],
-    held: Option<Held<P>>,
+    /// The step under way.
+    pub held: Option<Held<P>>,
 }
 
 /// Values at the beginning of the current step.
 #[derive(Clone, Copy, Debug)]
-struct Held<const P: usize> {
-    theta: [f64; P],
-    inputs: [f64; P],
-    dt: f64,
+pub(crate) struct Held<const P: usize> {
+    pub theta: [f64; P],
+    pub inputs: [f64; P],
+    pub dt: f64,
 }
 
 impl<const N: usize, const P: usize> Model<N, P> {

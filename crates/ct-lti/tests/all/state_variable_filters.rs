@@ -295,3 +295,25 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_restored_filter_goes_on_to_the_bit() {
+    for (order, hold, start) in [
+        (1, Hold::Zero, Start::Zero),
+        (2, Hold::First, Start::Rest),
+        (5, Hold::First, Start::Zero),
+    ] {
+        let filter = StateVariableFilter::with_bandwidth(order, 0.7, hold).unwrap();
+        let mut filter = filter.starting(start);
+        for k in 0..20 {
+            let text = serde_json::to_string(&filter).unwrap();
+            let mut restored: StateVariableFilter = serde_json::from_str(&text).unwrap();
+            let (signal, step) = ((0.3 * f64::from(k)).sin(), [0.5, 0.8][k as usize % 2]);
+            let expected = filter.update(signal, step).unwrap();
+            assert_eq!(restored.update(signal, step).unwrap(), expected);
+        }
+        let mut value = serde_json::to_value(&filter).unwrap();
+        value["denominator"][0] = (-1.0).into();
+        assert!(serde_json::from_value::<StateVariableFilter>(value).is_err());
+    }
+}

@@ -19,11 +19,13 @@ mod interval;
 mod memory;
 mod model;
 mod numbers;
+mod shared;
 mod sliding;
 mod step;
 
 pub use self::model::Model;
 pub use self::numbers::SimulationNumber;
+pub use self::shared::SharedSimulation;
 
 use self::delays::{Delay, Delays};
 use self::exact::Exact;

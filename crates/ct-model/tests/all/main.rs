@@ -11,6 +11,7 @@ mod mutated;
 mod own_candidates;
 mod refused;
 mod round_trip;
+mod shared;
 mod simulated;
 mod support;
 mod threads;

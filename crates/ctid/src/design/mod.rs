@@ -154,7 +154,10 @@ impl Found for Proposal {
 }
 
 /// The effect with one of the two names, and the tank in which it acts.
-pub(crate) fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Candidacy, Error> {
+///
+/// # Errors
+/// For an unknown effect or tank, and for an effect that the model in `file` has already.
+pub fn candidacy(model: &ModelFile, file: &Path, name: &str) -> Result<Candidacy, Error> {
     let (id, place) = match name.split_once(':') {
         Some((id, place)) => (id, Some(place)),
         None => (name, None),

@@ -11,6 +11,7 @@ mod trouble;
 
 use std::io::Write;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::RecvTimeoutError;
 
 use ::monitor::{CandidateModel, Model, Monitor, OwnModel, Settings, Units, Watched};
@@ -65,8 +66,8 @@ impl Arguments {
         };
         let candidates = candidates.into_iter();
         let candidates = candidates.map(|(candidate, model)| CandidateModel { candidate, model });
-        let candidates: Vec<CandidateModel> = candidates.collect();
-        let mut session = Session::new(self, (&file, &candidates), out)?;
+        let candidates: Arc<[CandidateModel]> = candidates.collect();
+        let mut session = Session::new(self, (&file, candidates), out)?;
         let note = file.loop_said(Look::plain());
         if !note.is_empty() {
             session.screen.say(note.trim_end());
@@ -125,20 +126,20 @@ impl From<Error> for Halt {
 enum Believed<'a> {
     Plant(Box<Model>),
     /// A user's own model with the candidates of its file, and the seconds in one unit of its time.
-    Own(&'a OwnModelFile, &'a [CandidateModel], f64),
+    Own(&'a OwnModelFile, Arc<[CandidateModel]>, f64),
 }
 
-impl<'a> Believed<'a> {
-    fn watched(&self) -> Watched<'a> {
+impl Believed<'_> {
+    fn watched(&self) -> Watched {
         match self {
             Self::Plant(model) => Model::clone(model).into(),
             Self::Own(file, candidates, time_unit) => OwnModel {
-                model: &file.model,
+                model: Arc::new(file.model.clone()),
                 known: file.known.clone(),
                 priors: file.priors.clone(),
                 hold: file.hold,
                 time_unit: *time_unit,
-                candidates,
+                candidates: Arc::clone(candidates),
             }
             .into(),
         }
@@ -152,7 +153,7 @@ struct Session<'a> {
     model: Believed<'a>,
     columns: Columns,
     settings: Settings,
-    monitor: Monitor<'a>,
+    monitor: Monitor,
     /// Conversion of each input and output of a user's own model to the model's unit.
     conversions: Vec<Option<Conversion>>,
     /// Whether the monitor continues from a saved state.
@@ -176,7 +177,7 @@ struct Session<'a> {
 impl<'a> Session<'a> {
     fn new(
         arguments: &'a Arguments,
-        (file, candidates): (&'a AnyModelFile, &'a [CandidateModel]),
+        (file, candidates): (&'a AnyModelFile, Arc<[CandidateModel]>),
         out: &'a mut dyn Write,
     ) -> Result<Self, Error> {
         let settings = Settings {
@@ -294,7 +295,8 @@ impl<'a> Session<'a> {
 }
 
 /// The settings of the model file that the monitor needs.
-fn believed(file: &ModelFile) -> Model {
+#[must_use]
+pub fn believed(file: &ModelFile) -> Model {
     Model {
         plant: file.plant,
         known: file.known.clone(),

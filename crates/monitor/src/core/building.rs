@@ -15,7 +15,7 @@ use crate::{
 /// Number of rows for settling when the simulation is built again.
 const RUN_UP: usize = 1024;
 
-impl<'a> Core<'a> {
+impl Core {
     pub(super) fn set_checkpoint(&mut self) {
         self.since.clear();
         self.checkpoint.clone_from(&self.now);
@@ -53,7 +53,7 @@ impl<'a> Core<'a> {
         self.running = self.running_from(states, at_rest);
     }
 
-    pub(super) fn running_from(&self, states: &[f64], at_rest: f64) -> Option<Running<'a>> {
+    pub(super) fn running_from(&self, states: &[f64], at_rest: f64) -> Option<Running> {
         let learned = self.now.learned.as_ref()?;
         let bank = self.now.bank.as_ref()?;
         let watch = Watch::new(&self.model, learned, self.hold(), states, at_rest)?;

@@ -16,7 +16,7 @@ use crate::{
     watch::as_learned,
 };
 
-impl Core<'_> {
+impl Core {
     /// Starts learning again.
     pub(super) fn begin(&mut self, every: usize) {
         self.now.phase = Phase::Learning {

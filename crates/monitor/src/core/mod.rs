@@ -90,8 +90,8 @@ pub(crate) struct Fed {
 }
 
 /// Objects that are built from the learned numbers.
-struct Running<'a> {
-    watch: Watch<'a>,
+struct Running {
+    watch: Watch,
     tracker: Option<Tracker>,
     covariance: Vec<f64>,
     threshold: f64,
@@ -99,20 +99,20 @@ struct Running<'a> {
     most: Vec<Most>,
 }
 
-pub(crate) struct Core<'a> {
-    model: Watched<'a>,
+pub(crate) struct Core {
+    model: Watched,
     settings: Settings,
     units: Units,
     pub(crate) axis: TimeAxis,
     /// The present state, except for the tracker, which is that of the last checkpoint.
     now: Checkpoint,
-    running: Option<Running<'a>>,
+    running: Option<Running>,
     checkpoint: Checkpoint,
     since: Vec<Sample>,
 }
 
-impl<'a> Core<'a> {
-    pub(crate) fn new(model: Watched<'a>, settings: Settings, units: Units) -> Self {
+impl Core {
+    pub(crate) fn new(model: Watched, settings: Settings, units: Units) -> Self {
         let outputs = model.0.outputs();
         let now = Checkpoint {
             phase: Phase::Learning {
@@ -142,7 +142,7 @@ impl<'a> Core<'a> {
 
     /// Restores from a checkpoint and the rows since; inconsistent data are reported in words.
     pub(crate) fn restore(
-        model: Watched<'a>,
+        model: Watched,
         settings: Settings,
         units: Units,
         checkpoint: Checkpoint,

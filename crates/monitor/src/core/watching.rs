@@ -23,7 +23,7 @@ const QUIET: f64 = 0.75;
 /// ... for this number of slowest time constants, the longest window of the scores.
 const QUIET_FOR: f64 = 6.0;
 
-impl Core<'_> {
+impl Core {
     /// After a long gap: the collected rows do not continue, and levels are not known.
     pub(super) fn resume(&mut self, sample: &Sample) -> Option<Notice> {
         let Some(learned) = &self.now.learned else {

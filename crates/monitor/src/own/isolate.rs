@@ -141,8 +141,8 @@ struct Window {
     candidates: Vec<Candidate>,
 }
 
-struct Search<'s, 'a> {
-    own: &'s OwnModel<'a>,
+struct Search<'s> {
+    own: &'s OwnModel,
     spec: &'s ModelSpec,
     /// All parameters of the learned model.
     theta: Vec<f64>,
@@ -153,7 +153,7 @@ struct Search<'s, 'a> {
     samples: f64,
 }
 
-impl Search<'_, '_> {
+impl Search<'_> {
     fn window(&self, rows: &[Kept], hold: Hold) -> Option<Window> {
         let first = rows.first()?;
         let reading = |output: usize| {
@@ -171,7 +171,7 @@ impl Search<'_, '_> {
             hold,
         )];
         let states = first.states.to_vec();
-        let setup = self.setup(self.own.model, &records, &BTreeMap::new())?;
+        let setup = self.setup(&self.own.model, &records, &BTreeMap::new())?;
         let x = self.vector(&setup, &states);
         let without = squares(&setup, &x, &self.noise)?.cost() / self.sigmas.first()?.powi(2);
         let by_row = |k: usize| records[0].inputs.iter().map(|u| u.values[k]).collect();

@@ -62,7 +62,7 @@ pub(super) fn learn(
         ));
     }
     let said = |error: &dyn std::fmt::Display| error.to_string();
-    let setup = ModelSetup::new(own.model, records, &own.known, own.time_unit)
+    let setup = ModelSetup::new(&own.model, records, &own.known, own.time_unit)
         .and_then(|setup| setup.with_priors(&own.priors))
         .map_err(|error| said(&error))?;
     ct_signals::require_samples(records, setup.free().len()).map_err(|error| said(&error))?;
@@ -130,7 +130,7 @@ fn mean_states(
     hold: Hold,
 ) -> Result<Vec<f64>, String> {
     let mut simulation =
-        Simulation::<f64>::new(own.model, &own.parameters_with(theta), states, 0.0);
+        Simulation::<f64>::new(&own.model, &own.parameters_with(theta), states, 0.0);
     let mut sums = states.to_vec();
     let mut time = 0.0;
     for pair in samples.windows(2) {
@@ -174,7 +174,7 @@ fn time_constant(
     for first in (0..n).step_by(LANES) {
         let lane = |i: usize| i.checked_sub(first).unwrap_or(LANES);
         let initial: Vec<_> = (0..n).map(|i| Dual::variable(states[i], lane(i))).collect();
-        let mut simulation = Simulation::new(own.model, &parameters, &initial, 0.0);
+        let mut simulation = Simulation::new(&own.model, &parameters, &initial, 0.0);
         simulation
             .advance(&inputs, &inputs, interval / own.time_unit)
             .map_err(|error| error.to_string())?;

@@ -31,9 +31,9 @@ use crate::{
 
 /// A user's own model, and its known properties.
 #[derive(Debug, Clone)]
-pub struct OwnModel<'a> {
+pub struct OwnModel {
     /// The model.
-    pub model: &'a Model,
+    pub model: Arc<Model>,
     /// Parameters that are not fitted, by name.
     pub known: BTreeMap<String, f64>,
     /// Priors of parameters, by name.
@@ -43,7 +43,7 @@ pub struct OwnModel<'a> {
     /// Seconds in one unit of the model's time, above zero.
     pub time_unit: f64,
     /// Candidates of the user's own, for the isolation in addition to the catalogue's effects.
-    pub candidates: &'a [CandidateModel],
+    pub candidates: Arc<[CandidateModel]>,
 }
 
 /// A candidate of the user's own, and the watched model with it.
@@ -55,17 +55,17 @@ pub struct CandidateModel {
     pub model: Model,
 }
 
-impl<'a> OwnModel<'a> {
+impl OwnModel {
     /// The model with default settings: time in seconds, inputs held between rows.
     #[must_use]
-    pub fn new(model: &'a Model) -> Self {
+    pub fn new(model: impl Into<Arc<Model>>) -> Self {
         Self {
-            model,
+            model: model.into(),
             known: BTreeMap::new(),
             priors: BTreeMap::new(),
             hold: Hold::Zero,
             time_unit: 1.0,
-            candidates: &[],
+            candidates: Arc::new([]),
         }
     }
 
@@ -127,13 +127,13 @@ fn put_in(alarm: &mut Alarm, suspects: &[isolate::Suspect]) {
     });
 }
 
-impl<'a> From<OwnModel<'a>> for Watched<'a> {
-    fn from(model: OwnModel<'a>) -> Self {
+impl From<OwnModel> for Watched {
+    fn from(model: OwnModel) -> Self {
         Self(Arc::new(model))
     }
 }
 
-impl<'a> Believed<'a> for OwnModel<'a> {
+impl Believed for OwnModel {
     fn check(&self) -> Result<(), Error> {
         let mut expressions = self.model.spec().expressions();
         if expressions.any(|e| e.any(&|part| matches!(part, Expression::Time))) {
@@ -208,12 +208,7 @@ impl<'a> Believed<'a> for OwnModel<'a> {
         parameters
     }
 
-    fn run(
-        &self,
-        learned: &Learned,
-        states: &[f64],
-        _at_rest: f64,
-    ) -> Option<Box<dyn Running + 'a>> {
+    fn run(&self, learned: &Learned, states: &[f64], _at_rest: f64) -> Option<Box<dyn Running>> {
         (states.len() == self.states()).then(|| running(self, &learned.theta, states))
     }
 

@@ -3,14 +3,16 @@
 //! Simulations that carry a few derivatives each run side by side until every watched parameter has one. **Cost** of a row: so many simulations of the
 //! model from row to row; nothing is allocated, but for the past of what is delayed.
 
-use ct_model::{Dual, Simulation, SimulationNumber};
+use std::sync::Arc;
+
+use ct_model::{Dual, SharedSimulation, SimulationNumber};
 use ct_signals::Hold;
 
 use super::OwnModel;
 use crate::{Each, intake::Sample, sensitivity::Model as Running};
 
-struct Lanes<'a, T> {
-    simulations: Vec<Simulation<'a, T>>,
+struct Lanes<T> {
+    simulations: Vec<SharedSimulation<T>>,
     /// Outputs of each simulation.
     observed: Vec<Vec<T>>,
     /// Model's time since its start, and its units in one second.
@@ -21,22 +23,18 @@ struct Lanes<'a, T> {
 }
 
 /// The model with these monitored parameters, from these states, which do not depend on parameters.
-pub(super) fn running<'a>(
-    own: &OwnModel<'a>,
-    theta: &[f64],
-    states: &[f64],
-) -> Box<dyn Running + 'a> {
+pub(super) fn running(own: &OwnModel, theta: &[f64], states: &[f64]) -> Box<dyn Running> {
     match theta.len() {
         0..=4 => Box::new(running_in::<Dual<4>>(own, theta, states)),
         _ => Box::new(running_in::<Dual<8>>(own, theta, states)),
     }
 }
 
-fn running_in<'a, T: SimulationNumber>(
-    own: &OwnModel<'a>,
+fn running_in<T: SimulationNumber + 'static>(
+    own: &OwnModel,
     theta: &[f64],
     states: &[f64],
-) -> Lanes<'a, T> {
+) -> Lanes<T> {
     let watched = own.watched();
     let values = own.parameters_with(theta);
     let states: Vec<T> = states.iter().map(|x| T::constant(*x)).collect();
@@ -47,7 +45,7 @@ fn running_in<'a, T: SimulationNumber>(
             .enumerate()
             .map(|(i, value)| T::variable(*value, lane(i)))
             .collect();
-        Simulation::new(own.model, &parameters, &states, 0.0)
+        SharedSimulation::new(Arc::clone(&own.model), &parameters, &states, 0.0)
     };
     let simulations: Vec<_> = watched.chunks(T::LANES).map(with_derivatives).collect();
     let outputs = own.model.spec().outputs.len();
@@ -60,7 +58,7 @@ fn running_in<'a, T: SimulationNumber>(
     }
 }
 
-impl<T: SimulationNumber> Running for Lanes<'_, T> {
+impl<T: SimulationNumber> Running for Lanes<T> {
     fn observe(&mut self, sample: &Sample) {
         for (simulation, observed) in self.simulations.iter_mut().zip(&mut self.observed) {
             simulation.read(&sample.inputs, observed);
@@ -93,7 +91,7 @@ impl<T: SimulationNumber> Running for Lanes<'_, T> {
 
     fn states(&self) -> Each<f64> {
         let first = self.simulations.first();
-        let states = first.map_or(&[][..], Simulation::state);
+        let states = first.map_or(&[][..], SharedSimulation::state);
         states.iter().map(|x| x.value()).collect()
     }
 

@@ -177,7 +177,7 @@ fn a_saved_state_goes_on_as_if_nothing_had_happened() {
         all(&mut first, &rows[..at]);
         let text = serde_json::to_string(&first.state()).unwrap();
         let state: State = serde_json::from_str(&text).unwrap();
-        let own = OwnModel::new(&plant.model);
+        let own = OwnModel::new(plant.model.clone());
         let mut second = Monitor::restore(own, Settings::default(), state).unwrap();
         assert_eq!(words(&all(&mut second, &rows[at..])), words(&whole[at..]));
     }
@@ -188,7 +188,7 @@ fn a_saved_state_goes_on_as_if_nothing_had_happened() {
             .replace("20*(T1", "21*(T1")
             .replace("h*(T1", "2*h*(T1"),
     );
-    let refused = Monitor::restore(OwnModel::new(&other), Settings::default(), state);
+    let refused = Monitor::restore(OwnModel::new(other), Settings::default(), state);
     assert!(matches!(refused, Err(Error::OtherModel { .. })));
 }
 
@@ -257,7 +257,7 @@ end Delayed;
 fn what_cannot_be_watched_is_said() {
     let of = |text: &str| {
         let model = model(text);
-        Monitor::new(OwnModel::new(&model), Settings::default(), Units::default()).err()
+        Monitor::new(OwnModel::new(model), Settings::default(), Units::default()).err()
     };
     let timed = BLOCK.replace("- loss;", "- loss + sin(time);");
     assert!(matches!(of(&timed), Some(Error::Time)));
@@ -294,7 +294,7 @@ fn what_cannot_be_watched_is_said() {
     assert_eq!((refused.column(), refused.at()), ("input", 1));
     // All four parameters of the block have one scale in common.
     let plant = Plant::block(1000, 91);
-    let unknown = OwnModel::new(&plant.model);
+    let unknown = OwnModel::new(plant.model.clone());
     let mut monitor = Monitor::new(unknown, Settings::default(), Units::default()).unwrap();
     let steps = all(&mut monitor, &plant.run());
     let mut said = steps.iter().flat_map(|step| step.notices.iter().flatten());

@@ -74,7 +74,7 @@ fn last_alarm(begins: &str, sizes: &[f64], candidates: &[CandidateModel]) -> Ala
     };
     plant.parameters = vec![(0, with(&without)), (ONSET, with(sizes))];
     let own = OwnModel {
-        candidates,
+        candidates: candidates.into(),
         ..own(&watched)
     };
     let mut monitor = Monitor::new(own, Settings::default(), Units::default()).unwrap();

@@ -11,7 +11,7 @@ pub fn units() -> Units {
 }
 
 /// A monitor of a model with the usual settings.
-pub fn new(model: Model) -> Monitor<'static> {
+pub fn new(model: Model) -> Monitor {
     Monitor::new(model, Settings::default(), units()).unwrap()
 }
 

@@ -11,6 +11,7 @@ mod orders;
 mod positive_real;
 mod printed_sign;
 mod rows;
+mod saved;
 mod summed;
 mod support;
 mod threads;

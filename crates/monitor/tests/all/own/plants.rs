@@ -116,15 +116,15 @@ impl Plant {
 pub(super) const HEATERS_TRUE: [f64; 6] = [20.0, 0.25, 0.4, 0.3, 0.6, 0.55];
 
 /// Known constants of the block: without its capacity the other parameters have no scale.
-pub(crate) fn own(model: &Model) -> OwnModel<'_> {
-    let mut own = OwnModel::new(model);
+pub(crate) fn own(model: &Model) -> OwnModel {
+    let mut own = OwnModel::new(model.clone());
     if model.spec().name == "HeatedBlock" {
         own.known.insert("C".to_string(), 52.0);
     }
     own
 }
 
-pub(super) fn monitor(model: &Model) -> Monitor<'_> {
+pub(super) fn monitor(model: &Model) -> Monitor {
     Monitor::new(own(model), Settings::default(), Units::default()).unwrap()
 }
 

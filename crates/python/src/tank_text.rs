@@ -1,0 +1,66 @@
+//! One of the plants as the text of a model.
+
+use std::collections::BTreeMap;
+
+use ct_model::{Given, ModelSpec, Output, Variable};
+use ctid::model_file::ModelFile;
+use plants::Plant;
+use pyo3::prelude::*;
+
+use crate::error;
+
+/// The text's names of what is known of the vessels, in their order.
+fn areas(plant: Plant) -> &'static [&'static str] {
+    match plant.vessels() {
+        3 => &["area_1", "area_3", "area_2"],
+        2 => &["area_upper", "area_lower"],
+        _ => &["area"],
+    }
+}
+
+/// The plant's text with what is known, these values of its parameters and initial levels, and the outputs that are read.
+pub fn spec(file: &ModelFile, values: &BTreeMap<String, f64>) -> PyResult<ModelSpec> {
+    let plant = file.plant;
+    let on: Vec<&str> = file.effects.iter().map(|placed| placed.effect.id).collect();
+    let terms = file.terms.iter().map(|own| own.term.name.as_str());
+    let on = on.into_iter().chain(terms).collect::<Vec<_>>();
+    if !on.is_empty() {
+        return Err(error::of_model(format!(
+            "the text of {} has no {}: an effect of a tank has no matrices; write the balance as a model of your own, or linearise the tank without it",
+            plant.id(),
+            on.join(", ")
+        )));
+    }
+    if file.known.disturbed_vessel(plant).is_some() {
+        return Err(error::of_model(format!(
+            "the text of {} has no measured disturbance: write the balance as a model of your own",
+            plant.id()
+        )));
+    }
+    let mut spec = ModelSpec::parse(plant.text()).map_err(error::of_model)?;
+    let fitted = spec.parameters.iter().filter(|p| p.given == Given::Fitted);
+    let names = fitted.map(|parameter| parameter.about.name.as_str());
+    let lacking: Vec<&str> = names.filter(|name| !values.contains_key(*name)).collect();
+    if !lacking.is_empty() {
+        return Err(error::of_model(format!(
+            "{} has no values of {}: fit it first, fit(...).model, or give them as start={{...}}",
+            plant.id(),
+            lacking.join(", ")
+        )));
+    }
+    for parameter in &mut spec.parameters {
+        let name = parameter.about.name.as_str();
+        let vessel = areas(plant).iter().position(|area| *area == name);
+        let known = match (vessel, name) {
+            (Some(vessel), _) => file.known.area[vessel],
+            (None, "orifice") => file.known.orifice,
+            _ => values.get(name).copied(),
+        };
+        parameter.value = known.unwrap_or(parameter.value);
+    }
+    let state = |vessel: usize| Output {
+        variable: Variable::State(vessel),
+    };
+    spec.outputs = file.known.outputs(plant).into_iter().map(state).collect();
+    Ok(spec)
+}

@@ -1,0 +1,100 @@
+"""What else a plant of the program can do: a monitor beside it, its matrices, its next experiment."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from . import _ctid
+from ._ctid import ModelError
+from ._frames import table
+from ._linear import StateSpace, state_space
+from ._model import Design, Progress, _clear, _teller
+from ._monitor import Monitor
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def linearized(tank: _ctid.Tank, values: Mapping[str, float], at: Mapping[str, float] | None) -> StateSpace:
+    """The matrices of a plant with these values of its parameters."""
+    point = {str(name): float(value) for name, value in (at or {}).items()}
+    return state_space(tank.linearize(dict(values), point))
+
+
+def monitored(
+    tank: _ctid.Tank, units: tuple[str, str], false_alarm_every: float, learn: int, time_unit: float
+) -> Monitor:
+    """A plant beside a running one; `units` are those of the command and of the readings."""
+    if time_unit != 1.0:
+        raise ModelError(f"{tank.name}: the time of a plant is in s, leave time_unit out")
+    return Monitor(tank.monitor(units, float(false_alarm_every), int(learn)))
+
+
+def _of_the_only(what: str, given: Mapping[str, Any], name: str, plant: str) -> Any:
+    """What is given for the one signal that is applied."""
+    for other in given:
+        if other != name:
+            raise ModelError(f'{what}: "{other}" is not applied to {plant}: its experiment has the one signal "{name}"')
+    return given.get(name)
+
+
+def designed(
+    content: bytes,
+    plant: str,
+    applied: str,
+    between: tuple[str, str],
+    ranges: Mapping[str, tuple[float, float]],
+    slews: Mapping[str, float],
+    inputs: Sequence[str],
+    *,
+    duration: float | None,
+    effort: str,
+    time_limit: float | None,
+    seed: int,
+    progress: Progress,
+) -> TankDesign:
+    """The experiment that tells two effects apart; `content`: the plant and its records as a fit of it is pickled."""
+    first, second = between
+    for name in inputs:
+        _of_the_only("inputs", {name: None}, applied, plant)
+    found = _of_the_only("ranges", ranges, applied, plant)
+    slew = _of_the_only("slews", slews, applied, plant)
+    try:
+        text = _ctid.tank_design(
+            content,
+            (str(first), str(second)),
+            range=None if found is None else (float(found[0]), float(found[1])),
+            slew=None if slew is None else float(slew),
+            duration=duration,
+            seed=seed,
+            effort=effort,
+            time_limit=time_limit,
+            progress=_teller(progress),
+        )
+    finally:
+        _clear(progress)
+    return TankDesign(json.loads(text), 1.0)
+
+
+class TankDesign(Design):
+    """An experiment that was proposed for a plant; it never changes."""
+
+    __slots__ = ()
+
+    @property
+    def experiment(self) -> pd.DataFrame:
+        """The best experiment, to be applied: the command, in its unit; the index is the time in s."""
+        found = self._found["experiment"]
+        result: pd.DataFrame = table({found["name"]: found["values"]}, found["time"], "t [s]")
+        return result
+
+    @property
+    def experiments(self) -> pd.DataFrame:
+        """All experiments that were tried, the best first: what each applies, and the probability with which it decides."""
+        name = self._found["experiment"]["name"]
+        all = self._found["candidates"]
+        applied = [f"{name}: {e['kind']} {e['low']:.3g}..{e['high']:.3g}" for e in all]
+        result: pd.DataFrame = table({"inputs": applied, "decides": [e["power"]["decides"] for e in all]})
+        return result

@@ -1,6 +1,7 @@
 //! Plants with numbers, inputs, and a reference that integrates the written equations by other means.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+pub mod passes;
 pub mod reference;
 
 use plants::{
@@ -260,14 +261,9 @@ impl Case {
 
     /// The output with its derivatives by all variables.
     pub fn run_dual(&self, input: &[(Command, f64)], substeps: usize) -> Vec<Dual<16>> {
-        let variables: Vec<Dual<16>> = self
-            .variables()
-            .iter()
-            .enumerate()
-            .map(|(i, &v)| Dual::variable(v, i))
-            .collect();
-        assert!(variables.len() <= 16);
-        self.run_at(&variables, input, substeps)
+        passes::both(&self.variables(), |variables| {
+            self.run_at(variables, input, substeps)
+        })
     }
 }
 

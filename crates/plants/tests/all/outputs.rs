@@ -1,7 +1,7 @@
 //! Plants of which several levels are read.
 
 use crate::support::{Case, DRIVES, base, effect, input, interior, mirrored, passes};
-use plants::{Command, Known, Placed, Plant, Scalar, Simulator, SimulatorNumber, Structure};
+use plants::{Command, Known, Placed, Plant, Simulator, SimulatorNumber, Structure};
 
 /// The plant with these levels read, in this order.
 fn reading(plant: Plant, measured: &[usize]) -> Case {

@@ -2,7 +2,7 @@
 
 use crate::support;
 use crate::support::{Case, base, difference, effect, passes, placements, random_sets, reference};
-use plants::{Command, Dual, Outlet, Plant, Scalar, Simulator};
+use plants::{Command, Dual, Outlet, Plant, Simulator};
 use proptest::prelude::*;
 
 /// Somewhere between two bounds, by a share: on a scale of decades where both are positive and far apart.

@@ -5,8 +5,8 @@ pub mod passes;
 pub mod reference;
 
 use plants::{
-    CATALOGUE, Command, Dual, Known, Outlet, ParameterInfo, Placed, Plant, Scalar, Scales,
-    Simulator, SimulatorNumber, Structure,
+    CATALOGUE, Command, Dual, Known, Outlet, ParameterInfo, Placed, Plant, Scales, Simulator,
+    SimulatorNumber, Structure,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,4 +1,4 @@
-//! Sixteen derivatives in two passes: a simulator takes at most twelve.
+//! Sixteen derivatives in two passes: a simulator takes at most eight.
 
 use plants::{Dual, Scalar};
 
@@ -17,7 +17,8 @@ pub fn both(values: &[f64], run: impl Fn(&[Dual<8>]) -> Vec<Dual<8>>) -> Vec<Dua
     let [low, high] = [0, 8].map(|first| run(&variables(values, first)));
     assert_eq!(low.len(), high.len());
     let join = |(low, high): (&Dual<8>, &Dual<8>)| {
-        assert_eq!(low.re.to_bits(), high.re.to_bits());
+        // Which formula is taken depends on whether derivatives differ: values agree to rounding.
+        assert!((low.re - high.re).abs() <= 1e-12 * low.re.abs().max(1.0));
         let mut both = Dual::constant(low.re);
         both.eps[..8].copy_from_slice(&low.eps);
         both.eps[8..].copy_from_slice(&high.eps);

@@ -66,6 +66,7 @@ pub(crate) fn model(
 ) -> Result<Box<dyn Model>, plants::Error> {
     match lanes(theta.len()) {
         0..=4 => simulated_in::<Dual<4>>(structure, substeps, theta, levels, at_rest),
+        9..=12 => simulated_in::<Dual<12>>(structure, substeps, theta, levels, at_rest),
         _ => simulated_in::<Dual<8>>(structure, substeps, theta, levels, at_rest),
     }
 }

@@ -77,7 +77,10 @@ impl Setup<'_> {
             .count();
         match parameters + self.states() {
             0..=4 => self.each_row_in::<Dual<4>>(x, &self.free, each),
-            _ => self.each_row_in::<Dual<8>>(x, &self.free, each),
+            5..=8 => self.each_row_in::<Dual<8>>(x, &self.free, each),
+            9..=12 => self.each_row_in::<Dual<12>>(x, &self.free, each),
+            13..=16 => self.each_row_in::<Dual<8>>(x, &self.free, each),
+            _ => self.each_row_in::<Dual<12>>(x, &self.free, each),
         }
     }
 

@@ -27,7 +27,7 @@ pub trait Compiled: Scalar {
     fn step(simulator: &mut Simulator<Self>, from: Self, to: Option<f64>, second: Command, h: f64);
 }
 
-/// The numbers that a [`Simulator`] runs on: `f64`, and duals with 4 or 8 derivatives; where there are more, several simulators run side by side.
+/// The numbers that a [`Simulator`] runs on: `f64`, and duals with 4, 8 or 12 derivatives; where there are more, several simulators run side by side.
 pub trait SimulatorNumber: Compiled {}
 
 impl<T: Compiled> SimulatorNumber for T {}
@@ -62,4 +62,4 @@ macro_rules! compile_for {
     )*};
 }
 
-compile_for!(f64, Dual<4>, Dual<8>);
+compile_for!(f64, Dual<4>, Dual<8>, Dual<12>);

@@ -1,4 +1,4 @@
-//! Sixteen derivatives in two passes: a simulator takes at most eight.
+//! Sixteen derivatives in two passes: a simulator takes at most twelve.
 
 use plants::{Dual, Scalar};
 

@@ -31,7 +31,7 @@ pub trait Compiled: Scalar {
     ) -> Result<(), NoSolution>;
 }
 
-/// The numbers that a [`Simulation`] runs on: `f64`, and duals with 2, 4, 8 or 12 derivatives; where there are more, several simulations run side by side.
+/// The numbers that a [`Simulation`] runs on: `f64`, and duals with 2, 4, 8, 12 or 16 derivatives.
 pub trait SimulationNumber: Compiled {}
 
 impl<T: Compiled> SimulationNumber for T {}
@@ -68,4 +68,4 @@ macro_rules! compile_for {
     )*};
 }
 
-compile_for!(f64, Dual<2>, Dual<4>, Dual<8>, Dual<12>);
+compile_for!(f64, Dual<2>, Dual<4>, Dual<8>, Dual<12>, Dual<16>);

@@ -109,8 +109,9 @@ impl<'a> ModelSetup<'a> {
             3..=4 => self.each_row_in::<Dual<4>>(x, &self.free, each),
             5..=8 => self.each_row_in::<Dual<8>>(x, &self.free, each),
             9..=12 => self.each_row_in::<Dual<12>>(x, &self.free, each),
-            13..=16 => self.each_row_in::<Dual<8>>(x, &self.free, each),
-            _ => self.each_row_in::<Dual<12>>(x, &self.free, each),
+            13..=16 => self.each_row_in::<Dual<16>>(x, &self.free, each),
+            17..=24 => self.each_row_in::<Dual<12>>(x, &self.free, each),
+            _ => self.each_row_in::<Dual<16>>(x, &self.free, each),
         }
     }
 

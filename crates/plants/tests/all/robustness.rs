@@ -178,9 +178,9 @@ fn a_level_a_little_above_a_hole_settles() {
                 // The step of the Dormand-Prince method shrinks to zero at a root; many short steps are as good.
                 let fine = case.run_dual(&input, (8.0 * stretch) as usize);
                 let coarse = case.run_dual(&input, 1);
-                let values = |run: &[Dual<15>]| run.iter().map(|y| y.re).collect::<Vec<_>>();
+                let values = |run: &[Dual<16>]| run.iter().map(|y| y.re).collect::<Vec<_>>();
                 let error = difference(&values(&coarse), &values(&fine));
-                let last = |run: &[Dual<15>]| run.last().unwrap().eps;
+                let last = |run: &[Dual<16>]| run.last().unwrap().eps;
                 let slopes = difference(&last(&coarse), &last(&fine));
                 println!(
                     "{largest:8.1e} {error:8.1e} {slopes:8.1e} {above} {stretch} {}",

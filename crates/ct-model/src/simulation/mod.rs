@@ -99,7 +99,7 @@ pub struct Simulation<'a, T> {
 }
 
 impl<'a, T: SimulationNumber> Simulation<'a, T> {
-    /// Begins at `start` on the clock that `time` follows, with parameters in the order of [`ModelSpec::parameters`] and a value for
+    /// Begins at `start` on the clock that `time` follows, with parameters in the order of [`crate::ModelSpec::parameters`] and a value for
     /// each state.
     ///
     /// # Panics

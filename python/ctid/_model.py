@@ -16,7 +16,6 @@ from ._frames import Array, Data, Records, as_list, index_of, need_pandas, serie
 
 from ._linear import StateSpace, state_space
 from ._monitor import Monitor
-from ._page import write_page
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -510,8 +509,9 @@ class Fit:
         return self._native.to_modelica()
 
     def report(self, path: str | os.PathLike[str]) -> None:
-        """Writes the page of `ctid compare --report`, which needs no network. plotly has to be installed: `pip install ctid[report]`."""
-        write_page(path, self._native.html)
+        """Writes the page of `ctid compare --report`, which needs no network."""
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(self._native.html())
 
     def plot(self, ax: Any = None) -> Any:
         """Measured and simulated outputs, and their residuals; returns matplotlib axes."""
@@ -633,8 +633,9 @@ class Diagnosis:
         return result
 
     def report(self, path: str | os.PathLike[str]) -> None:
-        """Writes the page of `ctid diagnose --report`, which needs no network. plotly has to be installed: `pip install ctid[report]`."""
-        write_page(path, lambda: self._page)
+        """Writes the page of `ctid diagnose --report`, which needs no network."""
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(self._page)
 
     @property
     def _title(self) -> str:

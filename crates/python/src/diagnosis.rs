@@ -106,7 +106,7 @@ impl Diagnosis {
             .sentences
     }
 
-    /// The page of `ctid diagnose --report`, without plotly.js.
+    /// The page of `ctid diagnose --report`.
     fn html(&self, py: Python<'_>) -> String {
         py.detach(|| diagnosed_page(&self.model.file, &self.records, &self.found).html())
     }

@@ -246,7 +246,7 @@ impl Fit {
         crate::diagnosis::json(&self.comparison)
     }
 
-    /// The page of `ctid compare --report`, without plotly.js.
+    /// The page of `ctid compare --report`.
     fn html(&self, py: Python<'_>) -> String {
         py.detach(|| ctid::report::html(self.page()))
     }

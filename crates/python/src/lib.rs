@@ -11,7 +11,6 @@
 //! | a model beside a running plant | `monitor.rs` |
 //! | linear models from records | `identify.rs` |
 //! | recursive estimators, and output error in a loop | `rls.rs`, `oe.rs` |
-//! | plotly.js in pages | `page.rs` |
 //! | published tables | `tables.rs` |
 //! | objects as bytes, for `pickle` | `bytes.rs` |
 //!
@@ -27,7 +26,6 @@ mod linear;
 mod model;
 mod monitor;
 mod oe;
-mod page;
 mod rls;
 mod tables;
 mod tank;
@@ -57,8 +55,6 @@ mod _ctid {
     use crate::monitor::Monitor;
     #[pymodule_export]
     use crate::oe::{StabilizedOe, fcloe_fit};
-    #[pymodule_export]
-    use crate::page::with_plotly;
     #[pymodule_export]
     use crate::rls::ContinuousRls;
     #[pymodule_export]

@@ -243,7 +243,6 @@ impl TankFit {
         json(&self.found)
     }
 
-    /// The page of `ctid compare --report` or `ctid diagnose --report`, without plotly.js.
     fn html(&self, py: Python<'_>) -> String {
         py.detach(|| ctid::report::html(&self.found))
     }

@@ -12,23 +12,12 @@
 //! | the tour | [`tour`] |
 //! | rows watched as they come | [`mod@monitor`] |
 //! | linear models from a record, as text | [`mod@identify`] |
-//! | the page | `serve` |
+//! | the page | [`mod@serve`] |
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
 //! | what is written, and what is not overwritten | [`output`] |
 //!
-//! Features, both on by default: `plotly` puts plotly.js into pages, `serve` is the page that is served.
-//!
 //! The algorithms are in the crates below, the search in `missing-effect`, linear models in `linear-identification`, the papers' tables in
 //! `paper-tables`; here is only what surrounds them.
-
-#![cfg_attr(
-    not(feature = "serve"),
-    allow(
-        dead_code,
-        unused_imports,
-        reason = "only the page that is served uses it"
-    )
-)]
 
 mod atomic;
 pub mod catalogue;
@@ -53,7 +42,6 @@ mod plot;
 mod program;
 pub mod progress;
 pub mod report;
-#[cfg(feature = "serve")]
 pub mod serve;
 mod signature;
 pub mod simulate;

@@ -108,12 +108,6 @@ impl Found for Identification {
 pub fn plan(wanted: &[(Kind, &Path)], inputs: &[&Path]) -> Result<Vec<Output>, Error> {
     let mut outputs = Vec::with_capacity(wanted.len());
     for (index, &(kind, path)) in wanted.iter().enumerate() {
-        if kind == Kind::Report && cfg!(not(feature = "plotly")) {
-            return Err(Error::file(
-                path,
-                "ctid was built without plotly.js, which a page needs; build it with its feature `plotly`",
-            ));
-        }
         if inputs.iter().any(|input| same_file(input, path)) {
             return Err(Error::file(
                 path,

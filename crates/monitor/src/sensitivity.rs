@@ -22,32 +22,25 @@ pub(crate) trait Model: Send + Sync {
     fn stands(&self) -> f64;
 }
 
-/// Simulators side by side, each with derivatives by some of the parameters, in order.
-struct Lanes<T: SimulatorNumber>(Vec<Simulator<T>>);
+struct Lanes<T: SimulatorNumber>(Simulator<T>);
 
 impl<T: SimulatorNumber> Model for Lanes<T> {
     fn observe(&mut self, _sample: &Sample) {}
     fn read(&mut self, output: usize, row: &mut [f64]) -> f64 {
-        let mut value = f64::NAN;
-        for (i, simulator) in self.0.iter_mut().enumerate() {
-            let y = simulator.read(output);
-            for (to, derivative) in row.iter_mut().skip(i * T::LANES).zip(y.slopes()) {
-                *to = *derivative;
-            }
-            value = y.value();
+        let y = self.0.read(output);
+        for (to, derivative) in row.iter_mut().zip(y.slopes()) {
+            *to = *derivative;
         }
-        value
+        y.value()
     }
     fn advance(&mut self, hold: Hold, from: &Sample, to: &Sample) {
-        for simulator in &mut self.0 {
-            simulator.advance(command(hold, from, to), to.time - from.time);
-        }
+        self.0.advance(command(hold, from, to), to.time - from.time);
     }
     fn states(&self) -> Each<f64> {
-        self.0[0].levels().map(Scalar::value).into_iter().collect()
+        self.0.levels().map(Scalar::value).into_iter().collect()
     }
     fn stands(&self) -> f64 {
-        self.0[0].stands()
+        self.0.stands()
     }
 }
 
@@ -66,8 +59,8 @@ pub(crate) fn model(
 ) -> Result<Box<dyn Model>, plants::Error> {
     match lanes(theta.len()) {
         0..=4 => simulated_in::<Dual<4>>(structure, substeps, theta, levels, at_rest),
-        9..=12 => simulated_in::<Dual<12>>(structure, substeps, theta, levels, at_rest),
-        _ => simulated_in::<Dual<8>>(structure, substeps, theta, levels, at_rest),
+        5..=8 => simulated_in::<Dual<8>>(structure, substeps, theta, levels, at_rest),
+        _ => simulated_in::<Dual<MOST_LANES>>(structure, substeps, theta, levels, at_rest),
     }
 }
 
@@ -78,21 +71,15 @@ fn simulated_in<T: SimulatorNumber>(
     levels: &[f64],
     at_rest: f64,
 ) -> Result<Box<dyn Model>, plants::Error> {
+    let theta: Vec<T> = theta
+        .iter()
+        .enumerate()
+        .map(|(lane, value)| T::variable(*value, lane))
+        .collect();
     let levels: Vec<T> = levels.iter().map(|level| T::constant(*level)).collect();
-    let simulator = |first: usize| {
-        let number = |(i, value): (usize, &f64)| match i.checked_sub(first) {
-            Some(lane) => T::variable(*value, lane),
-            None => T::constant(*value),
-        };
-        let theta: Vec<T> = theta.iter().enumerate().map(number).collect();
-        let mut simulator = Simulator::new(structure, &theta, &levels, at_rest)?;
-        simulator.set_substeps(substeps);
-        Ok(simulator)
-    };
-    // At least one, without parameters too.
-    let lanes = (0..lanes(theta.len()).max(1)).step_by(T::LANES);
-    let simulators: Result<_, plants::Error> = lanes.map(simulator).collect();
-    Ok(Box::new(Lanes(simulators?)))
+    let mut simulator = Simulator::new(structure, &theta, &levels, at_rest)?;
+    simulator.set_substeps(substeps);
+    Ok(Box::new(Lanes(simulator)))
 }
 
 /// The command from one sample to the next.

@@ -20,10 +20,8 @@ use crate::look::Look;
 use crate::output::{self, Found, Kind, Output};
 use crate::own_model::{self, AnyModelFile};
 use crate::progress::Bar;
-#[cfg(feature = "serve")]
-use crate::serve;
 use crate::symptoms::Sought;
-use crate::{Error, catalogue, check, design, edit, monitor, tour};
+use crate::{Error, catalogue, check, design, edit, monitor, serve, tour};
 
 /// Finds the physical effect that a model of measured data is missing.
 #[derive(Debug, Parser)]
@@ -61,7 +59,6 @@ enum Command {
     Monitor(monitor::Arguments),
     /// Identify a linear model in continuous time from a record
     Identify(Box<Identify>),
-    #[cfg(feature = "serve")]
     /// Serve the page: the same functions in a browser, on this computer only
     Serve(serve::Arguments),
     /// Compute the tables of a paper again, with many noises, and report which printed figures agree
@@ -179,7 +176,6 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Design(arguments)) => arguments.run(out, look),
         Some(Command::Monitor(arguments)) => arguments.run(out),
         Some(Command::Identify(arguments)) => arguments.run(out, look),
-        #[cfg(feature = "serve")]
         Some(Command::Serve(arguments)) => arguments.run(out),
         Some(Command::Tables(arguments)) => arguments.run(out, look),
     }

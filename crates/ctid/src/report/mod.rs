@@ -1,8 +1,7 @@
 //! The report: one HTML file that holds everything it needs, to be opened beside the plant.
 //!
 //! The words and the tables are written here and stand without a script; the plots are drawn in the
-//! browser by `report.js` with plotly.js, which the build script has packed, or which [`with_plotly`] puts into the page
-//! where ctid was built without its feature `plotly`. The page loads nothing:
+//! browser by `report.js` with plotly.js, which the build script has packed. The page loads nothing:
 //! its content security policy forbids every connection. The same diagnosis gives the same bytes.
 //!
 //! What every page shares is in `page.rs`, `plots.js` and `report.css`; pages whose plots are curves alone say in
@@ -30,10 +29,9 @@ pub(crate) use self::data::{json as drawing, records as drawing_of_records, roun
 pub(crate) use self::decimate::min_max;
 pub use self::identification::html as identification;
 pub(crate) use self::missing_term::{COMPARED, ComparedPort, MissingTerm};
+pub use self::page::head;
 use self::page::{NOTICES, Page, figure, items, large, section};
-#[cfg(feature = "serve")]
 pub(crate) use self::page::{PLOTLY, PLOTS, STYLE};
-pub use self::page::{head, with_plotly};
 use self::residual::{failures, residual_tests, role, unknown, variable};
 pub use self::side_by_side::html as side_by_side;
 use self::text::{escape, significant};

@@ -7,15 +7,8 @@ const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 
 pub(crate) const STYLE: &str = include_str!("report.css");
 /// Colours, axes and the unpacking of plotly.js: included before the page's own script.
 pub(crate) const PLOTS: &str = include_str!("plots.js");
-/// plotly.js, gzipped, in base64; empty without the feature `plotly`.
-#[cfg(feature = "plotly")]
+/// plotly.js, gzipped, in base64.
 pub(crate) const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
-#[cfg(not(feature = "plotly"))]
-pub(crate) const PLOTLY: &str = "";
-
-/// The element that holds plotly.js.
-const PLOTLY_OPENING: &str = "<script type=\"text/plain\" id=\"plotly\">";
-const PLOTLY_CLOSING: &str = "</script>";
 
 /// Message on a page whose scripts do not run.
 pub(super) const NOTICES: &str = "<noscript><p class=\"notice\">The plots need a browser that runs scripts; \
@@ -59,24 +52,10 @@ pub(super) fn html(page: &Page) -> String {
          <link rel=\"icon\" href=\"data:,\">\n\
          <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}\n\
          <script type=\"application/json\" id=\"data\">{data}</script>\n\
-         {PLOTLY_OPENING}{PLOTLY}{PLOTLY_CLOSING}\n\
+         <script type=\"text/plain\" id=\"plotly\">{PLOTLY}</script>\n\
          <script>\n{PLOTS}{script}</script>\n</body>\n</html>\n",
         head()
     )
-}
-
-/// A page with another plotly.js, or, of a build without the feature `plotly`, with one at all.
-///
-/// `packed` is plotly.js gzipped and in base64. A text that is no page of ctid's comes back as it is.
-#[must_use]
-pub fn with_plotly(page: &str, packed: &str) -> String {
-    let parts = page
-        .split_once(PLOTLY_OPENING)
-        .and_then(|(before, rest)| Some((before, rest.split_once(PLOTLY_CLOSING)?.1)));
-    let Some((before, after)) = parts else {
-        return page.to_owned();
-    };
-    [before, PLOTLY_OPENING, packed, PLOTLY_CLOSING, after].concat()
 }
 
 /// A part of the page under a heading; `title`, `lead` and `content` are HTML.

@@ -53,13 +53,12 @@ const plots = (() => {
 
   // Tools above the plot, the names of the curves below it.
   function toolsAbove(made) {
-    made.margin.t = 40;
+    made.margin.t = 34;
     Object.assign(made.legend, { y: 0, yref: "container", yanchor: "bottom" });
   }
 
   const config = (more) => Object.assign({
-    // plotly.js from version 4 on offers to upload what is drawn.
-    displaylogo: false, showSendToCloud: false, responsive: true, displayModeBar: tight() ? false : "hover",
+    displaylogo: false, responsive: true, displayModeBar: tight() ? false : "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], toImageButtonOptions: { scale: 2 },
   }, more);
 

@@ -79,8 +79,10 @@ impl Setup<'_> {
             0..=4 => self.each_row_in::<Dual<4>>(x, &self.free, each),
             5..=8 => self.each_row_in::<Dual<8>>(x, &self.free, each),
             9..=12 => self.each_row_in::<Dual<12>>(x, &self.free, each),
-            13..=16 => self.each_row_in::<Dual<8>>(x, &self.free, each),
-            _ => self.each_row_in::<Dual<12>>(x, &self.free, each),
+            13..=15 => self.each_row_in::<Dual<15>>(x, &self.free, each),
+            16 => self.each_row_in::<Dual<8>>(x, &self.free, each),
+            17..=24 => self.each_row_in::<Dual<12>>(x, &self.free, each),
+            _ => self.each_row_in::<Dual<15>>(x, &self.free, each),
         }
     }
 

@@ -72,23 +72,18 @@ fn run(case: &Case, model: &Model, input: &[(Command, f64)]) -> (Vec<Dual<LANES>
 fn off(case: &Case, input: &[(Command, f64)], substeps: usize) -> (f64, f64) {
     let kernel = case.run_dual(input, substeps);
     let (text, _) = run(case, &model(case), input);
-    let of = |kernel: &[f64], text: &[f64]| {
+    let of = |entry: &dyn Fn(&Dual<LANES>) -> f64| {
+        let values = || kernel.iter().map(entry);
         let (low, high) = (
-            kernel.iter().copied().fold(f64::INFINITY, f64::min),
-            kernel.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            values().fold(f64::INFINITY, f64::min),
+            values().fold(f64::NEG_INFINITY, f64::max),
         );
-        let pairs = kernel.iter().zip(text);
+        let pairs = values().zip(text.iter().map(entry));
         pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) / (high - low)
     };
     let entries = case.theta.len() + case.levels.len();
-    let slopes = (0..entries).map(|i| {
-        let kernel: Vec<f64> = kernel.iter().map(|y| y.eps[i]).collect();
-        let text: Vec<f64> = text.iter().map(|y| y.eps[i]).collect();
-        of(&kernel, &text)
-    });
-    let kernel: Vec<f64> = kernel.iter().map(|y| y.re).collect();
-    let text: Vec<f64> = text.iter().map(|y| y.re).collect();
-    (of(&kernel, &text), slopes.fold(0.0, f64::max))
+    let slopes = (0..entries).map(|i| of(&|y| y.eps[i]));
+    (of(&|y| y.re), slopes.fold(0.0, f64::max))
 }
 
 #[test]

@@ -197,14 +197,14 @@ fn derivatives_are_finite_and_right_where_levels_cross_and_rest() {
             })
             .collect()
     };
-    let duals: Vec<Dual<8>> = variables
+    let duals: Vec<Dual<15>> = variables
         .iter()
         .enumerate()
         .map(|(lane, &value)| Dual::variable(value, lane))
         .collect();
     let mut simulator =
         Simulator::with_inputs(&structure, &duals[..5], &duals[5..], [0.0; 2]).unwrap();
-    let exact: Vec<Dual<8>> = (0..600)
+    let exact: Vec<Dual<15>> = (0..600)
         .map(|k| {
             simulator.advance_both(held(back_and_forth(k, 90)), 1.0);
             simulator.read(0)

@@ -24,7 +24,7 @@ fn derivative(
     input: &[(Command, f64)],
     substeps: usize,
 ) -> (Vec<f64>, Vec<f64>) {
-    let dual: Vec<Dual<16>> = case.run_dual(input, substeps);
+    let dual: Vec<Dual<15>> = case.run_dual(input, substeps);
     dual.iter().map(|y| (y.re, y.eps[lane])).unzip()
 }
 

@@ -1,7 +1,7 @@
 //! Plants of which several levels are read.
 
-use crate::support::{Case, DRIVES, base, effect, input, interior, mirrored, passes};
-use plants::{Command, Known, Placed, Plant, Simulator, SimulatorNumber, Structure};
+use crate::support::{Case, DRIVES, base, effect, input, interior, mirrored};
+use plants::{Command, Dual, Known, Placed, Plant, Scalar, Simulator, SimulatorNumber, Structure};
 
 /// The plant with these levels read, in this order.
 fn reading(plant: Plant, measured: &[usize]) -> Case {
@@ -84,14 +84,19 @@ fn every_output_reads_the_level_of_its_vessel() {
 /// variable. Of two lengths of the difference the better one is used: one may cross a corner of the output.
 fn disagreement(case: &Case, input: &[(Command, f64)], output: usize) -> f64 {
     let variables = case.variables();
+    let duals: Vec<Dual<15>> = variables
+        .iter()
+        .enumerate()
+        .map(|(lane, &value)| Dual::variable(value, lane))
+        .collect();
     let of = |at: &[f64]| -> Vec<f64> {
         let run = run(case, at, input);
         run.iter().map(|(readings, _)| readings[output]).collect()
     };
-    let exact = passes::both(&variables, |variables| {
-        let run = run(case, variables, input);
-        run.iter().map(|(readings, _)| readings[output]).collect()
-    });
+    let exact: Vec<Dual<15>> = run(case, &duals, input)
+        .iter()
+        .map(|(readings, _)| readings[output])
+        .collect();
     let plain = of(&variables);
     for (dual, plain) in exact.iter().zip(&plain) {
         assert_eq!(dual.re.to_bits(), plain.to_bits());

@@ -105,7 +105,7 @@ fn introduction(look: Look) -> String {
 
 fn compare(diagnosis: &Diagnosis, look: Look) -> String {
     let text = "The model is fitted, then it runs on the pump's voltage alone: a simulation, never corrected \
-                by a measurement. A second record is held out; it not used for fits or selection.";
+                by a measurement. A second record is held out; it is not used for fits or selection.";
     let mut said = step(1, "Compare", text, look) + &terminal::header(diagnosis, look);
     if let Some(first) = diagnosis.steps.first() {
         said += &terminal::overlay(diagnosis, first, look);

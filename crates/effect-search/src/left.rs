@@ -1,4 +1,4 @@
-//! What the residual of a set shows that noise does not.
+//! Tests whether the residual of a set of effects is noise.
 
 use ct_signals::ArModel;
 use ct_signals::residual_tests::prewhitened_input_test;
@@ -13,7 +13,7 @@ use crate::residual::{harmonics_p, instant, level_p, of_command, period, standar
 use crate::stationarity::stationary_p;
 use crate::thresholds::Thresholds;
 
-/// What a residual shows that noise does not.
+/// A property of a residual that noise does not have.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Left {
@@ -31,7 +31,7 @@ pub enum Left {
         /// Its length \[s\].
         period: f64,
     },
-    /// Something that is there for a while.
+    /// A disturbance during a part of the record.
     Instant {
         /// The output.
         output: String,
@@ -42,26 +42,26 @@ pub enum Left {
         /// Until when \[s\].
         to: f64,
     },
-    /// It depends on what the model gives.
+    /// It depends on the model's output.
     Level {
         /// The output.
         output: String,
     },
-    /// It is not the same noise in all parts of a record: its spectrum changes.
+    /// It is not stationary: its spectrum differs between parts of a record.
     Spectrum {
         /// The output.
         output: String,
         /// The record.
         record: String,
     },
-    /// A smooth function of a signal, or of time, somewhere in the model lowers it by more than chance would.
+    /// A smooth function of a signal or of time, at some port of the model, lowers it significantly.
     Function {
-        /// The function, as the shapes of what is missing are named: `shape(T,u)`, `course(T)`.
+        /// Identifier of the function: `shape(T,u)`, `course(T)`.
         effect: String,
-        /// What it depends on: a state or an input, or `time`.
+        /// Its variable: a state or an input, or `time`.
         variable: String,
     },
-    /// It wanders so slowly that the records hold too few independent samples of it to be taken for noise.
+    /// Its correlation time is so long that the records contain too few independent samples to call it noise.
     Slow {
         /// The output.
         output: String,
@@ -78,7 +78,8 @@ fn is_predictable(signal: &[f64], thresholds: &Thresholds) -> bool {
 }
 
 impl Context<'_> {
-    /// What the residual of a set holds that is not noise; `own` is its fit with the noise model of its own residual. The first that was found.
+    /// The first property of a set's residual that noise does not have, `None` if the residual is noise; `own` is the set's fit with the noise
+    /// model of its own residual.
     pub fn left(&self, node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
         let setup = self.setup(&node.model)?;
         let Some(residuals) = estimation::residuals(&setup, &own.x) else {
@@ -91,7 +92,7 @@ impl Context<'_> {
         let outputs = records[0].outputs.len();
         let name = |i: usize| records[0].outputs[i % outputs].name.clone();
         let samples = |residual: &[f64]| residual.iter().filter(|e| !e.is_nan()).count();
-        // Inputs first: each signal that is made of one, at each output.
+        // Inputs first: each signal derived from an input, at each output.
         let (mut least, mut place, mut count) = (1.0, None, 0.0);
         for (i, residual) in residuals.iter().enumerate() {
             let record = &records[i / outputs];
@@ -167,8 +168,8 @@ impl Context<'_> {
         Ok(slow.map(|o| Left::Slow { output: name(o) }))
     }
 
-    /// The smooth function that lowers the deviance of a set by more than chance would, in the metric of the noise of its own residual: the
-    /// score test of each that the shape of what is missing may have.
+    /// The smooth function that lowers the deviance of a set significantly, with the noise model of the set's own residual: a score test of each
+    /// smooth function at each port.
     fn function(&self, node: &Node, own: &Fit) -> Option<Left> {
         let (with_shapes, of) = self.with_shapes();
         let node = Node {
@@ -183,7 +184,7 @@ impl Context<'_> {
                 let candidate = &with_shapes.candidates[trial.candidate];
                 let functions = candidate.fitted() as f64;
                 let rest = samples - own.parameters as f64 - functions;
-                // In a short record the fall is not chi-square yet: the ratio of the variances is F.
+                // In a short record the fall is not chi-square distributed: the ratio of the variances has an F distribution.
                 let ratio = (trial.fall.max(0.0) / samples).exp_m1() * rest / functions;
                 let p = FisherSnedecor::new(functions, rest).ok()?.sf(ratio);
                 Some((p, candidate))
@@ -196,7 +197,8 @@ impl Context<'_> {
         })
     }
 
-    /// Half the period of an effect of a set whose harmonics a residual holds \[unit of the model's time\], and which residual.
+    /// Half the period of a periodic effect of the set, if a residual contains its harmonics \[unit of the model's time\], and the number of the
+    /// residual.
     fn harmonics(
         &self,
         node: &Node,

@@ -1,4 +1,4 @@
-//! What is diagnosed: a model as text, records, what is known, and candidates.
+//! The problem of a diagnosis: a model as text, records, prior knowledge, and the user's candidates; options and time limits of a search.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,22 +13,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::thresholds::Thresholds;
 
-/// A model and the records that it is held against.
+/// A model and the records that it is compared with.
 #[derive(Debug, Clone)]
 pub struct Problem {
-    /// The model that its user believes, without effects.
+    /// The believed model, without effects.
     pub spec: ModelSpec,
-    /// Effects that the model has already, as [`ct_model::effects::Candidate::id`] has them.
+    /// Identifiers of the effects that the model already has ([`ct_model::effects::Candidate::id`]).
     pub effects: Vec<String>,
-    /// What is kept of effects from an earlier record, by their identifiers.
+    /// Numbers and starts of effects from an earlier record, by effect identifier.
     pub kept: BTreeMap<String, Kept>,
     /// Records that are fitted, whose inputs and outputs are those of the model, in its order and units; inputs are whole.
     pub records: Vec<Record>,
-    /// Records that take part in no fit and no choice.
+    /// Held-out records: they are not used for fits or selection.
     pub test: Vec<Record>,
     /// Parameters that are not fitted, by name \[unit of the text\].
     pub known: BTreeMap<String, f64>,
-    /// What is known of parameters beside the records.
+    /// Prior knowledge of parameters.
     pub priors: BTreeMap<String, PriorValue>,
     /// Candidates of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
@@ -38,16 +38,16 @@ pub struct Problem {
     pub time_unit_name: String,
 }
 
-/// What is kept of an effect from an earlier record.
+/// Numbers and starts of an effect from an earlier record.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Kept {
     /// The numbers of that record that the effect is written in ([`ct_model::effects::Candidate::record_numbers`]).
     pub numbers: BTreeMap<String, f64>,
-    /// Where fits of its parameters begin, by their names in the effect \[unit of the parameter\].
+    /// Starts of its parameters, by their names in the effect \[unit of the parameter\].
     pub start: BTreeMap<String, f64>,
 }
 
-/// How to search.
+/// Options of a search.
 #[derive(Debug, Clone, Copy)]
 pub struct Options<'a> {
     /// Largest number of effects to add.
@@ -56,11 +56,11 @@ pub struct Options<'a> {
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
-    /// Limit on the time of the search; what it does not allow is left out.
+    /// Time limit of the search; steps beyond it are left out.
     pub time_limit: Option<Duration>,
     /// Interruption flag: when set, the search ends soon with the best that was found so far.
     pub interrupt: Option<&'a AtomicBool>,
-    /// What is claimed, and how widely is searched.
+    /// Thresholds of the claims and of the width of the search.
     pub thresholds: Thresholds,
 }
 
@@ -77,7 +77,7 @@ impl Default for Options<'_> {
     }
 }
 
-/// When a search has to end.
+/// Time limit and interruption of a search.
 #[derive(Debug, Clone)]
 pub(crate) struct Limit<'a> {
     time: Arc<TimeLimit>,
@@ -94,13 +94,13 @@ pub(crate) enum Phase {
     White,
     /// The search in the metric of a noise model.
     Coloured,
-    /// What of the effects stays.
+    /// The acceptance test of the effects.
     Confirm,
     /// Sets of effects that do not follow time, grown once more.
     Floating,
     /// The largest part of the error that effects explain.
     Part,
-    /// What can stand in for them.
+    /// The alternatives to each effect.
     Groups,
 }
 
@@ -127,7 +127,7 @@ impl<'a> Limit<'a> {
         }
     }
 
-    /// From now on fits take steps until the time of this phase has passed.
+    /// Begins a phase: fits continue until its share of the time has passed.
     pub fn begin(&self, phase: Phase) {
         self.time.allow(phase.share());
     }
@@ -139,7 +139,7 @@ impl<'a> Limit<'a> {
             || self.time.passed()
     }
 
-    /// Whether a part of the search has to be left out or cut short for want of time; it is noted then.
+    /// Whether a part of the search has to be left out or cut short because of the time limit; the part is then noted.
     pub fn leaves_out(&self, part: &str) -> bool {
         let out = self.passed();
         if out {
@@ -148,12 +148,12 @@ impl<'a> Limit<'a> {
         out
     }
 
-    /// What was left out, in order.
+    /// The parts that were left out, in order.
     pub fn left_out(&self) -> Vec<String> {
         self.time.left_out()
     }
 
-    /// A limit of its own for what follows the search, whatever time that took.
+    /// A separate limit for the work after the search, independent of the time that the search took.
     pub fn afterwards(&self) -> Self {
         /// Share of the time of the search.
         const SHARE: f64 = 0.15;
@@ -165,7 +165,7 @@ impl<'a> Limit<'a> {
         }
     }
 
-    /// The same for what is found, which is fitted once more and shown, interrupted or not.
+    /// The same for the final fits of the result, which are made even after an interruption.
     pub fn of_report(&self) -> Self {
         Self {
             interrupt: None,

@@ -1,11 +1,11 @@
-//! Whether a residual is noise: tests of what an autoregressive noise cannot be.
+//! Tests whether a residual is autoregressive noise. Each one looks for:
 //!
-//! - **an input**: signals made of its past against the residual whitened by its own noise model ([`of_command`]);
-//! - **a period**: a line of the spectrum that stands out of its neighbours ([`period`]);
-//! - **harmonics** of a period that has been named: a disturbance of another shape than a sine ([`harmonics_p`]);
+//! - **an input**: correlation of signals derived from an input with the residual whitened by its own noise model ([`of_command`]);
+//! - **a period**: a spectral line above the neighbouring spectrum ([`period`]);
+//! - **harmonics** of an identified period: a periodic disturbance that is not a sine ([`harmonics_p`]);
 //! - **an instant**: windows of 1, 2, 4, ... samples whose sums over the root of their length are standard normal ([`instant`]);
-//! - **a level**: the whitened residual against functions of what the model gave a sample before ([`level_p`]). As it is white and independent
-//!   of the past, its regression on any past is chi-square, whatever the colour of the regressors.
+//! - **a level**: regression of the whitened residual on functions of the model's previous output ([`level_p`]). A white residual is independent
+//!   of the past, so its regression on any past signal is chi-square distributed, whatever the spectrum of the regressors.
 //!
 //! **References**: L. D. Haugh, J. American Statistical Association 71 (1976) 378-385; S. A. Billings, W. S. F. Voon, Int. J. Control 44 (1986)
 //! 235-244.
@@ -19,12 +19,12 @@ use statrs::function::erf::erfc;
 
 use crate::spectral_line::strongest_line;
 
-/// Longest window that is looked at, as a part of the record.
+/// Longest tested window, as a fraction (1 over this number) of the record.
 const LONGEST_WINDOW: usize = 4;
 
-/// Knots of the functions of the level, evenly over the range that the model visits.
+/// Knots of the functions of the level, evenly spaced over the range of the model's output.
 const KNOTS: usize = 11;
-/// A function counts where its squares sum to so many samples: fewer are as Gaussian as the noise is, and no more.
+/// A function is used if the sum of its squares is at least this many samples: a sum over fewer samples is not close to Gaussian.
 const VISITED: f64 = 5.0;
 
 /// The command, its square about the mean, and the size of its moves.
@@ -37,7 +37,7 @@ pub fn of_command(u: &[f64]) -> Vec<Vec<f64>> {
     vec![u.to_vec(), square, moves]
 }
 
-/// The whitened residual, of unit variance; zero where the sample is missing, so that sums and products leave it out.
+/// The whitened residual with unit variance; zero if the sample is missing, so that sums and products ignore it.
 #[must_use]
 pub fn standardised(noise: &ArModel, residual: &[f64]) -> Vec<f64> {
     let mut white = noise.whiten(residual);
@@ -54,7 +54,7 @@ pub fn standardised(noise: &ArModel, residual: &[f64]) -> Vec<f64> {
     white
 }
 
-/// p-value of the test that a whitened residual is independent of what the model read a sample before.
+/// p-value of the test that a whitened residual is independent of the model's previous output.
 #[must_use]
 pub fn level_p(model: &[f64], white: &[f64]) -> f64 {
     let (low, high) = model
@@ -66,7 +66,7 @@ pub fn level_p(model: &[f64], white: &[f64]) -> f64 {
     if !(width.is_finite() && width > 0.0) {
         return 1.0;
     }
-    // Hats, which sum to one: at a sample two neighbours are not zero.
+    // Piecewise linear (hat) functions, which sum to one: two neighbours are nonzero at each sample.
     let mut gram = DMatrix::<f64>::zeros(KNOTS, KNOTS);
     let mut moment = DVector::<f64>::zeros(KNOTS);
     // Zero where the sample is missing.
@@ -90,8 +90,8 @@ pub fn level_p(model: &[f64], white: &[f64]) -> f64 {
     ChiSquared::new(visited.len() as f64).map_or(1.0, |chi| chi.sf(explained.max(0.0)))
 }
 
-/// The first and the last sample of the window of a whitened residual whose sum stands out most of white noise; `None` where chance would
-/// show such a one more often than `level`.
+/// The first and the last sample of the window whose sum is least probable in white noise; `None` if its p-value, corrected for the number of
+/// windows, is `level` or more.
 #[must_use]
 pub fn instant(white: &[f64], level: f64) -> Option<(usize, usize)> {
     let n = white.len();
@@ -117,7 +117,7 @@ pub fn instant(white: &[f64], level: f64) -> Option<(usize, usize)> {
     })
 }
 
-/// How many periods of the strongest line of the spectrum a residual holds; `None` where chance would show such a line more often than `level`.
+/// Number of periods in the residual of its strongest spectral line; `None` if the p-value of the line is `level` or more.
 ///
 /// # Errors
 /// Where the residual is too short for a noise model of first order.
@@ -126,11 +126,11 @@ pub fn period(residual: &[f64], level: f64) -> Result<Option<usize>, Error> {
     Ok(line.map(|line| line.cycles))
 }
 
-/// Harmonics that are looked at.
+/// Tested harmonics.
 const HARMONICS: [f64; 2] = [2.0, 3.0];
 
-/// The probability that noise has as much at the second and third harmonic of a period as a residual: by the fall of -2 log likelihood of
-/// autoregressive noise of at most this order where they are taken out. `time` and `period` in one unit.
+/// p-value of the second and third harmonic of a period in a residual: by the fall of -2 log likelihood when they are removed, with
+/// autoregressive noise of at most this order. `time` and `period` in one unit.
 ///
 /// # Errors
 /// Where the residual is too short for a noise model.
@@ -174,7 +174,7 @@ pub fn harmonics_p(
     let with = ArModel::fit(&[&less(1)], order)?;
     let without = ArModel::fit(&[&less(columns)], order)?;
     let n = rows.len() as f64;
-    // The orders follow from BIC: a coefficient counts as there.
+    // BIC chose the orders, so each coefficient has the penalty of BIC.
     let coefficients = with.order() as f64 - without.order() as f64;
     let fall = 2.0 * n * (with.sigma() / without.sigma()).ln() + coefficients * n.ln();
     Ok(ChiSquared::new((columns - 1) as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0))))

@@ -1,6 +1,6 @@
 //! Changes of branches within a step: found, timed with their derivatives, and made.
 
-use super::Simulation;
+use super::SimulationState;
 use super::delays::Delays;
 use super::step::{Drive, Interval, Step};
 use crate::scalar::Scalar;
@@ -13,7 +13,7 @@ const EVENT: f64 = 1e-13;
 /// Distance of the differences from which the speed of a guard is computed, as a share of the step.
 const SPEED: f64 = 1e-4;
 
-impl<'a, T: Scalar> Simulation<'a, T> {
+impl<T: Scalar> SimulationState<T> {
     /// Where an equation has no value within a step: the change of a branch before that, `sqrt(max(x, 0))` at zero, and the error of the step
     /// to it, which stands computed.
     pub(super) fn branch_before(
@@ -98,13 +98,13 @@ impl<'a, T: Scalar> Simulation<'a, T> {
     }
 
     /// What may change within a step: what of it has to stay above zero, where the registers are.
-    fn distance(&self, watched: Watched) -> T {
+    fn distance(&self, tape: &Tape, watched: Watched) -> T {
         let Step {
             sliding, registers, ..
         } = &self.work;
         match watched {
             Watched::Guard(guard) => {
-                let difference = self.model.tape.guards[guard].difference;
+                let difference = tape.guards[guard].difference;
                 registers.values[difference]
             }
             Watched::Share(k, true) => T::constant(1.0 - sliding.share(k)),
@@ -148,7 +148,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             {
                 return None;
             }
-            let distance = self.distance(watched).value();
+            let distance = self.distance(tape, watched).value();
             is_crossed(watched, distance).then_some((watched, distance))
         });
         let crossed: Vec<_> = crossed.collect();
@@ -156,7 +156,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             let part = T::constant(h.value() * share);
             own.attempt(tape, interval, part, delays);
             tape.evaluate_guards(&mut own.work.registers);
-            own.distance(watched)
+            own.distance(tape, watched)
         };
         let mut first: Option<(f64, Watched, bool)> = None;
         for (watched, mut ends_with) in crossed {
@@ -198,7 +198,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             let after = T::constant(slide.min(h.value()));
             self.attempt(tape, interval, after, delays);
             tape.evaluate_guards(&mut self.work.registers);
-            let there = self.distance(watched).value();
+            let there = self.distance(tape, watched).value();
             let change = if is_crossed(watched, there) {
                 Change::Crossed(difference, there > 0.0)
             } else {

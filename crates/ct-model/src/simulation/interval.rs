@@ -3,7 +3,7 @@
 use super::delays::{Delays, POINTS};
 use super::events::Event;
 use super::step::{Drive, Interval};
-use super::{Method, NoSolution, Simulation, explicit, implicit};
+use super::{Method, NoSolution, SimulationState, explicit, implicit};
 use crate::scalar::Scalar;
 use crate::tape::Tape;
 
@@ -26,15 +26,15 @@ const MANY_STEPS: usize = 40;
 /// them.
 const STABILITY: f64 = 1.5;
 
-impl<'a, T: Scalar> Simulation<'a, T> {
+impl<T: Scalar> SimulationState<T> {
     /// The guards' answers where an interval begins, and what delays know of it.
     pub(super) fn begin_interval(
         &mut self,
+        tape: &Tape,
         interval: Interval<'_>,
         until: f64,
         delays: &mut Delays<T>,
     ) {
-        let tape = &self.model.tape;
         let Interval {
             begin, from, rise, ..
         } = interval;
@@ -45,7 +45,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             if first {
                 let drive = Drive::new(interval, delays);
                 drive.load(tape, &mut self.work, self.time, &self.state);
-                self.before_the_record();
+                self.before_the_record(tape);
                 for (delay, &(what, _)) in delays.all.iter_mut().zip(&tape.delays) {
                     delay.begin(self.time, self.work.registers.values[what]);
                 }
@@ -55,7 +55,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 }
             }
             let length = T::constant(until) - self.time;
-            self.keep_past(interval, length, delays, true);
+            self.keep_past(tape, interval, length, delays, true);
             for delay in &mut delays.all {
                 delay.forget(begin);
             }
@@ -65,7 +65,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             let drive = Drive::new(interval, delays);
             drive.load(tape, &mut self.work, self.time, &self.state);
             tape.evaluate_with_guards(&mut self.work.registers);
-            self.remember();
+            self.remember(tape);
             self.slide_on(tape, &drive);
         }
         // Whatever made the registers, it was computed for the inputs of this interval.
@@ -82,12 +82,12 @@ impl<'a, T: Scalar> Simulation<'a, T> {
     /// Keeps what is delayed over the next or the last step: what is known ahead for a whole interval, everything else after each step.
     fn keep_past(
         &mut self,
+        tape: &Tape,
         interval: Interval<'_>,
         length: T,
         delays: &mut Delays<T>,
         ahead: bool,
     ) {
-        let tape = &self.model.tape;
         if length.value() <= 0.0 || delays.all.iter().all(|delay| delay.known_ahead != ahead) {
             return;
         }
@@ -204,7 +204,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
                 h = *after;
                 self.attempt(tape, interval, h, delays);
             }
-            self.keep_past(interval, h, delays, false);
+            self.keep_past(tape, interval, h, delays, false);
             let sliding = !self.work.sliding.is_empty();
             self.work
                 .go_on(event.is_none() && !sliding && self.method == Method::Explicit);

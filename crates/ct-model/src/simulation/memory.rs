@@ -3,15 +3,15 @@
 //! A play moves with what goes into it at a distance of at most its half-width. Within an interval between rows it starts from what it
 //! gave at the row: exact where what goes in is held or runs in one direction, as every input does. It comes to rest in the middle before the record.
 
-use super::Simulation;
+use super::SimulationState;
 use super::delays::{Delay, Delays};
 use super::step::Drive;
 use crate::scalar::Scalar;
+use crate::tape::Tape;
 
-impl<T: Scalar> Simulation<'_, T> {
+impl<T: Scalar> SimulationState<T> {
     /// Before the record everything was as at its beginning: what a delay lets through, what plays hold, and settled states, too.
-    pub(super) fn before_the_record(&mut self) {
-        let tape = &self.model.tape;
+    pub(super) fn before_the_record(&mut self, tape: &Tape) {
         // One may stand on what another one gives.
         for _ in 0..=tape.delays.len() + tape.plays.len() + tape.settled.len() {
             tape.evaluate_with_guards(&mut self.work.registers);
@@ -38,19 +38,17 @@ impl<T: Scalar> Simulation<'_, T> {
     }
 
     /// Gives the settled states their initial values, and plays theirs, from the inputs of the first row.
-    pub(super) fn settle(&mut self, inputs: &[f64], delays: &Delays<T>) {
-        let tape = &self.model.tape;
+    pub(super) fn settle(&mut self, tape: &Tape, inputs: &[f64], delays: &Delays<T>) {
         if self.settled || (tape.settled.is_empty() && tape.plays.is_empty()) {
             return;
         }
         let drive = Drive::held(inputs, &self.held, delays);
         drive.load(tape, &mut self.work, self.time, &self.state);
-        self.before_the_record();
+        self.before_the_record(tape);
     }
 
     /// Evaluates a reading: what is delayed by nothing is there at once.
-    pub(super) fn let_through(&mut self, delays: &Delays<T>) {
-        let tape = &self.model.tape;
+    pub(super) fn let_through(&mut self, tape: &Tape, delays: &Delays<T>) {
         tape.evaluate_with_guards(&mut self.work.registers);
         let at_once = |delay: &Delay<T>| delay.by.value() == 0.0;
         for _ in 0..delays.all.iter().filter(|delay| at_once(delay)).count() {
@@ -65,8 +63,8 @@ impl<T: Scalar> Simulation<'_, T> {
     }
 
     /// Plays start anew from what they give at this row.
-    pub(super) fn remember(&mut self) {
-        for play in &self.model.tape.plays {
+    pub(super) fn remember(&mut self, tape: &Tape) {
+        for play in &tape.plays {
             self.work.registers.values[play.held] = self.work.registers.values[play.to];
         }
     }

@@ -19,13 +19,13 @@ mod interval;
 mod memory;
 mod model;
 mod numbers;
-mod shared;
+mod owners;
 mod sliding;
 mod step;
 
 pub use self::model::Model;
 pub use self::numbers::SimulationNumber;
-pub use self::shared::SharedSimulation;
+pub use self::owners::{SharedSimulation, Simulation};
 
 use self::delays::{Delay, Delays};
 use self::exact::Exact;
@@ -34,6 +34,7 @@ use self::interval::MOST_STEPS;
 use self::step::{Drive, Interval, Step};
 use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
+use crate::tape::Tape;
 
 /// How a model is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,11 +57,8 @@ pub struct NoSolution {
     pub time: f64,
 }
 
-/// A simulation in progress.
-///
-/// Nothing is allocated from row to row, but for the past of what is delayed.
-pub struct Simulation<'a, T> {
-    model: &'a Model,
+/// A simulation in progress, without its model: whoever owns it hands over the same model in every call.
+pub struct SimulationState<T> {
     method: Method,
     time: T,
     state: Vec<T>,
@@ -98,45 +96,8 @@ pub struct Simulation<'a, T> {
     settled: bool,
 }
 
-impl<'a, T: SimulationNumber> Simulation<'a, T> {
-    /// Begins at `start` on the clock that `time` follows, with parameters in the order of [`crate::ModelSpec::parameters`] and a value for
-    /// each state.
-    ///
-    /// # Panics
-    /// Where the numbers of parameters or states are not the model's.
-    #[must_use]
-    pub fn new(model: &'a Model, parameters: &[T], initial: &[T], start: f64) -> Self {
-        T::begin(model, parameters, initial, start)
-    }
-
-    /// The outputs now, with the inputs of this row.
-    pub fn read(&mut self, inputs: &[f64], outputs: &mut [T]) {
-        T::read(self, inputs, outputs);
-    }
-
-    /// Goes on to `until`, the inputs in straight lines from one value to the other (the same where they are held).
-    ///
-    /// # Errors
-    /// Where the simulation cannot go on.
-    pub fn advance(&mut self, from: &[f64], to: &[f64], until: f64) -> Result<(), NoSolution> {
-        T::advance(self, from, to, until)
-    }
-}
-
-impl<'a, T: Scalar> Simulation<'a, T> {
-    /// How it is simulated by now.
-    #[must_use]
-    pub fn method(&self) -> Method {
-        self.method
-    }
-
-    /// The present states.
-    #[must_use]
-    pub fn state(&self) -> &[T] {
-        &self.state
-    }
-
-    fn begin(model: &'a Model, parameters: &[T], initial: &[T], start: f64) -> Self {
+impl<T: Scalar> SimulationState<T> {
+    fn begin(model: &Model, parameters: &[T], initial: &[T], start: f64) -> Self {
         let tape = &model.tape;
         assert_eq!(parameters.len(), tape.parameters, "parameters");
         assert_eq!(initial.len(), tape.states, "initial states");
@@ -182,16 +143,15 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             ended_within: false,
             settled: false,
             work,
-            model,
         }
     }
 
-    fn read_outputs(&mut self, inputs: &[f64], outputs: &mut [T]) {
+    fn read(&mut self, model: &Model, inputs: &[f64], outputs: &mut [T]) {
         let Some(delays) = self.delays.take() else {
             return;
         };
         let drive = Drive::held(inputs, &self.held, &delays);
-        let tape = &self.model.tape;
+        let tape = &model.tape;
         if self.ended_within && inputs == self.last {
             // The last step's end is this reading.
             tape.evaluate_outputs(&mut self.work.registers);
@@ -199,11 +159,11 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             self.work.registers.held = false;
             drive.load(tape, &mut self.work, self.time, &self.state);
             if self.begun {
-                self.let_through(&delays);
+                self.let_through(tape, &delays);
             } else {
-                self.before_the_record();
+                self.before_the_record(tape);
             }
-            self.remember();
+            self.remember(tape);
         }
         self.ended_within = false;
         self.read.copy_from_slice(inputs);
@@ -231,11 +191,16 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         self.delays = Some(delays);
     }
 
-    fn advance_to(&mut self, from: &[f64], to: &[f64], until: f64) -> Result<(), NoSolution> {
+    fn advance(
+        &mut self,
+        model: &Model,
+        (from, to): (&[f64], &[f64]),
+        until: f64,
+    ) -> Result<(), NoSolution> {
         let Some(mut delays) = self.delays.take() else {
             return Err(NoSolution { time: until });
         };
-        let done = self.go_on(from, to, until, &mut delays);
+        let done = self.go_on(model, (from, to), until, &mut delays);
         self.delays = Some(delays);
         self.last.copy_from_slice(to);
         done
@@ -243,19 +208,18 @@ impl<'a, T: Scalar> Simulation<'a, T> {
 
     fn go_on(
         &mut self,
-        from: &[f64],
-        to: &[f64],
+        model: &Model,
+        (from, to): (&[f64], &[f64]),
         until: f64,
         delays: &mut Delays<T>,
     ) -> Result<(), NoSolution> {
-        let model = self.model;
         let tape = &model.tape;
         let begin = self.time.value();
         let length = until - begin;
         self.last_length = length;
         self.ended_within = false;
         self.work.registers.held = false;
-        self.settle(from, delays);
+        self.settle(tape, from, delays);
         for ((rise, from), to) in self.rise.iter_mut().zip(from).zip(to) {
             *rise = (to - from) / length;
         }
@@ -266,13 +230,13 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             from,
             rise: &rise,
         };
-        if self.model.exact == ExactSteps::HeldInputs && rise.iter().any(|rise| *rise != 0.0) {
-            self.go_on_in_steps();
+        if model.exact == ExactSteps::HeldInputs && rise.iter().any(|rise| *rise != 0.0) {
+            self.go_on_in_steps(tape);
         }
         let result = if self.exact.is_some() {
-            self.step_exactly(from, &rise, length)
+            self.step_exactly(tape, from, &rise, length)
         } else {
-            self.begin_interval(interval, until, delays);
+            self.begin_interval(tape, interval, until, delays);
             self.steps(tape, interval, until, delays)
         };
         self.rise = rise;
@@ -287,11 +251,10 @@ impl<'a, T: Scalar> Simulation<'a, T> {
     }
 
     /// From here on the inputs go in straight lines through what is not linear.
-    fn go_on_in_steps(&mut self) {
+    fn go_on_in_steps(&mut self, tape: &Tape) {
         if self.exact.take().is_none() {
             return;
         }
-        let tape = &self.model.tape;
         let parameters = &self.work.registers.values[1..=tape.parameters];
         let plain: Vec<f64> = parameters.iter().map(|value| value.value()).collect();
         self.jacobian = Some(Jacobian::new(tape, &plain));
@@ -299,8 +262,13 @@ impl<'a, T: Scalar> Simulation<'a, T> {
         self.note_largest();
     }
 
-    fn step_exactly(&mut self, from: &[f64], rise: &[f64], h: f64) -> Result<(), NoSolution> {
-        let tape = &self.model.tape;
+    fn step_exactly(
+        &mut self,
+        tape: &Tape,
+        from: &[f64],
+        rise: &[f64],
+        h: f64,
+    ) -> Result<(), NoSolution> {
         let n = tape.states;
         let delays = Delays { all: Vec::new() };
         // `time` plays no part in what is linear; held inputs first, then what their rise adds.
@@ -311,7 +279,7 @@ impl<'a, T: Scalar> Simulation<'a, T> {
             tape.evaluate_with_guards(&mut self.work.registers);
         }
         self.work.keep_slope(tape, 0);
-        self.remember();
+        self.remember(tape);
         self.begun = true;
         if rise.iter().any(|rise| *rise != 0.0) {
             let ends = self.last.iter_mut().zip(from).zip(rise);

@@ -3,35 +3,35 @@
 //! A generic function is compiled again in every crate that calls it, and the code of a simulation is large: its entry points belong to the
 //! number instead, so that the code for each number is compiled in this crate alone.
 
-use super::{Model, NoSolution, Simulation};
+use super::{Model, NoSolution, SimulationState};
 use crate::scalar::{Dual, Scalar};
 
-/// What [`Simulation`] does, for one kind of number.
+/// Entry points of a simulation, for one kind of number.
 pub trait Compiled: Scalar {
-    /// [`Simulation::new`].
-    fn begin<'a>(
-        model: &'a Model,
+    /// [`Simulation::new`](super::Simulation::new).
+    fn begin(
+        model: &Model,
         parameters: &[Self],
         initial: &[Self],
         start: f64,
-    ) -> Simulation<'a, Self>;
+    ) -> SimulationState<Self>;
 
-    /// [`Simulation::read`].
-    fn read(simulation: &mut Simulation<'_, Self>, inputs: &[f64], outputs: &mut [Self]);
+    /// [`Simulation::read`](super::Simulation::read).
+    fn read(state: &mut SimulationState<Self>, model: &Model, inputs: &[f64], outputs: &mut [Self]);
 
-    /// [`Simulation::advance`].
+    /// [`Simulation::advance`](super::Simulation::advance), with the inputs at the beginning and at the end.
     ///
     /// # Errors
     /// As there.
     fn advance(
-        simulation: &mut Simulation<'_, Self>,
-        from: &[f64],
-        to: &[f64],
+        state: &mut SimulationState<Self>,
+        model: &Model,
+        inputs: (&[f64], &[f64]),
         until: f64,
     ) -> Result<(), NoSolution>;
 }
 
-/// The numbers that a [`Simulation`] runs on: `f64`, and duals with 2, 4, 8, 12 or 15 derivatives.
+/// The numbers that a [`Simulation`](super::Simulation) runs on: `f64`, and duals with 2, 4, 8, 12 or 15 derivatives.
 pub trait SimulationNumber: Compiled {}
 
 impl<T: Compiled> SimulationNumber for T {}
@@ -39,30 +39,31 @@ impl<T: Compiled> SimulationNumber for T {}
 macro_rules! compile_for {
     ($($number:ty),*) => {$(
         impl Compiled for $number {
-            fn begin<'a>(
-                model: &'a Model,
+            fn begin(
+                model: &Model,
                 parameters: &[Self],
                 initial: &[Self],
                 start: f64,
-            ) -> Simulation<'a, Self> {
-                Simulation::begin(model, parameters, initial, start)
+            ) -> SimulationState<Self> {
+                SimulationState::begin(model, parameters, initial, start)
             }
 
             fn read(
-                simulation: &mut Simulation<'_, Self>,
+                state: &mut SimulationState<Self>,
+                model: &Model,
                 inputs: &[f64],
                 outputs: &mut [Self],
             ) {
-                simulation.read_outputs(inputs, outputs);
+                state.read(model, inputs, outputs);
             }
 
             fn advance(
-                simulation: &mut Simulation<'_, Self>,
-                from: &[f64],
-                to: &[f64],
+                state: &mut SimulationState<Self>,
+                model: &Model,
+                inputs: (&[f64], &[f64]),
                 until: f64,
             ) -> Result<(), NoSolution> {
-                simulation.advance_to(from, to, until)
+                state.advance(model, inputs, until)
             }
         }
     )*};

@@ -122,7 +122,7 @@ fn what_is_outside_the_catalogue_is_not_named_as_an_effect() {
             for remark in found
                 .sentences
                 .iter()
-                .filter(|said| said.contains("not taken for the answer"))
+                .filter(|said| said.contains("the effect is not accepted"))
             {
                 let (rmse, floor) = (found.steps[0].rmse, found.noise_floor);
                 println!("{kind} seed {seed}: {rmse:.3} cm, floor {floor:.3} cm: {remark}");

@@ -149,7 +149,8 @@ fn coloured_records_are_not_blamed(colours: &[f64], noise: f64, runs: u64) {
         assert!(!found.noise[0].coefficients.is_empty());
         let said = found.sentences.join(" ");
         assert!(
-            said.contains("The noise is coloured, and hides") && said.contains("times larger"),
+            said.contains("The noise is coloured: an effect has to be")
+                && said.contains("times larger"),
             "seed {seed}: {said}"
         );
         let sizes = found

@@ -68,7 +68,7 @@ fn an_example_is_fitted_and_its_text_is_changed() {
         browser.evaluate("document.getElementById('own-fit').disabled"),
         json!(true)
     );
-    assert!(browser.text("#next").contains("mend the text"));
+    assert!(browser.text("#next").contains("correct the text"));
     browser.press("Backspace", 8, "");
     browser.until("document.getElementById('own-text-error').hidden && !document.getElementById('own-fit').disabled");
     browser.click("#own-fit");

@@ -293,7 +293,7 @@ fn a_chain_is_in_its_order_and_readings_keep_their_name() {
     let other = Driven::all()[2].candidates();
     let other = other.iter().find(|c| c.id == "coupling(h1,h2)").unwrap();
     let error = apply(&block.spec, &[other]).unwrap_err().to_string();
-    assert!(error.contains("of another model"), "{error}");
+    assert!(error.contains("belongs to another model"), "{error}");
 }
 
 /// Every model of the project, and every effect that can act in it.

@@ -122,8 +122,8 @@ end Lag;
 #[test]
 fn initial_equations_are_of_states_alone() {
     for (line, wanted) in [
-        ("q = 1;", "stands one state"),
-        ("2*x = 1;", "stands one state"),
+        ("q = 1;", "must be one state"),
+        ("2*x = 1;", "must be one state"),
         ("x = 1; x = 2;", "two initial equations"),
         ("x = qq;", "`qq` is not declared"),
     ] {

@@ -184,10 +184,7 @@ fn what_is_wrong_is_said_with_its_place() {
         &own(&[("k", 1.0)], &[("T", "-k*T")]),
         "radiation.parameters.k: `k` is a variable of Block",
     );
-    refused(
-        &own(&[("max", 1.0)], &[("T", "-T")]),
-        "has a meaning of its own",
-    );
+    refused(&own(&[("max", 1.0)], &[("T", "-T")]), "is a reserved word");
     refused(&own(&e, &[]), "it has no terms");
     refused(&own(&[], &[("T", "-T")]), "it has no parameter");
     refused(

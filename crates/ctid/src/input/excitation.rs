@@ -324,7 +324,7 @@ mod tests {
         assert_eq!(warnings.len(), 1, "{warnings:?}");
         let said = warnings[0].to_string();
         assert!(
-            said.starts_with("a.csv: the output \"lower\" shows no trace"),
+            said.starts_with("a.csv: the output \"lower\" does not respond"),
             "{said}"
         );
     }

@@ -116,7 +116,7 @@ mod tests {
             saver.save(&monitor)
         };
         let first = next(&mut saver).unwrap();
-        assert!(first.contains("cannot be written") && first.contains("goes on watching"));
+        assert!(first.contains("cannot be written") && first.contains("the monitor continues"));
         assert_eq!(next(&mut saver), None);
         std::fs::create_dir(&inside).unwrap();
         assert_eq!(next(&mut saver).unwrap(), "the state is saved again");

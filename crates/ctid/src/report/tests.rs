@@ -95,7 +95,7 @@ fn the_headline_counts_and_says_what_remains() {
         );
     };
     headline(&diagnosis, "The missing effects are found");
-    assert!(!html(&diagnosis).contains("in doubt: its size"));
+    assert!(!html(&diagnosis).contains("uncertain: its size"));
     diagnosis.in_doubt[1] = true;
     diagnosis.residual_unexplained = true;
     headline(
@@ -118,7 +118,7 @@ fn a_partial_answer_shows_its_test_its_places_and_its_limit() {
     for part in [
         "<h1>Mostly overflow: 85 % of the squared error above the noise floor (86 % on held-out data); what remains: ",
         "<h3>Acceptance test of overflow</h3>",
-        "<td class=\"number\">85 %</td><td>90 % where more than noise remains; 50 % for a partial answer</td>",
+        "<td class=\"number\">85 %</td><td>90 % where the residual is not noise; 50 % for a partial explanation</td>",
         "<td class=\"number\">86 %</td><td>not used for the verdict</td>",
         "<td class=\"number\">512</td><td>more than 6</td>",
         "<li>The residual is not noise: it still depends on the command (p &lt; 0.001).</li>",

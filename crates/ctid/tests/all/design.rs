@@ -118,7 +118,7 @@ fn twins_are_said_to_be_twins_and_nothing_is_written() {
     assert!(said.contains("Step the pump and watch the jet"), "{text}");
     let text = place
         .succeeds("design b.csv --model line.toml --between sensor_lag pump_lag --out to-play.csv");
-    assert!(text.contains("to-play.csv is not written: nothing is worth applying"));
+    assert!(text.contains("to-play.csv is not written: no experiment is worth applying"));
     assert!(!place.path("to-play.csv").exists());
 }
 

@@ -73,10 +73,10 @@ fn a_delay_is_estimated_beside_coloured_noise() {
     // A missing delay, or a delay in another unit, is detected.
     for forgotten in ["", " --delay 0.07"] {
         let text = place.succeeds(&format!("identify late.csv --method rivc{forgotten}"));
-        assert!(text.contains("shows in the"), "{text}");
+        assert!(text.contains("the simulation error depends on"), "{text}");
     }
     let text = place.succeeds("identify late.csv --method srivc --delay 4");
-    assert!(!text.contains("shows in the"), "{text}");
+    assert!(!text.contains("the simulation error depends on"), "{text}");
     assert!(text.contains("4.000 s, as given"), "{text}");
     // With several methods, the option applies to those with delays.
     let text = place.succeeds("identify late.csv --method rivc,fcloe --delay auto --report a.html");

@@ -118,7 +118,7 @@ fn what_a_diagnosis_finds_is_added_and_the_error_falls() {
     // After removal the table is kept, and the model is as before.
     let said = place.succeeds("remove lag(y) --model m.toml");
     assert!(
-        said.contains("effects = []") && said.contains("stays for the day"),
+        said.contains("effects = []") && said.contains("is kept in the file"),
         "{said}"
     );
     let again = place.result("compare a.csv --model m.toml");

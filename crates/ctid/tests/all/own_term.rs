@@ -93,7 +93,7 @@ fn the_unknown_is_written_kept_and_taken_out() {
     };
     let by = |result| error(result, "rmse_test") / error(result, "rmse");
     for result in [&before, &after] {
-        let carries = !says(result, "does not carry over to that record");
+        let carries = !says(result, "does not hold for that record");
         assert_eq!(carries, by(result) <= 2.0, "{}", by(result));
     }
     let small = "Beside my_wave the standard errors are too small";

@@ -32,7 +32,10 @@ fn effects_that_cannot_be_added_or_removed() {
         ),
         (
             "remove pump_lag --model on.toml",
-            ["on.toml: pump_lag is not on", "effects = [\"overflow\"]"],
+            [
+                "on.toml: pump_lag is not in the model",
+                "effects = [\"overflow\"]",
+            ],
         ),
         (
             "effects overfow",

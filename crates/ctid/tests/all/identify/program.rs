@@ -78,7 +78,7 @@ fn what_cannot_be_is_refused() {
         }
     }
     let slow = place.succeeds("identify tour.csv --method ct-rls --bandwidth 1e-4");
-    assert!(slow.contains("hides a time constant"), "{slow}");
+    assert!(slow.contains("suppresses a time constant"), "{slow}");
     assert!(!slow.contains("NaN"), "{slow}");
     bad(
         "tour.csv --method ct-rls --columns t,u",
@@ -153,7 +153,7 @@ fn a_record_too_short_to_tell_is_called_so() {
         assert!(!drift.moves() && !drift.tells(), "{drift:?}");
         let text = ctid::identify::text::text(&found, ctid::look::Look::plain());
         assert!(text.contains("too short to tell"), "{text}");
-        assert!(!text.contains("do not move with the level"), "{text}");
+        assert!(!text.contains("do not change with the level"), "{text}");
     }
 }
 

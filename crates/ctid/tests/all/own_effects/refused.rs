@@ -20,11 +20,11 @@ fn what_cannot_be_added_is_refused_in_a_line() {
     );
     place.refuses(
         "add lag(y) --model m.toml --where upper",
-        &["--where is of the plants"],
+        &["--where is for the built-in plants only"],
     );
     place.refuses(
         "remove lag(y) --model m.toml",
-        &["lag(y) is not on", "effects = []"],
+        &["lag(y) is not in the model", "effects = []"],
     );
     place.refuses(
         "add lag(y) --model m.toml --from a.csv",
@@ -33,7 +33,7 @@ fn what_cannot_be_added_is_refused_in_a_line() {
     place.succeeds("compare a.csv --model m.toml --json bare.json");
     place.refuses(
         "add lag(y) --model m.toml --from bare.json",
-        &["the result says nothing of lag(y)"],
+        &["the result does not contain lag(y)"],
     );
     place.succeeds("add lag(y) --model m.toml");
     place.refuses("add lag(y) --model m.toml", &["lag(y) is on already"]);

@@ -85,7 +85,7 @@ mod tests {
             unreachable!()
         };
         assert!(
-            !wide.hold && wide.says.contains("do not ensure"),
+            !wide.hold && wide.says.contains("do not guarantee"),
             "{wide:?}"
         );
         assert!(sure.hold, "{sure:?}");

@@ -1,6 +1,6 @@
 //! Exact propagation of linear vessels under a polynomial inflow, in closed form.
 //!
-//! `S_i dz_i/dt = q_i - z_i`, `z_i = x_i - offset_i`, `q_2 = z_1`, under `q_1 = a + b s + c s^2`, `s` from 0 to 1 over a step of length `h`.
+//! `S_i dz_i/dt = q_i - z_i`, `z_i = x_i - offset_i`, `q_2 = z_1`, `q_1 = a + b s + c s^2`, `s` from 0 to 1 over a step of length `h`.
 //! With `r_i = h/S_i` ([`crate::lag_response`] defines `w_k`, `C` and `W_k`):
 //! ```text
 //! x_1 <- exp(-r_1) x_1 + w_0(r_1) a + w_1(r_1) b + w_2(r_1) c + w_0(r_1) offset_1

@@ -31,7 +31,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         meaning: "height from the bottom of the tank to the end of the pipe",
         absent: 0.0,
         lower: 0.0,
-        // A pipe longer than the tank's depth would have been noticed.
+        // A pipe longer than the largest level would have been noticed.
         upper: most,
         starts: vec![0.1 * most],
     }]

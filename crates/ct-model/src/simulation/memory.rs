@@ -1,7 +1,8 @@
-//! What the first row settles, and what plays remember from row to row.
+//! Initialisation at the first sample, and the memory of play operators (backlash) from sample to sample.
 //!
-//! A play moves with what goes into it at a distance of at most its half-width. Within an interval between rows it starts from what it
-//! gave at the row: exact where what goes in is held or runs in one direction, as every input does. It comes to rest in the middle before the record.
+//! The output of a play operator differs from its input by at most the half-width. Within a sampling interval the output is computed from
+//! its value at the last sample: this is exact for an input that is held or monotone in the interval, as every model input is. Before the
+//! record, the play is in the middle position.
 
 use super::Simulation;
 use super::delays::{Delay, Delays};
@@ -9,10 +10,10 @@ use super::step::Drive;
 use crate::scalar::Scalar;
 
 impl<T: Scalar> Simulation<'_, T> {
-    /// Before the record everything was as at its beginning: what a delay lets through, what plays hold, and settled states, too.
+    /// Sets the values before the record to those at its beginning: of delays, play operators and states with a steady-state initial value.
     pub(super) fn before_the_record(&mut self) {
         let tape = &self.model.tape;
-        // One may stand on what another one gives.
+        // One of these values may depend on another one, so the evaluation is repeated.
         for _ in 0..=tape.delays.len() + tape.plays.len() + tape.settled.len() {
             tape.evaluate_with_guards(&mut self.work.registers);
             let values = &mut self.work.registers.values;
@@ -37,7 +38,7 @@ impl<T: Scalar> Simulation<'_, T> {
         }
     }
 
-    /// Gives the settled states their initial values, and plays theirs, from the inputs of the first row.
+    /// Sets the initial values of settled states and of play operators from the inputs of the first sample.
     pub(super) fn settle(&mut self, inputs: &[f64], delays: &Delays<T>) {
         let tape = &self.model.tape;
         if self.settled || (tape.settled.is_empty() && tape.plays.is_empty()) {
@@ -48,7 +49,7 @@ impl<T: Scalar> Simulation<'_, T> {
         self.before_the_record();
     }
 
-    /// Evaluates a reading: what is delayed by nothing is there at once.
+    /// Evaluates the outputs; an expression with a delay of zero takes its present value.
     pub(super) fn let_through(&mut self, delays: &Delays<T>) {
         let tape = &self.model.tape;
         tape.evaluate_with_guards(&mut self.work.registers);
@@ -64,7 +65,7 @@ impl<T: Scalar> Simulation<'_, T> {
         }
     }
 
-    /// Plays start anew from what they give at this row.
+    /// Stores the outputs of the play operators at this sample as their new initial values.
     pub(super) fn remember(&mut self) {
         for play in &self.model.tape.plays {
             self.work.registers.values[play.held] = self.work.registers.values[play.to];

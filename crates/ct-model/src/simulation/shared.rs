@@ -1,11 +1,11 @@
-//! A simulation that owns a share of its model.
+//! A simulation that shares ownership of its model.
 
 use std::sync::{Arc, LazyLock};
 
 use super::{Model, NoSolution, Simulation, SimulationNumber};
 use crate::spec::ModelSpec;
 
-/// What a simulation stands on between two calls.
+/// An empty model, which the simulation borrows between two calls.
 static NO_MODEL: LazyLock<Model> = LazyLock::new(|| {
     Model::new(ModelSpec {
         name: String::new(),
@@ -19,17 +19,18 @@ static NO_MODEL: LazyLock<Model> = LazyLock::new(|| {
     })
 });
 
-/// A [`Simulation`] that owns a share of its model instead of borrowing it: for what lives longer than a function. Its numbers are the same.
+/// A [`Simulation`] that shares ownership of its model instead of borrowing it, so that it may outlive the function that creates it. The
+/// results are identical.
 ///
-/// **Cost** beside that of a [`Simulation`]: it is moved, about a kilobyte, in every call.
+/// **Cost** in addition to that of a [`Simulation`]: every call moves the simulation, about one kilobyte.
 pub struct SharedSimulation<T> {
     model: Arc<Model>,
-    /// There but within a call.
+    /// `None` during a call only.
     simulation: Option<Simulation<'static, T>>,
 }
 
 impl<T> Simulation<'_, T> {
-    /// The same on another borrow of its model.
+    /// The same simulation with another borrow of its model.
     fn on(self, model: &Model) -> Simulation<'_, T> {
         Simulation { model, ..self }
     }
@@ -39,7 +40,7 @@ impl<T: SimulationNumber> SharedSimulation<T> {
     /// As [`Simulation::new`].
     ///
     /// # Panics
-    /// Where the numbers of parameters or states are not the model's.
+    /// If the number of parameters or states is not that of the model.
     #[must_use]
     pub fn new(model: Arc<Model>, parameters: &[T], initial: &[T], start: f64) -> Self {
         let simulation = Simulation::new(&model, parameters, initial, start).on(&NO_MODEL);
@@ -69,7 +70,7 @@ impl<T: SimulationNumber> SharedSimulation<T> {
         self.simulation.as_ref().map_or(&[], Simulation::state)
     }
 
-    /// Nothing where a call has panicked before.
+    /// Calls `call` with the simulation; `None` if an earlier call has panicked.
     fn on_its_model<R>(&mut self, call: impl FnOnce(&mut Simulation<'_, T>) -> R) -> Option<R> {
         let mut simulation = self.simulation.take()?.on(&self.model);
         let result = call(&mut simulation);

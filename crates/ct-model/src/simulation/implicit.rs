@@ -101,7 +101,7 @@ impl Jacobian {
         }
     }
 
-    /// The maximum norm: the largest row sum of absolute values.
+    /// The infinity norm: the largest row sum of absolute values.
     pub fn norm(&self) -> f64 {
         let rows = self.matrix.row_iter();
         rows.map(|row| row.iter().map(|v| v.abs()).sum())

@@ -1,13 +1,13 @@
 //! The diagnosis: from a model and records to a verdict.
 //!
-//! 1. The nominal model is fitted with white noise, from many starts; the candidates follow from the ranges that it simulates.
+//! 1. The believed model is fitted with white noise, from many starts; the candidates follow from the ranges that it simulates.
 //! 2. A forward search with white noise adds many effects; the noise model is estimated from the residual of the best set. If this noise
 //!    model is not white, the search is repeated with it (prewhitened fits).
 //! 3. The effects of the best set that pass the acceptance test are kept: with one common noise model first, then with a noise model from
 //!    each model's own residual.
 //! 4. Residual tests check whether the residual is noise. If it is not, or if many effects were needed, sets of effects that do not depend
-//!    on time are searched once more; if the residual is still not noise, the set that explains the largest part of the error is selected from
-//!    all sets.
+//!    on time are searched once more; if the residual is still not noise, the set that explains the largest part of the error is selected
+//!    from all sets.
 //! 5. The result of the residual tests determines the verdict; effects that the data cannot distinguish form groups.
 
 use ct_signals::ArModel;
@@ -30,7 +30,7 @@ pub struct Progress {
     pub phase: &'static str,
 }
 
-/// Searches the candidates for effects that the nominal model lacks.
+/// Searches the candidates for effects that the believed model lacks.
 ///
 /// # Errors
 /// If the records, the model or the fit do not allow a diagnosis.

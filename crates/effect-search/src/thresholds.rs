@@ -47,17 +47,17 @@ pub struct Thresholds {
     pub scaled_parameters: usize,
 
     // The search of sets.
-    /// Number of single effects, those with the best scores, that are fitted in addition to the nominal model (1 or more). Chosen, for
+    /// Number of single effects, those with the best scores, that are fitted in addition to the believed model (1 or more). Chosen, for
     /// time.
     pub first_refits: usize,
-    /// Number of best single effects that are also fitted from starts of their own, if the nominal model has a parameter without a known
-    /// value. Chosen, for time.
+    /// Number of best single effects that are also fitted from starts of their own, if a parameter of the believed model is at a bound or
+    /// not determined by the records. Chosen, for time.
     pub own_start_refits: usize,
     /// Number of starts of each of these fits (1 or more). Chosen, for time.
     pub own_starts: usize,
     /// Number of pairs of effects that are fitted, those with the best joint scores. Chosen, for time.
     pub pair_refits: usize,
-    /// Smallest number of candidates that are scored in addition to larger sets, those with the best scores for the nominal model; half of
+    /// Smallest number of candidates that are scored in addition to larger sets, those with the best scores for the believed model; half of
     /// all candidates if that is more. Chosen, for time.
     pub kept_candidates: usize,
     /// Beam width: number of sets that are extended in parallel (1 or more). Chosen, for time.

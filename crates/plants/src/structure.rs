@@ -375,7 +375,7 @@ mod tests {
             })
         };
         assert_eq!(at(None, 1), [35.0; 2]);
-        // The level of the upper tank is known from the nominal model only.
+        // The level of the upper tank is known from the believed model only.
         assert_eq!(at(None, 0), [85.0; 2]);
         assert_eq!(at(Some(28.0), 0), [28.0; 2]);
         assert_eq!(at(Some(28.0), 1), [28.0; 2]);

@@ -56,8 +56,8 @@ impl Model {
 
     /// Simulates the model from its initial values, with evenly sampled, held inputs; returns a series for each output.
     ///
-    /// `parameters`: in the order of [`ModelSpec::parameters`]. `interval` \[the model's unit of time\]. `inputs`: a series for each input, of
-    /// equal length.
+    /// `parameters`: in the order of [`ModelSpec::parameters`]. `interval` \[the model's unit of time\]. `inputs`: a series for each input,
+    /// of equal length.
     ///
     /// # Errors
     /// If the simulation fails.

@@ -113,8 +113,8 @@ impl Setup<'_> {
         let mut rows = vec![0.0; columns * outputs];
         let mut models = vec![f64::NAN; outputs];
         let count = self.parameter_count();
-        // Response of the linearised plant to commands of the loop. Its input is, for the derivatives, minus the derivatives of the simulated
-        // command and, for the residual, the simulated command minus the measured one.
+        // Response of the linearised plant to commands of the loop. Its input is, for the derivatives, minus the derivatives of the
+        // simulated command and, for the residual, the simulated command minus the measured one.
         let mut response: Option<(Response, Vec<f64>)> = self
             .feedback
             .as_ref()

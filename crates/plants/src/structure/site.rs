@@ -110,7 +110,7 @@ impl Site<'_> {
     }
     /// Upper bound of the height of a rim or a hole: the height of the tank, if it is known and the level is counted from the tank's
     /// bottom; otherwise a height so far above the largest level that the effect would not show. A level that is not measured is known from
-    /// the nominal model only, which may be far too low.
+    /// the believed model only, which may be far too low.
     #[must_use]
     pub fn highest_place(&self) -> f64 {
         let (low, high) = self.level();

@@ -76,8 +76,8 @@ impl Domain {
         format!("sensor of the {which} {kind}")
     }
 
-    /// The text for the place of an effect, from its name ([`crate::Placed::place_name`]): `in the upper tank`, `at the sensor of the lower
-    /// tank`, `at pump 1`.
+    /// The text for the place of an effect, from its name ([`crate::Placed::place_name`]):
+    /// `in the upper tank`, `at the sensor of the lower tank`, `at pump 1`.
     #[must_use]
     pub fn place_words(self, effect: &str, name: &str) -> String {
         let (which, kind) = self.vessel_words(name);

@@ -28,9 +28,9 @@
 //! length, each an exponential Runge-Kutta step (ETDRK4): S. M. Cox, P. C. Matthews, J. Computational Physics 176 (2002) 430-455; A.-K.
 //! Kassam, L. N. Trefethen, SIAM J. Scientific Computing 26 (2005) 1214-1233. A vessel that is near its steady state takes one part. With
 //! one step per sample of 1.6 to 45 time constants, any single effect and levels from 4 to 20, the error of the output is at most 0.0003
-//! (linear vessels; without an effect in a vessel, linear plants are exact) and 0.006 (Torricelli): `cargo test -p plants --test all
-//! fast_vessels:: -- --nocapture`. If a level changes so much within the shortest part, 1/32 of a step, that its decay rate is not
-//! constant, that part is an implicit step of order one, which conserves mass.
+//! (linear vessels; without an effect in a vessel, linear plants are exact) and 0.006 (Torricelli):
+//! `cargo test -p plants --test all fast_vessels:: -- --nocapture`. If a level changes so much within the shortest part, 1/32 of a step,
+//! that its decay rate is not constant, that part is an implicit step of order one, which conserves mass.
 
 mod actuator;
 pub mod controller;

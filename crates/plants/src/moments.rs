@@ -1,8 +1,9 @@
 //! The first moments of an exponential over one step, smooth down to a time constant of zero.
 //!
-//! The transient of a first-order lag of time constant `T` behind a constant or polynomial signal decays as `exp(-s/e)`, `s = t/h` in `[0,
-//! 1]`, `e = T/h`. Its effect on a slow vessel is given by the moments `M_j = int_0^1 s^j exp(-s/e) ds`. They go to zero with `e`, with the
-//! correct slope (`M_0 -> e`), so that the model is smooth where the lag vanishes.
+//! The transient of a first-order lag of time constant `T` behind a constant or polynomial signal decays as
+//! `exp(-s/e)`, `s = t/h` in `[0, 1]`, `e = T/h`. Its effect on a slow vessel is given by the moments
+//! `M_j = int_0^1 s^j exp(-s/e) ds`. They go to zero with `e`, with the correct slope (`M_0 -> e`), so that the model is smooth where the
+//! lag vanishes.
 
 use crate::{Scalar, linear::same_step};
 

@@ -1,7 +1,7 @@
 //! The diagnosis: from a model and records to a verdict.
 //!
 //! 1. The believed model is fitted with white noise, from many starts; the candidates follow from the ranges that it simulates.
-//! 2. A forward search with white noise adds many effects; the noise model is estimated from the residual of the best set. If this noise
+//! 2. A search with white noise adds many effects; the noise model is estimated from the residual of the best set. If this noise
 //!    model is not white, the search is repeated with it (prewhitened fits).
 //! 3. The effects of the best set that pass the acceptance test are kept: with one common noise model first, then with a noise model from
 //!    each model's own residual.

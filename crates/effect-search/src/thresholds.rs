@@ -136,7 +136,7 @@ pub struct Thresholds {
     /// disturbance by its own dynamics makes the output rougher than the record. Chosen.
     pub innovation_ratio: f64,
 
-    // Groups of what the data cannot tell apart.
+    // Groups of effects that the data cannot distinguish.
     /// A candidate with no more parameters is an alternative if its deviance is within this of the best one's: the 99 % quantile of
     /// chi-square with two degrees of freedom.
     pub same_deviance: f64,
@@ -158,7 +158,7 @@ pub struct Thresholds {
     /// to 1). Chosen.
     pub own_candidate_share: f64,
 
-    // The shape of what no candidate explains.
+    // The shape of the error that no candidate explains.
     /// Number of smooth functions that are fitted, those with the best scores (1 or more). Chosen, for time.
     pub shape_refits: usize,
     /// Number of these functions, the best ones, that are tested on parts of the records to which they were not fitted. Chosen, for time.

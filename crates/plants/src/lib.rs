@@ -9,7 +9,7 @@
 //! # fn main() -> Result<(), plants::Error> {
 //! let scales = Scales::from_ranges((0.0, 10.0), (5.0, 20.0), 1.0, 600.0);
 //! let tank = Structure::new(Plant::SingleTank, Known { area: [Some(154.0), None, None], ..Known::default() }, scales);
-//! // pump_gain [cm^3/(V s)], alpha [cm^2.5/s]; level(0) = 9 cm; the pump stands at 4 V.
+//! // pump_gain [cm^3/(V s)], alpha [cm^2.5/s]; level(0) = 9 cm; the command before the record is 4 V.
 //! let mut simulator = Simulator::<f64>::new(&tank, &[9.0, 11.0], &[9.0], 4.0)?;
 //! let before = simulator.read(0);
 //! simulator.advance(Command::held(5.0), 1.0);

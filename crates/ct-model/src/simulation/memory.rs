@@ -10,7 +10,8 @@ use super::step::Drive;
 use crate::scalar::Scalar;
 
 impl<T: Scalar> Simulation<'_, T> {
-    /// Sets the values before the record to those at its beginning: of delays, play operators and states with a steady-state initial value.
+    /// Sets the values before the record to those at its beginning: of delays, of play operators, and of states whose initial values depend
+    /// on inputs or other states (`settled`).
     pub(super) fn before_the_record(&mut self) {
         let tape = &self.model.tape;
         // One of these values may depend on another one, so the evaluation is repeated.
@@ -38,7 +39,7 @@ impl<T: Scalar> Simulation<'_, T> {
         }
     }
 
-    /// Sets the initial values of settled states and of play operators from the inputs of the first sample.
+    /// Sets the initial values of play operators and of states whose initial values depend on inputs, from the inputs of the first sample.
     pub(super) fn settle(&mut self, inputs: &[f64], delays: &Delays<T>) {
         let tape = &self.model.tape;
         if self.settled || (tape.settled.is_empty() && tape.plays.is_empty()) {

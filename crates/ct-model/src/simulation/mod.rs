@@ -94,7 +94,7 @@ pub struct Simulation<'a, T> {
     begun: bool,
     /// The registers hold slopes and guards at the end of the last interval, whose inputs were held.
     ended_within: bool,
-    /// Settled states have their initial values.
+    /// States whose initial values depend on inputs or other states have received these values.
     settled: bool,
 }
 

@@ -18,9 +18,9 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 };
 
 /// Start values of the width, as shares of the range of the command, in two geometric grids: smallest value, number, and ratio. With
-/// stiction, a fit converges only from within a tenth of the true width, so the grid is this fine. For widths near the range of the
-/// command, the actuator moves only at extreme commands, and the grid is finer. The largest start is nearly twice the range: the command
-/// leaves so wide a band only if the valve begins near an end of it.
+/// stiction, the cost has a visible minimum only within a tenth of the true width, so the grid is this fine. For widths near the range of
+/// the command, the actuator moves only at extreme commands, and the grid is finer. The largest start is nearly twice the range: a valve
+/// with so wide a band moves only if it begins near an end of the band.
 const WIDTHS: [(f64, i32, f64); 2] = [(0.03, 14, 1.2), (0.38, 18, 1.1)];
 /// Upper bound of the width, as a share of the range of the command. Beyond it, a sticking valve moves only if it begins at an end of its
 /// band, and the width and the initial position cannot be identified separately.

@@ -210,7 +210,7 @@ pub(super) fn crossing(
     let mut last = f64::NAN;
     let mut side = 0;
     for _ in 0..60 {
-        // Not `clamp`, which panics where a bound is not a number.
+        // Not `clamp`, which panics if a bound is NaN.
         let s = ((low.0 * high.1 - high.0 * low.1) / (high.1 - low.1))
             .max(low.0)
             .min(high.0);

@@ -231,7 +231,7 @@ impl<const N: usize> Vessels<f64, N> {
         }
     }
 
-    /// For the outlet of vessel `i`: the head under the square root, the rate of the head, and the width of the range near zero where the root is
+    /// For the outlet of vessel `i`: the head under the square root, its rate, and the width of the range near zero where the root is
     /// replaced.
     fn head_of_root(&self, i: usize, rates: &[f64; N]) -> (f64, f64, f64) {
         match self.valves {

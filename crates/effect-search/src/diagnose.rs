@@ -1,13 +1,14 @@
-//! From a model and records to a verdict.
+//! The diagnosis: from a model and records to a verdict.
 //!
-//! 1. The believed model is fitted in white noise, from many starts; the candidates follow from what it visits.
-//! 2. A search in white noise finds a rich set; the noise model is that of its residual. Where it is not white, the search is repeated in
-//!    its metric.
-//! 3. Of the best set the effects stay that the acceptance test asks for, in one metric and with the noise model of each model's own
-//!    residual.
-//! 4. Residual tests say whether it leaves more than noise. Where it does, or where many effects were needed, sets of effects that do not
-//!    follow time are grown once more; where something is left the largest part of the error is looked for among all sets.
-//! 5. What is left decides between the verdicts; groups hold what cannot be told apart.
+//! 1. The believed model is fitted with white noise, from many starts; the candidates follow from the ranges that it simulates.
+//! 2. A search with white noise adds many effects; the noise model is estimated from the residual of the best set. If this noise
+//!    model is not white, the search is repeated with it (prewhitened fits).
+//! 3. The effects of the best set that pass the acceptance test are kept: with one common noise model first, then with a noise model from
+//!    each model's own residual.
+//! 4. Residual tests check whether the residual is noise. If it is not, or if many effects were needed, sets of effects that do not depend
+//!    on time are searched once more; if the residual is still not noise, the set that explains the largest part of the error is selected
+//!    from all sets.
+//! 5. The result of the residual tests determines the verdict; effects that the data cannot distinguish form groups.
 
 use ct_signals::ArModel;
 use estimation::Noise;
@@ -22,17 +23,17 @@ use crate::problem::{Limit, Options, Phase, Problem};
 use crate::result::{Diagnosis, Verdict};
 use crate::search::Grown;
 
-/// How far the computation is.
+/// The progress of a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// What is being done.
+    /// The present phase.
     pub phase: &'static str,
 }
 
-/// Searches the candidates for what the believed model is missing.
+/// Searches the candidates for effects that the believed model lacks.
 ///
 /// # Errors
-/// Where the records, the model or the fit do not allow it.
+/// If the records, the model or the fit do not allow a diagnosis.
 pub fn diagnose(
     problem: &Problem,
     options: &Options,
@@ -72,17 +73,17 @@ pub fn diagnose(
     context.limit.begin(Phase::Confirm);
     let mut confirmed = context.confirm(grown.best.clone(), &grown.base, &noise)?;
     if grown.cut_short && confirmed.added.len() == grown.base.added.len() {
-        // The noise model of a search that was cut short explains what was not reached: the test below decides without it.
+        // After a search that was cut short, the noise model also describes effects that were not tried; the test below decides without it.
         confirmed = grown.best.clone();
     }
     if confirmed.added.len() > grown.base.added.len() {
-        // Each model with the noise model of its own residual: what coloured noise explains needs no effect.
+        // Each model has the noise model of its own residual: what autocorrelated noise explains needs no effect.
         let own = context.in_own_noise(&confirmed)?;
         let bare = context.in_own_noise(&grown.base)?;
         let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
         let error =
             |node: &Node| weighted_rms(&node.fit.rmse, &floors, &node.fit.samples_per_output);
-        // And the simulation error falls: in the metric of coloured noise a single reading can ask for an effect.
+        // The simulation error must decrease too: in a prewhitened fit, a single reading can be a reason to add an effect.
         let needed = bare.bic() - own.bic() > options.thresholds.bic_margin
             && context.beyond_chance((&confirmed, &own), (&grown.base, &bare))
             && error(&confirmed) < error(&grown.base);
@@ -102,8 +103,8 @@ pub fn diagnose(
         let timeless = context.floating(&base, &sets, options.max_effects);
         context.limit.begin(Phase::Part);
         if left.is_some() {
-            // Its noise model takes physics for noise, and where that is slow the simulation drifts off in its metric: sets are compared
-            // by their simulation error.
+            // The noise model describes unmodelled physics as noise, and if that physics is slow, simulations of prewhitened fits drift.
+            // The sets are therefore compared by their simulation error.
             sets.extend(timeless);
             let part = context.largest_part(&base, &sets)?;
             if let Some(part) = part.and_then(|(part, _)| context.of_many_readings(part, &base)) {
@@ -115,7 +116,7 @@ pub fn diagnose(
                 left = context.left(&confirmed, &own)?;
             }
         } else if let Some(better) = context.better_in_own_noise(timeless, &own) {
-            // So many effects may imitate others, and the coloured noise beside them what these leave.
+            // So many effects may imitate other effects, and the noise model may describe the rest of the error.
             noise = better.fit.noise.clone();
             if let Ok(bare) = context.refitted(&grown.base, &noise, FINE) {
                 grown.base = bare;
@@ -128,11 +129,11 @@ pub fn diagnose(
     tell("telling apart");
     context.limit.begin(Phase::Groups);
     let found = confirmed.added.len() > grown.base.added.len();
-    // What a search did not reach its noise model explains: then the effects are a part of the answer at most.
+    // After a search that was cut short, the noise model describes what was not tried; the effects are then at most a part of the answer.
     let open = grown.cut_short && own.noise.order() > 0;
     let whole = left.is_none() && !open;
     let many = many(&confirmed);
-    // All that remains is noise, or else what its past does not predict.
+    // The noise level: the standard deviation of the whole residual if it is noise, otherwise that of its innovations.
     let floors: Vec<f64> = if whole {
         own.noise.iter().map(ArModel::stationary_std).collect()
     } else {
@@ -195,7 +196,7 @@ pub fn diagnose(
     )
 }
 
-/// The search in the metric of a noise model, where that is not white.
+/// The search with prewhitened fits, if the noise model is not white.
 fn in_metric(
     context: &Context,
     by_error: Grown,
@@ -212,7 +213,7 @@ fn in_metric(
         return Ok((by_error, Noise::white(noise.outputs())));
     };
     if late {
-        // Sets are compared in one metric, whatever time is left.
+        // Sets are compared with one noise model, even if no time is left.
         let mut grown = by_error;
         if let Ok(best) = context.refitted(&grown.best, &noise, FINE) {
             (grown.base, grown.best) = (begin, best);
@@ -228,7 +229,7 @@ fn in_metric(
         &noise,
         options.max_effects,
     )?;
-    // The rich set of white noise may be the better one here too.
+    // The best set of the search with white noise may also be better with this noise model.
     let other = context.refitted(&by_error.best, &noise, FINE);
     let mut grown = grown;
     if let Ok(other) = other

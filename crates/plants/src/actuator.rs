@@ -1,4 +1,4 @@
-//! The actuator: static laws on the command, then dead time, then lag.
+//! The actuator: static nonlinearities of the command, then dead time, then a first-order lag.
 
 use std::collections::VecDeque;
 
@@ -8,16 +8,16 @@ use crate::{
     moments::{KeptMoments, decayed},
 };
 
-/// Corners of a ramp that lie closer together than this share of the interval are one.
+/// Corners of a ramp that are closer together than this share of the sampling interval are merged.
 const SAME_CORNER: f64 = 1e-9;
 
-/// A smooth stretch of the command: `value + slope s + curve s^2`, `s` the seconds since it began.
+/// A smooth segment of the command: `value + slope s + curve s^2`, where `s` is the time since the segment began \[s\].
 #[derive(Clone, Copy)]
 pub(crate) struct Signal<T> {
     value: T,
     slope: T,
     curve: T,
-    /// Slope and curve are zero.
+    /// `slope` and `curve` are zero: the command is constant.
     held: bool,
 }
 
@@ -40,7 +40,7 @@ impl<T: Scalar> Signal<T> {
         }
     }
 
-    /// The same signal, counted from `s` on.
+    /// The same signal with its time origin moved to `s`.
     pub(crate) fn from(&self, s: T) -> Self {
         if self.held {
             return *self;
@@ -64,7 +64,7 @@ impl<T: Scalar> Signal<T> {
     }
 }
 
-/// A stretch that was commanded: it began `after` seconds after `time`.
+/// A commanded segment that began `after` seconds after `time`.
 #[derive(Clone, Copy)]
 struct Piece<T> {
     time: f64,
@@ -76,22 +76,22 @@ pub(crate) struct Actuator<T: Scalar> {
     laws: Vec<Box<dyn Law<T>>>,
     delay: Option<T>,
     lag: Option<KeptMoments<T>>,
-    /// By how much the lagged signal exceeds the one it follows.
+    /// Output of the lag minus its input.
     excess: T,
-    /// What the command was, oldest first; only kept where there is a delay.
+    /// Past commands, oldest first; stored only if there is a dead time.
     past: VecDeque<Piece<T>>,
-    /// Where a ramp has corners, as shares of the interval: scratch space.
+    /// Corners of a ramp as shares of the sampling interval (scratch space).
     corners: Vec<T>,
-    /// Where the last step ended: the command after delay, for the lag's jump.
+    /// Delayed command at the end of the last step: the lag needs it to find the jump of its input.
     last: T,
-    /// Where what the command moves stands.
+    /// Position of the element that the command moves, after backlash or stiction.
     stands: f64,
-    /// The pump's gain changes with time.
+    /// The pump's gain is a function of time.
     drifts: bool,
 }
 
 impl<T: Scalar> Actuator<T> {
-    /// `at_rest`: the command before the record began.
+    /// `at_rest`: the constant command before the record began.
     pub(crate) fn new(laws: Vec<Box<dyn Law<T>>>, at_rest: f64, start: f64) -> Self {
         let delay = laws.iter().find_map(|law| law.delay());
         let lag = laws.iter().find_map(|law| law.actuator_lag());
@@ -121,14 +121,14 @@ impl<T: Scalar> Actuator<T> {
         actuator
     }
 
-    /// The lag had not settled: `h` before the record its signal exceeded the one that it follows by this.
+    /// Sets an initial state of the lag other than steady state: `h` before the record began, its output exceeded its input by `before`.
     pub(crate) fn unsettle(&mut self, before: T, h: f64) {
         if let Some(lag) = &self.lag {
             self.excess = decayed(before, lag.time_constant, h);
         }
     }
 
-    /// Where the actuator stands at a recorded command.
+    /// Position of the actuator at a recorded command.
     fn position(&mut self, u: T) -> T {
         let moved = self.laws.iter_mut().find_map(|law| law.position(u));
         let position = moved.unwrap_or(u);
@@ -144,7 +144,7 @@ impl<T: Scalar> Actuator<T> {
         self.laws.iter_mut().fold(u, |u, law| law.command(u, t))
     }
 
-    /// Finds where a ramp has corners after the static laws: zero, the corners, one.
+    /// Finds the corners of a ramp after the static nonlinearities, as shares of the interval: zero, the corners, one.
     fn find_corners(&mut self, from: T, to: T, t: f64, h: f64) {
         self.corners.clear();
         self.corners.extend([T::constant(0.0), T::constant(1.0)]);
@@ -175,19 +175,19 @@ impl<T: Scalar> Actuator<T> {
         }
     }
 
-    /// The smooth stretch between two shares of a ramp's interval.
+    /// The smooth segment between two shares of a ramp's interval.
     fn stretch(&mut self, ramp: (T, T), t: f64, h: f64, low: T, high: T) -> Signal<T> {
         let (from, to) = ramp;
         let mut at = |share: f64| {
             let s = low + (high - low) * share;
             self.effective((to - from) * s + from, t + s.value() * h)
         };
-        // Strictly inside: at a corner itself the derivatives could be those of the neighbour.
+        // The points are strictly inside: at a corner the derivatives could be those of the neighbouring segment.
         let (first, middle, last) = (at(0.25), at(0.5), at(0.75));
         let mut bend = first + last - middle * 2.0;
         let largest = first.value().abs().max(last.value().abs());
         if bend.value().abs() <= 4.0 * f64::EPSILON * largest {
-            // Rounding; its derivatives need not be.
+            // The value of `bend` is rounding error here, but its derivatives need not be.
             bend = bend - bend.value();
         }
         let slope = (last - first) * 2.0;
@@ -200,8 +200,8 @@ impl<T: Scalar> Actuator<T> {
         }
     }
 
-    /// Runs `each(length, command)` over the pieces of one sampling interval, in order: a piece is smooth,
-    /// and the command on it is what arrives after static laws and dead time.
+    /// Calls `each(length, command)` for the smooth pieces of one sampling interval in order of time. `command` is the command after the
+    /// static nonlinearities and the dead time.
     pub(crate) fn pieces(
         &mut self,
         from: T,
@@ -246,7 +246,7 @@ impl<T: Scalar> Actuator<T> {
             }
         }
         let Some(delay) = self.delay else { return };
-        // Break points: where a past piece begins to arrive, in time from the start of this interval.
+        // Break points: the times, from the start of this interval, at which a past piece comes out of the dead time.
         let arrives = |piece: &Piece<T>| delay + piece.after + (piece.time - t);
         while self.past.len() > 1 && arrives(&self.past[1]).value() < 0.0 {
             self.past.pop_front();
@@ -275,7 +275,7 @@ impl<T: Scalar> Actuator<T> {
         }
     }
 
-    /// The inflow over a stretch of length `h` from time `start` on: the signal behind the lag, times the pump's gain.
+    /// The inflow over a segment of length `h` from time `start` on: the lag output times the pump's gain.
     #[inline]
     pub(crate) fn inflow(&mut self, h: T, command: Signal<T>, gain: T, start: T) -> Inflow<T> {
         if self.drifts {
@@ -297,18 +297,18 @@ impl<T: Scalar> Actuator<T> {
         self.lagged(h, command).map(|u| gain * u)
     }
 
-    /// The signal behind the lag over a stretch of length `h`, as the parabola with the same first three moments.
+    /// The lag output over a segment of length `h`, as the parabola with the same first three moments.
     fn lagged(&mut self, h: T, command: Signal<T>) -> Inflow<T> {
         let ahead = command.over(h);
         let Some(kept) = &mut self.lag else {
             return ahead;
         };
         let lag = kept.time_constant;
-        // The lag follows continuously: what the command jumps by is added to the excess.
+        // The lag output is continuous: a jump of the lag input changes the excess by the opposite amount.
         self.excess = self.excess + (self.last - command.value);
         self.last = ahead.end;
         if h.value() == 0.0 {
-            // An empty stretch moves nothing, but its length may have derivatives.
+            // A segment of length zero leaves the state unchanged, but its length may have derivatives.
             let behind = ahead.map(|c| c + self.excess);
             self.excess = self.excess - command.slope * h;
             if lag.value() > 0.0 {
@@ -316,7 +316,7 @@ impl<T: Scalar> Actuator<T> {
             }
             return behind;
         }
-        // Behind a polynomial w the lag settles to w - T w' + T^2 w''; the rest decays.
+        // For a polynomial input w, the lag output tends to w - T w' + T^2 w''; the difference from that decays exponentially.
         let settled = |s: T| {
             -(lag * (command.slope + command.curve * s * 2.0)) + lag * lag * command.curve * 2.0
         };

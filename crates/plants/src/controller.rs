@@ -1,14 +1,13 @@
-//! Controllers with limits, to close the loop around a [`crate::Simulator`], on any [`Scalar`].
+//! Controllers with output limits, to close the loop around a [`crate::Simulator`], for any [`Scalar`].
 //!
-//! - **PI**: `u = b + gain e`, `b+ = b + gain h/integral_time e`, `e = r - y`; the integral stands still while the
-//!   command is limited and would be driven further out.
-//! - **R/S**: `S(q^-1) u = R(q^-1) e`, `s_0 = 1`, in the transposed direct form `u = x_1 + r_0 e`,
-//!   `x_i+ = x_(i+1) + r_i e - s_i u`, where `u` is the command as it was limited (K. J. Astrom, B. Wittenmark, Computer
-//!   Controlled Systems, 3rd ed. 1997, section 9.4), so that no integral in it winds up either. Around an operating point,
-//!   where `S(1)` is not zero, one more state holds its command.
+//! - **PI**: `u = b + gain e`, `b+ = b + gain h/integral_time e`, `e = r - y`; anti-windup: the integral is held while the command is at a
+//!   limit and the error would drive it further beyond.
+//! - **R/S**: `S(q^-1) u = R(q^-1) e`, `s_0 = 1`, in the transposed direct form `u = x_1 + r_0 e`, `x_i+ = x_(i+1) + r_i e - s_i u`. `u` is
+//!   the limited command (K. J. Astrom, B. Wittenmark, Computer Controlled Systems, 3rd ed. 1997, section 9.4), so that integral action in
+//!   `R/S` does not wind up. If `S(1)` is not zero, one more state holds the command of the operating point.
 //!
-//! The states of a controller are in units of the command. The sum of those that the command sees is what it would be at
-//! `e = 0`: a PI has one, `b`, operating point and integral in one.
+//! The states of a controller have the unit of the command. The states that enter the command directly add up to the command at `e = 0`. A
+//! PI controller has one state, `b`: the sum of operating point and integral.
 
 mod regulator;
 
@@ -17,7 +16,7 @@ use ct_lti::{Hold, StateSpace, TransferFunction};
 pub use self::regulator::{Pi, Regulator};
 use crate::{Error, Scalar};
 
-/// The most states that a controller may have.
+/// Largest number of states of a controller.
 pub const MAX_CONTROLLER_STATES: usize = 8;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -26,7 +25,7 @@ enum Kind {
         gain: f64,
         integral_time: f64,
     },
-    /// `r` and `s` are equally long, `s[0] = 1`.
+    /// `r` and `s` have equal length, and `s[0] = 1`.
     Sampled {
         r: Vec<f64>,
         s: Vec<f64>,
@@ -43,16 +42,16 @@ pub struct Controller {
     output: usize,
 }
 
-/// A controller without limits as `x+ = A x + b e`, `u = c x + d e`.
+/// A controller without limits in state-space form: `x+ = A x + b e`, `u = c x + d e`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearController {
-    /// A, row by row.
+    /// Matrix A, row by row.
     pub a: Vec<Vec<f64>>,
-    /// b.
+    /// Vector b.
     pub b: Vec<f64>,
-    /// c.
+    /// Vector c.
     pub c: Vec<f64>,
-    /// d.
+    /// Direct feedthrough d.
     pub d: f64,
 }
 
@@ -76,14 +75,14 @@ fn checked(kind: Kind, limits: (f64, f64)) -> Result<Controller, Error> {
 }
 
 impl Controller {
-    /// The same controller at another output than the first.
+    /// The same controller, reading the output with this index instead of the first output.
     #[must_use]
     pub fn at_output(mut self, output: usize) -> Self {
         self.output = output;
         self
     }
 
-    /// The output that it reads, counted from zero.
+    /// Index of the output that the controller reads, counted from zero.
     #[must_use]
     pub fn output(&self) -> usize {
         self.output
@@ -92,7 +91,7 @@ impl Controller {
     /// A PI controller: `gain` \[input/output\], `integral_time` \[s\], `limits` \[input\].
     ///
     /// # Errors
-    /// Where a setting is not finite, the gain is zero, the integral time not positive, or the limits are crossed.
+    /// If a setting is not finite, the gain is zero, the integral time is not positive, or the lower limit is not below the upper one.
     pub fn pi(gain: f64, integral_time: f64, limits: (f64, f64)) -> Result<Self, Error> {
         if !gain.is_finite() || gain == 0.0 {
             return refused(format!(
@@ -115,10 +114,11 @@ impl Controller {
         )
     }
 
-    /// `S(q^-1) u = R(q^-1) e`, the coefficients of the powers 0, 1, 2, ... of `q^-1`, a sample each; `limits` \[input\].
+    /// `S(q^-1) u = R(q^-1) e`: coefficients of the powers 0, 1, 2, ... of `q^-1`, the delay by one sample; `limits` \[input\].
     ///
     /// # Errors
-    /// Where a coefficient is not finite, `s[0]` or all of `r` is zero, there are too many states, or the limits are crossed.
+    /// If a coefficient is not finite, `s[0]` or all of `r` is zero, there are too many states, or the lower limit is not below the upper
+    /// one.
     pub fn sampled(r: &[f64], s: &[f64], limits: (f64, f64)) -> Result<Self, Error> {
         if let Some(value) = r.iter().chain(s).find(|value| !value.is_finite()) {
             return refused(format!(
@@ -158,11 +158,11 @@ impl Controller {
         )
     }
 
-    /// `S(p) u = R(p) e`, highest power first as they are written, sampled every `step` seconds; between samples it sees
-    /// the last reading.
+    /// `S(p) u = R(p) e`, coefficients from the highest power down, discretised with a zero-order hold of the reading and a sampling
+    /// interval of `step` seconds.
     ///
     /// # Errors
-    /// Where `R/S` is not proper, cannot be sampled, or [`Controller::sampled`] refuses it.
+    /// If `R/S` is not proper, cannot be sampled, or [`Controller::sampled`] rejects the result.
     pub fn continuous(r: &[f64], s: &[f64], step: f64, limits: (f64, f64)) -> Result<Self, Error> {
         let bad = |error: ct_lti::Error| Error::Controller {
             what: format!("r/s as a transfer function in p: {error}"),
@@ -172,7 +172,7 @@ impl Controller {
         let space = StateSpace::controllable(&system).map_err(bad)?;
         let n = space.order();
         let sampled = space.sampled(Hold::Zero, step).map_err(bad)?;
-        // The characteristic polynomial by Faddeev and LeVerrier, then R = S times the pulse response.
+        // Characteristic polynomial by the Faddeev-LeVerrier algorithm, then R = S times the pulse response.
         let mut s = vec![1.0];
         let mut m = vec![0.0; n * n];
         for k in 1..=n {
@@ -186,7 +186,7 @@ impl Controller {
             let trace: f64 = (0..n).map(|i| product[i * n + i]).sum();
             s.push(-trace / k as f64);
         }
-        // An integral is one exactly: rounding would let it leak.
+        // A pole at z = 1 is set exactly: rounding would turn the integrator into a slow lag.
         let (sum, size) = s.iter().fold((0.0, 0.0), |(sum, size), value: &f64| {
             (sum + value, size + value.abs())
         });
@@ -209,7 +209,7 @@ impl Controller {
         Self::sampled(&r, &s, limits)
     }
 
-    /// How many states it has.
+    /// Number of states.
     #[must_use]
     pub fn states(&self) -> usize {
         match &self.kind {
@@ -226,7 +226,7 @@ impl Controller {
         self.limits
     }
 
-    /// What the command answers to an error at once \[input/output\].
+    /// Direct feedthrough: the immediate change of the command per unit of error \[input/output\].
     #[must_use]
     pub fn direct(&self) -> f64 {
         match &self.kind {
@@ -235,7 +235,7 @@ impl Controller {
         }
     }
 
-    /// Its settings in the words of a model file.
+    /// The settings in the syntax of a model file.
     #[must_use]
     pub fn describe(&self) -> String {
         match &self.kind {
@@ -251,7 +251,7 @@ impl Controller {
         }
     }
 
-    /// Starts it; states that are not given are zero.
+    /// Creates a running controller with these initial states; states that are not given are zero.
     #[must_use]
     pub fn start<T: Scalar>(&self, states: &[T]) -> Regulator<T> {
         let zero = T::constant(0.0);
@@ -263,7 +263,7 @@ impl Controller {
         }
     }
 
-    /// The linear controller over steps of `h` seconds, where the command is not limited.
+    /// The linear controller for a sampling interval of `h` seconds, valid while the command is not limited.
     #[must_use]
     pub fn linear(&self, h: f64) -> LinearController {
         let n = self.states();
@@ -311,7 +311,7 @@ impl Controller {
     }
 }
 
-/// A number as it was written, or with a power of ten where its digits would fill a line.
+/// A number as the user wrote it, or with a power of ten if it has too many digits.
 fn short(value: f64) -> String {
     if value == 0.0 || (1e-6..1e15).contains(&value.abs()) {
         value.to_string()
@@ -320,7 +320,7 @@ fn short(value: f64) -> String {
     }
 }
 
-/// Polynomials of a model file are short; of a long one the first coefficients stand for all.
+/// Longer polynomials are shown by their first coefficients only.
 const MOST_SHOWN: usize = 3;
 
 /// Coefficients to four digits.

@@ -1,13 +1,13 @@
-//! An exponential Runge-Kutta step of order four for what forgets fast: ETDRK4.
+//! An exponential Runge-Kutta step of order four (ETDRK4) for states with fast decay.
 //!
-//! `d' = -rate d + N(d, t)` from `d = 0`: the forgetting is exact for any length of the step, `N` is taken for a parabola through
-//! the stages. For a rate of zero it is the classical Runge-Kutta step. `rate` only
-//! splits the equation: the solution does not depend on it, but the step does, so it carries derivatives.
+//! Solves `d' = -rate d + N(d, t)` from `d = 0`. The linear decay is exact for any step length; `N` is interpolated by a parabola through
+//! the stages. At a rate of zero this is the classical Runge-Kutta step. `rate` only splits the equation: the exact solution does not
+//! depend on `rate`, but the numerical step does, so `rate` carries derivatives.
 //!
-//! A step that is long against `1/rate` is as accurate as `N` is smooth: what a jump sets off has died away within the step
-//! and is weighted exactly, and the rest follows a parabola. The weights come from moments that are smooth down to a
-//! time constant of zero instead of differences of exponentials, whose cancellation Kassam and Trefethen cure by a
-//! contour integral.
+//! The error of a step that is long against `1/rate` depends on how smooth `N` is: the transient after a jump decays within the step and
+//! has exact weights; the slow part is approximated by a parabola. The weights are computed from moments that are smooth down to a time
+//! constant of zero, not from differences of exponentials, which cancel (Kassam and Trefethen avoid that cancellation by a contour
+//! integral).
 //!
 //! **References**: S. M. Cox, P. C. Matthews, Exponential time differencing for stiff systems, J. Computational Physics 176
 //! (2002) 430-455, equations (26) to (29); A.-K. Kassam, L. N. Trefethen, Fourth-order time-stepping for stiff PDEs, SIAM J.
@@ -15,14 +15,14 @@
 
 use crate::{Scalar, moments::exponential_moments};
 
-/// The weights of one vessel over one step.
+/// The weights of one vessel for one step.
 #[derive(Clone, Copy)]
 pub(crate) struct Damped<T> {
-    /// What is left after half the step.
+    /// Decay factor over half the step.
     decay: T,
     /// `int exp(-rate s) ds` over half the step.
     half: T,
-    /// Weights of the drive at the beginning, in the middle and at the end.
+    /// Weights of the drive `N` at the beginning, in the middle and at the end.
     whole: [T; 3],
 }
 
@@ -53,16 +53,16 @@ impl<T: Scalar> Damped<T> {
         drive * self.half
     }
 
-    /// Half a step from there under another one.
+    /// Half a step from the state `from` under another constant drive.
     pub(crate) fn half_from(&self, from: T, drive: T) -> T {
         from * self.decay + drive * self.half
     }
 
-    /// The whole step under a drive with these values at its beginning, in its middle and at its end.
+    /// The whole step under a drive with these values at the beginning, the middle and the end.
     pub(crate) fn whole(&self, [a, b, c]: [T; 3]) -> T {
         a * self.whole[0] + b * self.whole[1] + c * self.whole[2]
     }
 }
 
-/// Below this the forgetting is left to the drive, which then is all: nothing is lost by it.
+/// Below this rate, the decay is integrated as part of `N`; the accuracy is the same.
 const SLOW: f64 = 1e-6;

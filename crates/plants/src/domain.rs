@@ -1,4 +1,4 @@
-//! The domain of a model: which effects of the catalogue are offered, and what things are called.
+//! The domain of a model: which effects of the catalogue are candidates, and the words used for vessels and levels.
 
 use ct_signals::Unit;
 
@@ -14,12 +14,12 @@ use crate::{EffectInfo, Error, Outlet, Place, Plant};
 pub enum Domain {
     /// Tanks: the output is a level.
     Hydraulic,
-    /// Anything else.
+    /// Any other process.
     General,
 }
 
 impl Domain {
-    /// The domain of a plant whose output has this unit; empty where it is not known.
+    /// The domain of a plant whose output has this unit; an empty unit means that it is not known.
     ///
     /// ```
     /// use plants::{Domain, Plant};
@@ -39,16 +39,16 @@ impl Domain {
         }
     }
 
-    /// Whether an effect is offered in this domain.
+    /// Whether an effect is a candidate in this domain.
     #[must_use]
     pub fn offers(self, effect: &EffectInfo) -> bool {
         self == Self::Hydraulic || effect.general.is_some()
     }
 
-    /// Checks that an effect is offered for a plant whose output has this unit.
+    /// Checks that an effect is a candidate for a plant whose output has this unit.
     ///
     /// # Errors
-    /// [`Error::NotHydraulic`] where it is not.
+    /// [`Error::NotHydraulic`] if the effect is for hydraulic plants only and the plant is not hydraulic.
     pub fn check(effect: &EffectInfo, plant: Plant, output_unit: &str) -> Result<(), Error> {
         if Self::of(plant, output_unit).offers(effect) {
             return Ok(());
@@ -59,7 +59,7 @@ impl Domain {
         })
     }
 
-    /// What a vessel of this name ([`Plant::vessel_name`]) is called in text, as adjective and noun: `upper tank`, `first lag`.
+    /// The text for a vessel of this name ([`Plant::vessel_name`]), as adjective and noun: `upper tank`, `first lag`.
     #[must_use]
     pub fn vessel_words(self, name: &str) -> (&str, &'static str) {
         match (self, name) {
@@ -69,15 +69,15 @@ impl Domain {
         }
     }
 
-    /// What the sensor is called that reads a vessel of this name: `sensor of the upper tank`.
+    /// The text for the sensor of a vessel of this name: `sensor of the upper tank`.
     #[must_use]
     pub fn sensor_words(self, name: &str) -> String {
         let (which, kind) = self.vessel_words(name);
         format!("sensor of the {which} {kind}")
     }
 
-    /// Where an effect acts whose place has this name ([`crate::Placed::place_name`]): `in the upper tank`, `at the sensor of the lower tank`,
-    /// `at pump 1`.
+    /// The text for the place of an effect, from its name ([`crate::Placed::place_name`]):
+    /// `in the upper tank`, `at the sensor of the lower tank`, `at pump 1`.
     #[must_use]
     pub fn place_words(self, effect: &str, name: &str) -> String {
         let (which, kind) = self.vessel_words(name);
@@ -88,7 +88,7 @@ impl Domain {
         }
     }
 
-    /// What the level of a vessel ([`Plant::level_name`]) is called in text: `level_upper`, `output`, `first lag`.
+    /// The text for the level of a vessel ([`Plant::level_name`]): `level_upper`, `output`, `first lag`.
     #[must_use]
     pub fn level_words(self, name: &str) -> &str {
         match (self, name) {

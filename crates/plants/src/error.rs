@@ -1,6 +1,6 @@
-//! What can be wrong with a structure.
+//! Errors of structures, controllers and simulations.
 
-/// What can be wrong with a structure or a simulation.
+/// Errors of structures, controllers and simulations.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -9,24 +9,24 @@ pub enum Error {
         "unknown plant `{name}`: take one of single-tank, single-tank-linear, cascaded-tanks, cascaded-tanks-linear, first-order, three-tank"
     )]
     UnknownPlant {
-        /// The name that was given.
+        /// The given name.
         name: String,
     },
     /// No effect of that name.
     #[error("unknown effect `{name}`: `ctid effects` lists the catalogue{suggestion}")]
     UnknownEffect {
-        /// The name that was given.
+        /// The given name.
         name: String,
-        /// Empty, or the closest name.
+        /// The closest name of the catalogue as a suggestion, or empty.
         suggestion: String,
     },
-    /// The effect is on already.
+    /// The structure already has the effect.
     #[error("effect `{effect}` is on already: remove it once")]
     EffectTwice {
         /// The effect.
         effect: &'static str,
     },
-    /// The effect does not act on this plant.
+    /// The effect does not apply to this plant.
     #[error(
         "effect `{effect}` does not act on plant `{plant}`, {why}: `ctid effects {effect}` names the plants it acts on"
     )]
@@ -38,7 +38,7 @@ pub enum Error {
         /// What the plant has instead.
         why: &'static str,
     },
-    /// A hydraulic effect for an output that is no level.
+    /// A hydraulic effect for a plant whose output is not a level.
     #[error(
         "{effect} is an effect of tanks, and the output is in {unit}, which is no level: take a general effect (`ctid effects --model MODEL.toml` lists them), or, where the output is a level, give its column a unit of length, of volume or %"
     )]
@@ -48,7 +48,7 @@ pub enum Error {
         /// Unit of the output.
         unit: String,
     },
-    /// The effect is one of a pump that does not run.
+    /// The effect is at the second pump, but the record has no command for that pump.
     #[error(
         "effect `{effect}` cannot act at pump_2, which is off: name the column of its command as input_2 under [columns]"
     )]
@@ -56,7 +56,7 @@ pub enum Error {
         /// The effect.
         effect: &'static str,
     },
-    /// The plant has no such vessel, or nothing could be seen of the effect in it.
+    /// The plant has no such vessel, or the effect is not observable in that vessel.
     #[error(
         "effect `{effect}` cannot act there: plant `{plant}` has no such vessel, or the effect makes no difference in it"
     )]
@@ -69,25 +69,25 @@ pub enum Error {
     /// Wrong number of parameters or initial levels.
     #[error("{what}: {given} given, {needed} needed")]
     Count {
-        /// What was counted.
+        /// The kind of value that was counted.
         what: &'static str,
-        /// How many were given.
+        /// Number of values given.
         given: usize,
-        /// How many are needed.
+        /// Number of values needed.
         needed: usize,
     },
-    /// A term of the user's own that cannot be.
+    /// An invalid user-defined term.
     #[error("term `{term}`: {what}")]
     Term {
-        /// Its name.
+        /// Name of the term.
         term: String,
-        /// What is wrong and what to do.
+        /// What is wrong and how to correct it.
         what: String,
     },
-    /// A controller that cannot work.
+    /// A controller with invalid settings.
     #[error("controller: {what}")]
     Controller {
-        /// What is wrong and what to do.
+        /// What is wrong and how to correct it.
         what: String,
     },
 }

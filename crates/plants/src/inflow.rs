@@ -2,7 +2,7 @@
 
 use crate::Scalar;
 
-/// The inflow to the first vessel over a step: at its beginning, middle and end; a parabola through the three.
+/// The inflow to the first vessel over a step: a parabola through its values at the beginning, the middle and the end.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Inflow<T> {
     pub start: T,
@@ -27,7 +27,7 @@ impl<T: Scalar> Inflow<T> {
         }
     }
 
-    /// Both inflows together.
+    /// The sum of two inflows.
     pub(crate) fn and(self, other: Self) -> Self {
         Self {
             start: self.start + other.start,
@@ -36,7 +36,7 @@ impl<T: Scalar> Inflow<T> {
         }
     }
 
-    /// Coefficients of `a + b s + c s^2`, `s` from 0 to 1 over the step.
+    /// Coefficients of the inflow `a + b s + c s^2`, `s` from 0 to 1 over the step.
     #[inline]
     pub(crate) fn coefficients(&self) -> [T; 3] {
         let b = self.middle * 4.0 - self.start * 3.0 - self.end;
@@ -44,7 +44,7 @@ impl<T: Scalar> Inflow<T> {
         [self.start, b, c]
     }
 
-    /// The part from `from` to `to`, both in `[0, 1]`.
+    /// The inflow over the part of the step between `from` and `to`, both in `[0, 1]`.
     pub(crate) fn part(&self, from: T, to: T) -> Self {
         let [a, b, c] = self.coefficients();
         let at = |s: T| a + (b + c * s) * s;
@@ -56,8 +56,8 @@ impl<T: Scalar> Inflow<T> {
     }
 }
 
-/// An inflow beside that of the first pump, as a function of time: `a + b s + c s^2`, `s` the share of its `length` \[s\] since `start` \[s\].
-/// A second pump or a measured disturbance brings it.
+/// An additional inflow (second pump or measured disturbance) as a function of time: `a + b s + c s^2`, `s` the time since `start` \[s\] as
+/// a share of `length` \[s\].
 pub(crate) struct Feed<T> {
     start: T,
     length: T,
@@ -77,19 +77,19 @@ impl<T: Scalar> Feed<T> {
         }
     }
 
-    /// The same without derivatives.
+    /// The same feed without derivatives.
     pub(crate) fn values(&self) -> Feed<f64> {
         let coefficients = self.coefficients.map(T::value);
         Feed::new(self.start.value(), self.length.value(), coefficients)
     }
 
-    /// It does not change.
+    /// The feed is constant.
     #[inline]
     pub(crate) fn is_held(&self) -> bool {
         self.held || self.length.value() == 0.0
     }
 
-    /// At a time; `time` is asked only where it changes.
+    /// The feed at a time; `time` is called only if the feed is not constant.
     #[inline(always)]
     pub(crate) fn at(&self, time: impl FnOnce() -> T) -> T {
         let [a, b, c] = self.coefficients;
@@ -100,7 +100,7 @@ impl<T: Scalar> Feed<T> {
         a + (b + c * share) * share
     }
 
-    /// From a time on for `h` seconds.
+    /// The feed over `h` seconds from `begin` on.
     pub(crate) fn over(&self, begin: T, h: T) -> Inflow<T> {
         if self.is_held() {
             return Inflow::held(self.coefficients[0]);

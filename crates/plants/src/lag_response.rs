@@ -1,23 +1,25 @@
-//! What one lag, and two in series, make of a polynomial over one step, with derivatives by the rates.
+//! Response of one lag, and of two lags in series, to a polynomial input over one step, with derivatives by the rates.
 //!
-//! With `r` the length of the step over the time constant, the drive `s^k`, `s` from 0 to 1 over the step, leaves at its end
+//! Let `r` be the step length divided by the time constant. The input `s^k`, `s` from 0 to 1 over the step, contributes to the lag output
+//! at the end of the step
 //! ```text
 //! w_k(r) = int_0^1 r exp(-r (1 - s)) s^k ds
 //! ```
-//! behind one lag. Behind a second one of rate `r2`, of what stood behind the first at the beginning and of the drive there arrive
+//! The second lag has the rate `r2`. The initial output of the first lag contributes `C` to the output of the second one, and the input
+//! `s^k` of the first lag contributes `W_k`:
 //! ```text
 //! C = -r2 E[r1, r2],  E(r) = exp(-r)
 //! W_k = w_k(r1) - r1 w_k[r1, r2] = -r1 r2 v_k[r1, r2],  v_k(r) = w_k(r)/r
 //! ```
-//! `f[a, b] = (f(b) - f(a))/(b - a)` is the divided difference, the mean of `f'` between the two: for rates that are near each
-//! other it is taken as that, by quadrature, or as a power series, so that equal time constants are nothing special.
+//! `f[a, b] = (f(b) - f(a))/(b - a)` is the divided difference, the mean of `f'` between `a` and `b`. For rates that are close to each
+//! other it is computed as that mean, by quadrature, or as a power series, so that equal time constants are no special case.
 //!
-//! All of it hangs on one or two numbers. So derivatives are written out for these in plain numbers, and chained into whatever else the
-//! rates hang on: a dual with many lanes is multiplied a few times only.
+//! These functions depend on one or two numbers only. Their derivatives by these numbers are therefore computed in `f64` and combined with
+//! the derivatives of the rates by the chain rule: a dual with many derivatives is multiplied only a few times.
 
-/// Below this rate power series are summed: what they replace divides by the rate.
+/// Below this rate, power series are summed, because the closed forms divide by the rate.
 const SLOW: f64 = 1.0;
-/// Terms of a power series reach rounding for any rate below [`SLOW`].
+/// Number of terms with which a power series is exact to rounding for any rate below [`SLOW`].
 const TERMS: usize = 22;
 
 /// A value and its derivatives by the two rates.
@@ -27,16 +29,16 @@ pub(crate) struct Partial {
     pub by: [f64; 2],
 }
 
-/// One lag: what is left of a level, and what comes of the inflow's three coefficients; each with its derivative by the rate.
+/// One lag: the factor of its initial output and those of the inflow's three coefficients, each with its derivative by the rate.
 pub(crate) struct OneLag {
     pub decay: [f64; 2],
     pub inflow: [[f64; 2]; 3],
 }
 
-/// A function of the rate with its first two derivatives.
+/// A function of the rate and its first two derivatives.
 type Jet = [f64; 3];
 
-/// Behind one lag of rate `r`.
+/// Response of one lag of rate `r`.
 pub(crate) fn one_lag(r: f64) -> OneLag {
     if r >= SLOW {
         let decay = (-r).exp();
@@ -58,7 +60,7 @@ pub(crate) fn one_lag(r: f64) -> OneLag {
     }
 }
 
-/// As many terms of `v_3(r) = sum_n (-r)^n 3!/(n + 4)!` as reach rounding in its slope.
+/// The terms of `v_3(r) = sum_n (-r)^n 3!/(n + 4)!` that are needed for a slope exact to rounding.
 fn series(r: f64) -> &'static [f64] {
     let terms = if r < 0.04 {
         8
@@ -81,7 +83,7 @@ const SERIES: [f64; 18] = {
     terms
 };
 
-/// `w_0, w_1, w_2` with two derivatives each, for rates that are not slow; `decay = exp(-r)`.
+/// `w_0, w_1, w_2` and their first two derivatives, for rates that are not small; `decay = exp(-r)`.
 fn jets(r: f64, decay: f64) -> [Jet; 3] {
     let i = 1.0 / r;
     let w0 = [-(-r).exp_m1(), decay, -decay];
@@ -96,7 +98,7 @@ fn jets(r: f64, decay: f64) -> [Jet; 3] {
     [w0, w1, next(w1, 2.0)]
 }
 
-/// `v_0, v_1, v_2` with two derivatives each; `decay = exp(-r)`.
+/// `v_0, v_1, v_2` and their first two derivatives; `decay = exp(-r)`.
 fn quotient_jets(r: f64, decay: f64) -> [Jet; 3] {
     if r >= SLOW {
         let i = 1.0 / r;
@@ -108,7 +110,7 @@ fn quotient_jets(r: f64, decay: f64) -> [Jet; 3] {
     }
     // v_k = sum_n (-r)^n k!/(n + k + 1)!
     let mut jets = [[0.0; 3]; 3];
-    // (-r)^n/(n + 1)! and its derivatives.
+    // The term (-r)^n/(n + 1)! and its derivatives.
     let mut power = [1.0, 0.0, 0.0];
     for n in 0..TERMS {
         let n = n as f64;
@@ -132,12 +134,14 @@ fn quotient_jets(r: f64, decay: f64) -> [Jet; 3] {
     jets
 }
 
-/// Behind two lags of rates `a` and `b`: what comes of the first one's level, `C`, and of its inflow's three coefficients, `W_k`.
+/// Two lags of rates `a` and `b` in series: the factor `C` of the first lag's initial output and the factors `W_k` of the inflow's three
+/// coefficients.
 pub(crate) fn two_lags(a: f64, b: f64) -> [Partial; 4] {
     if a.max(b) < SLOW {
         return slow_lags(a, b);
     }
-    // Where one is slow W_k is small, and v_k gives it without a difference of large terms; where both are fast w_k does.
+    // If one rate is small, W_k is small, and the form with v_k avoids a difference of large terms; if both are large, the form with w_k is
+    // accurate.
     let one_slow = a.min(b) < SLOW;
     let gap = b - a;
     let near = gap.abs() < f64::max(1.0, 0.4 * a.min(b));
@@ -202,8 +206,8 @@ pub(crate) fn two_lags(a: f64, b: f64) -> [Partial; 4] {
     [level, of(0), of(1), of(2)]
 }
 
-/// The same for rates below [`SLOW`], by Horner's scheme for `v_3` at `b` and its divided difference, and then as `v_k` follow from each other:
-/// `(r v)[a, b] = v(b) + a v[a, b]`.
+/// [`two_lags`] for rates below [`SLOW`]: Horner's scheme gives `v_3` at `b` and its divided difference, and the recursion gives the other
+/// `v_k`: `(r v)[a, b] = v(b) + a v[a, b]`.
 fn slow_lags(a: f64, b: f64) -> [Partial; 4] {
     let mut at_b = [0.0; 2];
     let mut between = Partial::default();
@@ -217,7 +221,7 @@ fn slow_lags(a: f64, b: f64) -> [Partial; 4] {
         };
         at_b = [at_b[0] * b + c, at_b[1] * b + at_b[0]];
     }
-    // Of r v: value and slope at b, and the divided difference.
+    // For r v: value and slope at b, and the divided difference.
     let times_rate = |at_b: [f64; 2], between: Partial| {
         let at = [b * at_b[0], at_b[0] + b * at_b[1]];
         let divided = Partial {
@@ -255,7 +259,7 @@ fn slow_lags(a: f64, b: f64) -> [Partial; 4] {
     [level, w0, w1, w2]
 }
 
-/// Gauss-Legendre with sixteen nodes on the unit interval: the nodes below one half, and the weights.
+/// Gauss-Legendre quadrature with sixteen nodes on the unit interval: the nodes below one half, and the weights.
 const NODES: [(f64, f64); 8] = [
     (0.4524937450811813, 0.09472530522753432),
     (0.35919822461037054, 0.09130170752246182),

@@ -1,57 +1,57 @@
-//! What an effect may do to the chain actuator -> vessels -> sensor.
+//! The interface of an effect: what it may change in the chain actuator -> vessels -> sensor.
 
 use crate::Scalar;
 
-/// A vessel's rim: the level cannot rise above it.
+/// The rim of a vessel: the level cannot rise above it.
 #[derive(Debug, Clone, Copy)]
 pub struct Rim<T> {
-    /// Height of the rim, in the level's unit; infinite where there is none.
+    /// Height of the rim \[level unit\]; infinite if there is no rim.
     pub level: T,
-    /// Share of the spill that reaches the next vessel, 0 to 1.
+    /// Share of the overflow that reaches the next vessel, 0 to 1.
     pub fraction: T,
 }
 
-/// A side tank: it exchanges water with a vessel through a pipe, and fills and empties with it.
+/// A side tank, which exchanges water with a vessel through a pipe.
 #[derive(Debug, Clone, Copy)]
 pub struct Side<T> {
-    /// Its surface, as a share of the vessel's.
+    /// Surface of the side tank as a share of the vessel's surface.
     pub share: T,
-    /// How fast its level follows the vessel's, one over the time constant \[1/s\].
+    /// Inverse time constant with which the side tank's level follows the vessel's level \[1/s\].
     pub rate: T,
 }
 
-/// What a law changes in the balance of its vessel.
+/// The term of a vessel's balance that a law changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Balance {
     /// [`Law::head`].
     Head,
     /// [`Law::outflow`].
     Outflow,
-    /// [`Law::net`], by an amount that does not hang on the level but through the net inflow.
+    /// [`Law::net`], by an amount that depends on the net inflow but not on the level.
     Net,
-    /// [`Law::net`], by an amount that differs from level to level.
+    /// [`Law::net`], by an amount that depends on the level.
     NetByLevel,
     /// [`Law::area`].
     Area,
 }
 
-/// An effect with its parameters bound, at its place in the chain. Every method has a default that
-/// changes nothing, so a law says only what it does.
+/// An effect with numerical parameters, at its place in the chain. The default of every method changes nothing, so a law implements only
+/// the methods that it needs.
 ///
-/// Smoothness is part of the contract: at the absent value the law returns its argument bit for bit,
-/// and its derivative there is the one of the limit.
+/// Laws must be smooth: at the absent value of its parameter, a law returns its argument bit for bit, and its derivative there is the limit
+/// of the derivatives nearby.
 pub trait Law<T: Scalar>: Send + Sync {
-    /// Actuator: where what the command moves stands, for a law with memory, which must be the first in the chain. Asked
-    /// once for each recorded command, in the order of time; on a ramp it runs straight between the two ends.
+    /// Actuator: position of the element that the command moves, for a law with memory, which must be the first law of the chain. Called
+    /// once for each recorded command, in order of time; on a ramp the position is linear between the two ends.
     fn position(&mut self, _u: T) -> Option<T> {
         None
     }
-    /// Actuator: the command that acts, for the command that was given \[input unit\]. Without memory.
+    /// Actuator: the effective command for a given command \[input unit\]; a static function.
     fn command(&mut self, u: T, _t: f64) -> T {
         u
     }
-    /// Actuator: the inputs at which [`Law::command`] has a corner, so that a ramp can be cut there. No law before it
-    /// in the chain may have memory.
+    /// Actuator: the commands at which [`Law::command`] has a corner, so that a ramp can be cut there. No earlier law in the chain may have
+    /// memory.
     fn corners(&self) -> [Option<T>; 2] {
         [None; 2]
     }
@@ -63,37 +63,37 @@ pub trait Law<T: Scalar>: Send + Sync {
     fn actuator_lag(&self) -> Option<T> {
         None
     }
-    /// Actuator: by which factor the pump's gain differs at a time from that of the plant.
+    /// Actuator: factor on the plant's pump gain, as a function of time.
     fn gain(&self, _t: T) -> Option<T> {
         None
     }
-    /// Vessel: which of the next four it has; it is not asked for the others, which would cost a call each at every stage
-    /// of a step.
+    /// Vessel: which one of [`Law::head`], [`Law::outflow`], [`Law::net`] and [`Law::area`] the law implements. The other three are not
+    /// called: each call would cost time at every stage of a step.
     fn changes(&self) -> Option<Balance> {
         None
     }
-    /// Vessel: changes the head that drives the outflow, which begins as the level, given the level of the next vessel
-    /// \[level unit\]. In place, as the next three: they are called several times a step, and a dual with many lanes is
-    /// long.
+    /// Vessel: changes the head that drives the outflow \[level unit\]; `head` starts as the level, `next` is the level of the next vessel.
+    /// This method and the next three work in place, because they are called several times a step and a dual with many derivatives is
+    /// large.
     fn head(&self, _head: &mut T, _next: &T) {}
-    /// Vessel: changes the outflow to the next vessel at a head, as the law before it left it \[flow\].
+    /// Vessel: changes the outflow to the next vessel at a head \[flow\]; `outflow` is the value after the laws before this one.
     fn outflow(&self, _head: &T, _outflow: &mut T, _t: &T) {}
-    /// Vessel: takes out of the net inflow what is lost \[flow\].
+    /// Vessel: subtracts the loss from the net inflow \[flow\].
     fn net(&self, _level: &T, _net: &mut T, _t: &T) {}
     /// Vessel: changes the surface at a level \[area\].
     fn area(&self, _level: &T, _area: &mut T) {}
-    /// Vessel: the instant at which the law jumps, if it does \[s\]. A step is cut there, and [`Law::switch_over`] called
-    /// between the two parts; a law that asked the time instead could not tell the two sides of the cut apart.
+    /// Vessel: the time of a jump of the law, if it has one \[s\]. The step is cut at that time, and [`Law::switch_over`] is called between
+    /// the two parts: a comparison with the time could not tell the two sides of the cut apart.
     fn switch(&self) -> Option<T> {
         None
     }
-    /// Vessel: the instant of [`Law::switch`] has come.
+    /// Vessel: called at the time of [`Law::switch`]; the law takes its values after the jump.
     fn switch_over(&mut self) {}
-    /// Vessel: a side tank that it adds to a plant of one vessel.
+    /// Vessel: a side tank that the law adds to a plant with one vessel.
     fn side(&self) -> Option<Side<T>> {
         None
     }
-    /// Vessel: its rim.
+    /// Vessel: the rim.
     fn rim(&self) -> Option<Rim<T>> {
         None
     }
@@ -101,7 +101,7 @@ pub trait Law<T: Scalar>: Send + Sync {
     fn sensor_lag(&self) -> Option<T> {
         None
     }
-    /// Sensor: the reading of a level \[level unit\]. It may have memory and is called once a sample, in order.
+    /// Sensor: the reading of a level \[level unit\]. May have memory; called once for each sample, in order of time.
     fn reading(&mut self, y: T, _t: f64) -> T {
         y
     }

@@ -1,8 +1,7 @@
-//! Tank models as chains actuator -> vessels -> sensor, and the catalogue of effects that a believed
-//! model may lack.
+//! Tank models as chains actuator -> vessels -> sensor, and the catalogue of effects that may be missing from a model.
 //!
-//! A [`Structure`] is a plant with the effects that are on; a [`Simulator`] steps it from sample to
-//! sample on any [`Scalar`]: plain `f64`, or [`Dual`]s that carry exact derivatives.
+//! A [`Structure`] is a plant with its active effects. A [`Simulator`] steps a structure from sample to sample for any [`Scalar`]: `f64`,
+//! or [`Dual`]s that carry exact derivatives.
 //!
 //! ```
 //! use plants::{Command, Known, Plant, Scales, Simulator, Structure};
@@ -10,7 +9,7 @@
 //! # fn main() -> Result<(), plants::Error> {
 //! let scales = Scales::from_ranges((0.0, 10.0), (5.0, 20.0), 1.0, 600.0);
 //! let tank = Structure::new(Plant::SingleTank, Known { area: [Some(154.0), None, None], ..Known::default() }, scales);
-//! // pump_gain [cm^3/(V s)], alpha [cm^2.5/s]; level(0) = 9 cm; the pump stands at 4 V.
+//! // pump_gain [cm^3/(V s)], alpha [cm^2.5/s]; level(0) = 9 cm; the command before the record is 4 V.
 //! let mut simulator = Simulator::<f64>::new(&tank, &[9.0, 11.0], &[9.0], 4.0)?;
 //! let before = simulator.read(0);
 //! simulator.advance(Command::held(5.0), 1.0);
@@ -20,19 +19,18 @@
 //! ```
 //!
 //! # Measured disturbances
-//! The second input of a record is the command to the second pump of joined tanks. Of every other plant it may be a measured flow into
-//! a vessel ([`Known::disturbance`]), held or a ramp between samples, with a gain of its own:
-//! `S dH/dt = ... + disturbance_gain d` and, where the outflow is linear, `tau dy/dt + y = ... + disturbance_gain d`. Effects at the actuator
-//! do not act on it.
+//! The second input of a record is, for joined tanks, the command to the second pump. For every other plant it may be a measured flow into
+//! a vessel ([`Known::disturbance`]), held or a ramp between samples, with its own gain: `S dH/dt = ... + disturbance_gain d` or, if the
+//! outflow is linear, `tau dy/dt + y = ... + disturbance_gain d`. Effects at the actuator do not act on the disturbance.
 //!
-//! # Steps that are longer than a time constant
-//! A step of up to one time constant of the fastest vessel is a Runge-Kutta step of order four. A longer one is cut into
-//! parts that double, each an exponential Runge-Kutta step (ETDRK4): S. M. Cox, P. C. Matthews, J. Computational Physics
-//! 176 (2002) 430-455; A.-K. Kassam, L. N. Trefethen, SIAM J. Scientific Computing 26 (2005) 1214-1233. A vessel that has
-//! settled takes one part. With one step a sample of 1.6 to 45 time constants, any single effect and levels from 4 to 20,
-//! the output errs by at most 0.0003 (linear vessels; those without an effect in them are exact) and 0.006 (Torricelli):
-//! `cargo test -p plants --test all fast_vessels:: -- --nocapture`. A level that moves too far within the shortest part, 1/32 of
-//! a step, for its forgetting to be one number goes by an implicit part of order one that keeps the balance of mass.
+//! # Steps longer than a time constant
+//! A step of up to one time constant of the fastest vessel is a Runge-Kutta step of order four. A longer step is cut into parts of doubling
+//! length, each an exponential Runge-Kutta step (ETDRK4): S. M. Cox, P. C. Matthews, J. Computational Physics 176 (2002) 430-455; A.-K.
+//! Kassam, L. N. Trefethen, SIAM J. Scientific Computing 26 (2005) 1214-1233. A vessel that is near its steady state takes one part. With
+//! one step per sample of 1.6 to 45 time constants, any single effect and levels from 4 to 20, the error of the output is at most 0.0003
+//! (linear vessels; without an effect in a vessel, linear plants are exact) and 0.006 (Torricelli):
+//! `cargo test -p plants --test all fast_vessels:: -- --nocapture`. If a level changes so much within the shortest part, 1/32 of a step,
+//! that its decay rate is not constant, that part is an implicit step of order one, which conserves mass.
 
 mod actuator;
 pub mod controller;

@@ -1,7 +1,7 @@
 //! Exact propagation of linear vessels under a polynomial inflow, in closed form.
 //!
-//! `S_i dz_i/dt = q_i - z_i`, `z_i = x_i - offset_i`, `q_2 = z_1`, under `q_1 = a + b s + c s^2`, `s` from 0 to 1 over a step of length `h`.
-//! With `r_i = h/S_i` ([`crate::lag_response`] has `w_k`, `C` and `W_k`):
+//! `S_i dz_i/dt = q_i - z_i`, `z_i = x_i - offset_i`, `q_2 = z_1`, `q_1 = a + b s + c s^2`, `s` from 0 to 1 over a step of length `h`.
+//! With `r_i = h/S_i` ([`crate::lag_response`] defines `w_k`, `C` and `W_k`):
 //! ```text
 //! x_1 <- exp(-r_1) x_1 + w_0(r_1) a + w_1(r_1) b + w_2(r_1) c + w_0(r_1) offset_1
 //! x_2 <- C x_1 + exp(-r_2) x_2 + W_0 a + W_1 b + W_2 c + w_0(r_2) offset_2 - C offset_1
@@ -17,28 +17,28 @@ use crate::{
 /// Coefficients of one vessel's level after a step.
 #[derive(Clone, Copy)]
 struct Row<T> {
-    /// Of the levels before.
+    /// Coefficients of the levels before the step.
     levels: [T; SERIES],
-    /// Of the inflow's three coefficients.
+    /// Coefficients of the inflow's `a`, `b` and `c`.
     inflow: [T; 3],
     constant: T,
 }
 
-/// Propagates `S_i dx_i/dt = q_i - (x_i - offset_i)`, `q_(i+1) = x_i - offset_i`.
+/// Exact step of `S_i dx_i/dt = q_i - (x_i - offset_i)`, `q_(i+1) = x_i - offset_i`.
 pub(crate) struct Propagators<T> {
     /// Time constant and offset of each vessel.
     vessels: Vec<(T, T)>,
-    /// Rows made so far, by step length; a delay needs a few, an even sampling one.
+    /// Coefficients computed so far, by step length: even sampling needs one length, a dead time a few.
     known: Vec<(T, [Row<T>; SERIES])>,
-    /// Which of them is replaced next.
+    /// Index of the entry that is replaced next.
     oldest: usize,
 }
 
-/// Step lengths whose rows are kept.
+/// Number of step lengths whose coefficients are stored.
 const KEPT: usize = 6;
 
-/// Whether what was computed for a step of length `known` holds for one of length `h`: they differ by less than times that
-/// are read from text do, and have the same derivatives.
+/// Whether the coefficients for a step length `known` are valid for `h`: the lengths differ by less than the rounding of times that are
+/// read from text, and have the same derivatives.
 pub(crate) fn same_step<T: Scalar>(known: T, h: T) -> bool {
     const SHARE: f64 = 1e-9;
     (known.value() - h.value()).abs() <= SHARE * h.value() && known.same_derivatives(h)
@@ -62,7 +62,7 @@ impl<T: Scalar> Propagators<T> {
     ) -> [T; N] {
         let n = self.vessels.len();
         if h.value() == 0.0 {
-            // An empty stretch moves nothing, but its length may have derivatives.
+            // A step of length zero leaves the levels unchanged, but its length may have derivatives.
             let mut next = *levels;
             let mut inflow = q.start;
             for (i, &(tau, offset)) in self.vessels.iter().enumerate() {
@@ -86,14 +86,14 @@ impl<T: Scalar> Propagators<T> {
         next
     }
 
-    /// What the second vessel gets over a step of length `h`: from the first one's level, and from its inflow's three
+    /// Contributions to the second vessel's level over a step of length `h`: of the first vessel's level, and of the inflow's three
     /// coefficients.
     pub(crate) fn second_from(&mut self, h: T) -> (T, [T; 3]) {
         let row = &self.rows(h)[1];
         (row.levels[0], row.inflow)
     }
 
-    /// The rows for a step of length `h`, which is not zero.
+    /// The coefficients for a step of length `h`, which is not zero.
     fn rows(&mut self, h: T) -> &[Row<T>; SERIES] {
         let found = self
             .known
@@ -113,7 +113,7 @@ impl<T: Scalar> Propagators<T> {
         &self.known[at].1
     }
 
-    /// The closed form.
+    /// The coefficients in closed form.
     fn rows_of(&self, h: T) -> [Row<T>; SERIES] {
         let zero = T::constant(0.0);
         let mut rows = [Row {
@@ -153,19 +153,19 @@ mod tests {
     use super::*;
     use crate::Dual;
 
-    /// Vessels, and the inflow's three coefficients and the constant one beside them.
+    /// Size of the augmented system: the vessels, the inflow's three coefficients and the constant one.
     const SIZE: usize = SERIES + 4;
 
     type Matrix<T> = [[T; SIZE]; SIZE];
 
-    /// The matrix exponential by scaling and squaring, which the closed form is held against.
+    /// Reference for the closed form: the matrix exponential by scaling and squaring.
     struct Reference<T> {
         vessels: Vec<(T, T)>,
     }
 
     impl<T: Scalar> Reference<T> {
-        /// The first rows of `exp(M)`, where `M` drives the vessels over the unit interval by
-        /// `a + b s + c s^2` and by the offsets: the columns after the vessels' belong to `a`, `b`, `c` and one.
+        /// The first rows of `exp(M)`, where `M` describes the vessels over the unit interval, driven by `a + b s + c s^2` and the offsets:
+        /// the columns after those of the vessels belong to `a`, `b`, `c` and one.
         fn exponential(&self, h: T) -> Vec<[T; SIZE]> {
             let zero = T::constant(0.0);
             let n = self.vessels.len();
@@ -186,7 +186,7 @@ mod tests {
             m[n][n + 1] = T::constant(1.0);
             m[n + 1][n + 2] = T::constant(1.0);
             let size = n + 4;
-            // Scaling and squaring with the Taylor series: at a norm of at most 1/2 sixteen terms reach rounding.
+            // Scaling and squaring with the Taylor series: at a norm of at most 1/2, sixteen terms are exact to rounding.
             let norm = (0..size)
                 .map(|i| (0..size).map(|j| m[i][j].value().abs()).sum::<f64>())
                 .fold(0.0, f64::max);
@@ -216,7 +216,7 @@ mod tests {
             for _ in 0..squarings {
                 sum = product(&sum, &sum, size);
             }
-            // From (p0, p1, p2) at the beginning to (a, b, c): p0 = a, p1 = b, p2 = 2 c.
+            // Change of variables from (p0, p1, p2) at the beginning to (a, b, c): p0 = a, p1 = b, p2 = 2 c.
             sum.iter()
                 .take(n)
                 .map(|row| {
@@ -256,7 +256,7 @@ mod tests {
             .collect()
     }
 
-    /// Largest error of value and derivatives of the rows, as a share of the largest entry of its kind.
+    /// Largest error of the values and of the derivatives of the coefficients, each relative to the largest entry of its kind.
     fn error(vessels: Vec<(Dual<5>, Dual<5>)>, h: Dual<5>) -> f64 {
         let n = vessels.len();
         let reference = Reference {
@@ -280,7 +280,7 @@ mod tests {
         worst
     }
 
-    /// Time constants for rates over a step of length one, in lanes of which the derivatives are relative ones.
+    /// Time constants for these rates over a step of length one, as duals with relative derivatives.
     fn lags(rates: &[f64]) -> Vec<(Dual<5>, Dual<5>)> {
         let lag = |(i, r): (usize, &f64)| {
             let mut tau = Dual::variable(1.0 / r, i);
@@ -311,7 +311,7 @@ mod tests {
             .map(|f| f * a);
             for b in rates().into_iter().chain(near) {
                 let both = error(lags(&[a, b]), h);
-                // Squaring doubles the rounding of the reference each time.
+                // Each squaring doubles the rounding error of the reference.
                 let rounding = 4e-15 * a.max(b).max(1.0) + 2e-14;
                 assert!(both < rounding, "{a} {b}: {both:e}");
             }

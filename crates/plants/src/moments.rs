@@ -1,13 +1,13 @@
 //! The first moments of an exponential over one step, smooth down to a time constant of zero.
 //!
-//! A first-order lag of time constant `T` behind a held or polynomial signal decays as
-//! `exp(-s/e)`, `s = t/h` in `[0, 1]`, `e = T/h`. What a slow vessel feels of it are the moments
-//! `M_j = int_0^1 s^j exp(-s/e) ds`; they go to zero with `e`, with the right slope (`M_0 -> e`), so
-//! that a lag does not jump where it vanishes.
+//! The transient of a first-order lag of time constant `T` behind a constant or polynomial signal decays as
+//! `exp(-s/e)`, `s = t/h` in `[0, 1]`, `e = T/h`. Its effect on a slow vessel is given by the moments
+//! `M_j = int_0^1 s^j exp(-s/e) ds`. They go to zero with `e`, with the correct slope (`M_0 -> e`), so that the model is smooth where the
+//! lag vanishes.
 
 use crate::{Scalar, linear::same_step};
 
-/// The last moments of one time constant: most steps are as long as the one before.
+/// The moments of the last step, kept for reuse: most steps have the same length.
 pub(crate) struct KeptMoments<T> {
     pub time_constant: T,
     last: Option<(T, (T, [T; 3]))>,
@@ -49,11 +49,11 @@ const SERIES: [f64; 16] = {
 /// `exp(-1/e)` and the moments `M_0, M_1, M_2` for `e = time_constant/h`, both non-negative, not both zero.
 pub(crate) fn exponential_moments<T: Scalar>(time_constant: T, h: T) -> (T, [T; 3]) {
     if time_constant.value() > 2.0 * h.value() {
-        // Small z = h/T: the recursion below cancels. Upwards it does not: M_(j-1) = (z M_j + exp(-z))/j, from the series of M_3;
+        // For small z = h/T the downward recursion cancels. The upward one does not: M_(j-1) = (z M_j + exp(-z))/j, from the series of M_3;
         // and the derivative of M_j by z is -M_(j+1).
         let rate = h / time_constant;
         let z = rate.value();
-        // At z <= 1/2 the first term that is left out is 2e-19 of the sum.
+        // At z <= 1/2 the first omitted term is 2e-19 of the sum.
         let m3 = SERIES.iter().rev().fold(0.0, |sum, c| sum * z + c);
         let decay = (-z).exp();
         let m2 = (z * m3 + decay) / 3.0;
@@ -75,7 +75,7 @@ pub(crate) fn exponential_moments<T: Scalar>(time_constant: T, h: T) -> (T, [T; 
     (decay, [m0, m1, m2])
 }
 
-/// What is left of an excess after `h`, smooth down to a time constant of zero, where nothing is.
+/// An excess after it has decayed for `h`, smooth down to a time constant of zero, where it is zero.
 pub(crate) fn decayed<T: Scalar>(excess: T, time_constant: T, h: f64) -> T {
     if 700.0 * time_constant.value() > h {
         excess * (-(T::constant(h) / time_constant)).exp()
@@ -94,7 +94,7 @@ mod tests {
     fn kept_moments_are_those_of_the_step() {
         let lag = Dual::<2>::variable(3.0, 0);
         let mut kept = KeptMoments::new(lag);
-        // The same length again, another one, and the same again with derivatives.
+        // Same length, other length, and the same length with derivatives.
         let [plain, other] = [2.0, 0.5].map(Dual::constant);
         for h in [plain, plain, other, plain, Dual::variable(2.0, 1), plain] {
             assert_eq!(kept.over(h), exponential_moments(lag, h));
@@ -108,7 +108,7 @@ mod tests {
             assert_relative_eq!(decay, (-1.0_f64 / e).exp(), epsilon = 1e-15);
             let n = 400_000;
             for (j, moment) in moments.iter().enumerate() {
-                // Midpoint rule: its error is 1/(24 n^2 e) and less.
+                // Midpoint rule: its error is at most 1/(24 n^2 e).
                 let sum: f64 = (0..n)
                     .map(|i| (i as f64 + 0.5) / f64::from(n))
                     .map(|s| s.powi(j as i32) * (-s / e).exp())

@@ -1,4 +1,4 @@
-//! The plants of the model file: which vessels, which outflow law, which parameters are fitted.
+//! The plants of the model file: their vessels, outflow laws and fitted parameters.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,49 +12,49 @@ pub enum Plant {
     SingleTank,
     /// `tau d(y - y0)/dt + (y - y0) = K (u - u0)`; `offset = y0 - K u0`.
     SingleTankLinear,
-    /// Two tanks in series, each as `single-tank`, the lower one measured.
+    /// Two tanks in series, each as `single-tank`; the level of the lower tank is measured.
     CascadedTanks,
     /// Two first-order lags in series: `K`, `tau1`, `tau2`, `offset`.
     CascadedTanksLinear,
     /// `tau dy/dt + y = K u`.
     FirstOrder,
-    /// Three tanks in a row, T1, T3, T2, joined by valves, with an outlet at T2 and pumps into T1 and T2 (the DTS200 rig):
+    /// Three tanks in a row, T1, T3, T2, connected by valves, with an outlet at T2 and pumps into T1 and T2 (the DTS200 rig):
     /// ```text
     /// S1 dH1/dt = pump_gain_1 u1 - q13,   q13 = az13 s(H1 - H3)
     /// S3 dH3/dt = q13 - q32,              q32 = az32 s(H3 - H2)
     /// S2 dH2/dt = pump_gain_2 u2 + q32 - az20 sqrt(H2),   s(d) = sign(d) sqrt(|d|)
     /// ```
-    /// `az` times `S_n sqrt(2 g)` where that is known ([`crate::Known::orifice`]). The vessels are numbered in the row: 0 is T1, 1 is T3, 2
-    /// is T2. [`crate::Known::measured`] says which levels are read.
+    /// If `S_n sqrt(2 g)` is known ([`crate::Known::orifice`]), `az` is multiplied by it. The vessels are numbered along the row: 0 is T1,
+    /// 1 is T3, 2 is T2. [`crate::Known::measured`] lists the measured levels.
     ThreeTank,
 }
 
-/// How a vessel lets its content out.
+/// The outflow law of a vessel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outlet {
     /// `alpha sqrt(H)`.
     Torricelli,
-    /// `H - offset`, the flow in units of the level; the vessel's area is then its time constant.
+    /// `H - offset`: the flow in units of the level, so that the vessel's area is its time constant.
     Linear,
 }
 
 /// A parameter that a fit may change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterInfo {
-    /// Name, as the model file's `[start]` writes it.
+    /// Name in the `[start]` section of a model file.
     pub name: &'static str,
     /// Unit.
     pub unit: Unit,
-    /// What it is, in a few words.
+    /// What the parameter means, in a few words.
     pub meaning: &'static str,
-    /// The value at which an effect is absent; for a plant's own parameter it is not used (NaN).
-    /// It is infinite for a threshold that is never reached.
+    /// The value at which the effect is absent; NaN for a parameter of the plant itself, which does not use it. Infinite for a threshold
+    /// that is never reached.
     pub absent: f64,
     /// Smallest plausible value: a bound of the fit.
     pub lower: f64,
     /// Largest plausible value: a bound of the fit.
     pub upper: f64,
-    /// Values from which a fit is worth starting, at least one.
+    /// Start values for a fit, at least one.
     pub starts: Vec<f64>,
 }
 
@@ -75,7 +75,7 @@ const STATIC_GAIN: Unit = Unit {
 };
 
 impl Plant {
-    /// All of them.
+    /// All plants.
     pub const ALL: [Self; 6] = [
         Self::SingleTank,
         Self::SingleTankLinear,
@@ -85,7 +85,7 @@ impl Plant {
         Self::ThreeTank,
     ];
 
-    /// The model file's name.
+    /// Name in model files.
     #[must_use]
     pub fn id(self) -> &'static str {
         match self {
@@ -98,9 +98,9 @@ impl Plant {
         }
     }
 
-    /// The plant as the text of a model ([`ct_model::ModelSpec::parse`]): its fitted parameters, in the order of [`Plant::parameters`], its
-    /// levels, vessel by vessel, and as output the level of the last vessel, of [`Plant::ThreeTank`] that of T3. What may be known
-    /// ([`Known`]) are `final parameter`s, as they are where it is not.
+    /// The plant as the text of a model ([`ct_model::ModelSpec::parse`]): its fitted parameters in the order of [`Plant::parameters`], its
+    /// levels, vessel by vessel, and one output: the level of the last vessel, or of T3 for [`Plant::ThreeTank`]. Constants that may be
+    /// known ([`Known`]) are `final parameter`s, with the values that they have if they are not known.
     #[must_use]
     pub fn text(self) -> &'static str {
         match self {
@@ -113,7 +113,7 @@ impl Plant {
         }
     }
 
-    /// How many vessels it has; the last one is measured, unless [`crate::Known::measured`] says otherwise.
+    /// Number of vessels; the level of the last one is measured, unless [`crate::Known::measured`] says otherwise.
     #[must_use]
     pub fn vessels(self) -> usize {
         match self {
@@ -123,7 +123,7 @@ impl Plant {
         }
     }
 
-    /// How its vessels let their content out.
+    /// The outflow law of the vessels.
     #[must_use]
     pub fn outlet(self) -> Outlet {
         match self {
@@ -132,19 +132,19 @@ impl Plant {
         }
     }
 
-    /// Its vessels stand beside each other, joined by valves through which water flows either way, and not above each other.
+    /// Whether the vessels are side by side, connected by valves through which water flows in both directions, and not in series.
     #[must_use]
     pub fn joined(self) -> bool {
         self == Self::ThreeTank
     }
 
-    /// How many pumps it has; a second one is off where no record says what it was told.
+    /// Number of pumps; the second pump is off if the record has no command for it.
     #[must_use]
     pub fn pumps(self) -> usize {
         1 + usize::from(self.joined())
     }
 
-    /// The name of a vessel where there are several: `upper` or `lower`; of three, as they stand: `T1`, `T3`, `T2`.
+    /// The name of a vessel if there are several: `upper` or `lower`; for three vessels, in their order: `T1`, `T3`, `T2`.
     #[must_use]
     pub fn vessel_name(self, vessel: usize) -> Option<&'static str> {
         let names: &[&str] = match self.vessels() {
@@ -155,7 +155,7 @@ impl Plant {
         names.get(vessel).copied()
     }
 
-    /// The name of a pump where there are two: `pump_1` or `pump_2`.
+    /// The name of a pump if there are two: `pump_1` or `pump_2`.
     #[must_use]
     pub fn pump_name(self, pump: usize) -> Option<&'static str> {
         let names = ["pump_1", "pump_2"];
@@ -175,17 +175,18 @@ impl Plant {
         }
     }
 
-    /// Two parameters that may be exchanged without any reading becoming another, once the first level of the vessel that nobody
-    /// measures is fitted anew; an effect in one of the vessels tells them apart. `None` too where both levels are measured, or a measured
-    /// disturbance flows into the lower vessel: these tell them apart already.
+    /// Two parameters whose values may be exchanged without any change of the readings, once the initial level of the vessel that is not
+    /// measured is fitted again. An effect in one of the vessels removes this symmetry. `None` if there is no such pair, and also if both
+    /// levels are measured or a measured disturbance flows into the lower vessel, which removes the symmetry too.
     #[must_use]
     pub fn interchangeable(self, known: &Known) -> Option<[&'static str; 2]> {
         let told_apart = known.outputs(self).len() > 1 || known.disturbed_vessel(self) == Some(1);
         (self == Self::CascadedTanksLinear && !told_apart).then_some(["tau1", "tau2"])
     }
 
-    /// Its own fitted parameters, in the order in which the simulator takes them. Of a record with a measured disturbance
-    /// ([`crate::Known::disturbance`]) the last one is `disturbance_gain`: its inflow for one unit or, of a linear plant, its static gain.
+    /// The plant's own fitted parameters, in the order in which the simulator takes them. For a record with a measured disturbance
+    /// ([`crate::Known::disturbance`]), the last one is `disturbance_gain`: inflow per unit of the disturbance or, for a linear plant, the
+    /// static gain.
     #[must_use]
     pub fn parameters(self, scales: &Scales) -> Vec<ParameterInfo> {
         let info = |name, unit, meaning, lower: f64, upper: f64| ParameterInfo {
@@ -197,8 +198,8 @@ impl Plant {
             upper,
             starts: vec![(lower * upper).abs().sqrt()],
         };
-        // Time constants from a tenth of a sample (below it a vessel is over before it is read, whatever it is) to
-        // thirty records; the rest follows from them, generously. No unit is preferred: nothing here has a size.
+        // Time constants range from 0.1 sampling intervals (a shorter one cannot be identified) to thirty record lengths; the other bounds
+        // follow, with wide margins. The bounds scale with the data, so they do not depend on the choice of units.
         let tau = (0.1 * scales.sample_interval, 30.0 * scales.duration);
         let level = positive(scales.largest_level());
         let largest = |(low, high): (f64, f64)| positive(high.abs().max(low.abs()));
@@ -215,7 +216,8 @@ impl Plant {
         };
         let gain = |area: f64| pump("pump_gain", area, input);
         // Torricelli: tau = 2 S sqrt(H)/alpha = 2 S Q/alpha^2. The shortest tau at the largest level of a measured vessel bounds the
-        // throughput Q, and Q bounds alpha of the vessels whose levels are not known. Of several measured vessels the largest content counts.
+        // throughput Q, and Q bounds alpha of the vessels whose levels are not measured. Of several measured vessels, the one with the
+        // largest content counts.
         let contents = scales.outputs.iter().map(|output| {
             let (low, high) = scales.level[output.vessel];
             scales.area[output.vessel] * positive(low.abs().max(high.abs()))
@@ -230,7 +232,7 @@ impl Plant {
                 2.0 * (area * content).sqrt() / tau.0,
             )
         };
-        // The same through a valve, in units of what it lets through where that is known.
+        // The coefficient of a valve: as alpha, but divided by the flow through the orifice at one unit of head if that flow is known.
         let valve = |name, meaning, vessel: usize| {
             let mut valve = alpha(name, meaning, scales.area[vessel]);
             if let Some(orifice) = scales.orifice {
@@ -315,7 +317,7 @@ impl Plant {
             };
             let reach = reach / largest(input);
             own.push(ParameterInfo {
-                // What is measured may flow out as well as in.
+                // The measured flow may be an inflow or an outflow.
                 starts: vec![0.0],
                 ..info("disturbance_gain", unit, meaning, -reach, reach)
             });
@@ -324,11 +326,11 @@ impl Plant {
     }
 }
 
-/// The largest flow coefficient of a valve whose orifice is known: an orifice lets through at most what Torricelli's law says, which is
-/// one, and its cross-section may be twice what is written down.
+/// Largest flow coefficient of a valve whose orifice is known: Torricelli's law gives at most one, and the true cross-section may be twice
+/// the documented one.
 const MOST_OF_AN_ORIFICE: f64 = 2.0;
 
-/// A size to divide by: one where there is none.
+/// A value to divide by: one if `size` is not positive.
 fn positive(size: f64) -> f64 {
     if size > 0.0 { size } else { 1.0 }
 }

@@ -1,50 +1,50 @@
-//! Scales: what the data visit, which sets plausible ranges, starts and operating levels.
+//! Scales: the ranges of the data, which set plausible parameter ranges, start values and operating levels.
 
 use serde::{Deserialize, Serialize};
 
 use crate::structure::{MAX_VESSELS, SERIES};
 
-/// The best of many values that were looked at: a start whose choice a claim has to pay for.
+/// A start value chosen from the data as the best of several alternatives; their number enters the multiple-testing correction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Picked {
-    /// The best.
+    /// The best alternative.
     pub value: f64,
-    /// How many were looked at.
+    /// Number of alternatives.
     pub of: f64,
 }
 
-/// What the data visit: it sets the plausible ranges, the starts and the operating levels.
+/// The ranges of the data: they set plausible parameter ranges, start values and operating levels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scales {
     /// Smallest and largest command \[input unit\].
     pub input: (f64, f64),
-    /// Smallest and largest value of the second input: the command to the second pump or, where [`crate::Known::disturbance`] says so, the measured
-    /// disturbance; `None`: there is none \[input unit\].
+    /// Smallest and largest value of the second input: the command to the second pump or, if [`crate::Known::disturbance`] says so, the
+    /// measured disturbance; `None` if there is no second input \[input unit\].
     pub input_2: Option<(f64, f64)>,
-    /// Deciles of the commands, where they are known \[input unit\].
+    /// Deciles of the commands, if known \[input unit\].
     #[serde(default)]
     pub input_deciles: [Option<Deciles>; 2],
-    /// Range over which the actuator works: the known one, or zero to the largest command \[input unit\].
+    /// Range of the actuator: the known range, or zero to the largest command \[input unit\].
     pub input_range: f64,
-    /// How many vessels there are, as [`crate::Structure::new`] knows it.
+    /// Number of vessels, set by [`crate::Structure::new`].
     pub vessels: usize,
-    /// Smallest and largest level that each vessel visits, as far as it is known \[level unit\].
+    /// Smallest and largest level of each vessel, as far as they are known \[level unit\].
     pub level: [(f64, f64); MAX_VESSELS],
-    /// Deciles of these levels, where they are known \[level unit\].
+    /// Deciles of these levels, if known \[level unit\].
     #[serde(default)]
     pub level_deciles: [Option<Deciles>; MAX_VESSELS],
-    /// Height of the tanks, where it is known, as [`crate::Structure::new`] knows it \[level unit\].
+    /// Height of the tanks, if known, set by [`crate::Structure::new`] \[level unit\].
     #[serde(default)]
     pub tank_height: Option<f64>,
     /// Mean level of each vessel \[level unit\].
     pub operating_level: [f64; MAX_VESSELS],
-    /// Area of each vessel, one where it is not known.
+    /// Area of each vessel; one if it is not known.
     pub area: [f64; MAX_VESSELS],
-    /// The outputs in order, at least one, as [`crate::Structure::new`] knows them.
+    /// The outputs in order, at least one, set by [`crate::Structure::new`].
     pub outputs: Vec<OutputScales>,
-    /// Flow through a valve of flow coefficient one at one unit of head, where it is known \[level^2.5/s\].
+    /// Flow through a valve with a flow coefficient of one at one unit of head, if known \[level^2.5/s\].
     pub orifice: Option<f64>,
-    /// Period of the strongest line in the spectrum of what is not explained so far; zero where none is looked for \[s\].
+    /// Period of the strongest spectral line of the residual so far; zero if no period is searched \[s\].
     pub period: f64,
     /// Mean throughput \[area x level/s\].
     pub flow: f64,
@@ -54,22 +54,23 @@ pub struct Scales {
     pub duration: f64,
 }
 
-/// An output: a sensor and what its readings show.
+/// An output: a sensor and the properties of its readings.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OutputScales {
-    /// The vessel whose level it reads.
+    /// The vessel whose level the sensor reads.
     pub vessel: usize,
-    /// What the readings are whole multiples of, where they are; zero where they are not \[level unit\].
+    /// Quantisation step of the readings: all of them are integer multiples of it; zero if there is none \[level unit\].
     pub reading_step: f64,
-    /// Step of a sensor that takes most out of what is not explained so far, where the readings show none; `None` where none is looked for
-    /// \[level unit\].
+    /// The quantisation step that explains most of the residual so far, if the readings themselves show no step; `None` if no step is
+    /// searched \[level unit\].
     pub hidden_step: Option<Picked>,
 }
 
-/// The 10 %, 20 %, ... 90 % quantiles of what was visited.
+/// The 10 %, 20 %, ... 90 % quantiles of a signal.
 pub type Deciles = [f64; 9];
 
-/// The quantile of a share, between two ends and straight between the deciles; of an even spread where these are not known.
+/// The quantile for a share, by linear interpolation between the deciles and the two ends; for a uniform distribution if the deciles are
+/// not known.
 pub(crate) fn quantile(share: f64, (low, high): (f64, f64), deciles: Option<&Deciles>) -> f64 {
     let Some(deciles) = deciles else {
         return low + share * (high - low);
@@ -84,7 +85,7 @@ pub(crate) fn quantile(share: f64, (low, high): (f64, f64), deciles: Option<&Dec
     at(below) + (place - below as f64) * (at(below + 1) - at(below))
 }
 
-/// The deciles of values; `None` of nothing.
+/// The deciles of values; `None` if there are no values.
 #[must_use]
 pub fn deciles(mut values: Vec<f64>) -> Option<Deciles> {
     values.sort_by(f64::total_cmp);
@@ -95,7 +96,7 @@ pub fn deciles(mut values: Vec<f64>) -> Option<Deciles> {
 }
 
 impl Scales {
-    /// Scales from the ranges of the command and of the reading, before any simulation has shown more.
+    /// Scales from the ranges of the command and of the reading, before any simulation.
     #[must_use]
     pub fn from_ranges(
         input: (f64, f64),
@@ -124,7 +125,7 @@ impl Scales {
         }
     }
 
-    /// The output that reads the level of the lowest vessel that is read: of joined ones the last in the row.
+    /// The output that reads the lowest measured vessel: for joined vessels the last one in the row.
     #[must_use]
     pub fn lowest_output(&self) -> usize {
         let outputs = self.outputs.iter().enumerate();
@@ -132,10 +133,10 @@ impl Scales {
         lowest.map_or(0, |(output, _)| output)
     }
 
-    /// The largest level in any vessel, by magnitude.
+    /// The largest level of any vessel, by magnitude.
     #[must_use]
     pub fn largest_level(&self) -> f64 {
-        // What there is not has the range of the reading.
+        // The range of a vessel that does not exist is that of the reading.
         let levels = self.level.iter().take(self.vessels.max(SERIES));
         levels.fold(0.0, |most: f64, (low, high)| {
             most.max(low.abs()).max(high.abs())
@@ -149,7 +150,7 @@ mod tests {
 
     #[test]
     fn quantiles_lie_on_what_was_visited() {
-        // Nine tenths of the time near the lower end.
+        // Nine tenths of the samples are near the lower end.
         let values: Vec<f64> = (0..=1000)
             .map(|k| f64::from(k) / 1000.0)
             .map(|x| if x < 0.9 { x } else { 0.9 + 91.0 * (x - 0.9) })

@@ -1,4 +1,4 @@
-//! The sensor: a lag behind the measured level, then static laws on the reading.
+//! The sensor: a first-order lag of the measured level, then static nonlinearities of the reading.
 
 use crate::{
     Law, Scalar,
@@ -9,12 +9,12 @@ use crate::{
 pub(crate) struct Sensor<T: Scalar> {
     laws: Vec<Box<dyn Law<T>>>,
     lag: Option<KeptMoments<T>>,
-    /// Reading behind the lag minus the level.
+    /// Lag output minus level.
     excess: T,
 }
 
 impl<T: Scalar> Sensor<T> {
-    /// The sensor has settled when the record begins, unless [`Sensor::unsettle`] says otherwise.
+    /// The sensor's lag starts in steady state, unless [`Sensor::unsettle`] sets another initial state.
     pub(crate) fn new(laws: Vec<Box<dyn Law<T>>>) -> Self {
         let lag = laws.iter().find_map(|law| law.sensor_lag());
         let lag = lag.map(KeptMoments::new);
@@ -25,7 +25,7 @@ impl<T: Scalar> Sensor<T> {
         }
     }
 
-    /// The lag had not settled: `h` before the record the reading behind it exceeded the level by this.
+    /// Sets an initial state of the lag other than steady state: `h` before the record began, its output exceeded the level by `before`.
     pub(crate) fn unsettle(&mut self, before: T, h: f64) {
         if let Some(lag) = &self.lag {
             self.excess = decayed(before, lag.time_constant, h);
@@ -36,8 +36,8 @@ impl<T: Scalar> Sensor<T> {
         self.lag.is_some()
     }
 
-    /// Follows the level over a stretch: `T dw/dt = -w - T dH/dt`, `w` the excess, with the level's cubic
-    /// through its values and rates at both ends.
+    /// Advances the lag over a segment: `T dw/dt = -w - T dH/dt`, `w` the excess. The level is the cubic through its values and rates at
+    /// both ends.
     pub(crate) fn follow(&mut self, stretch: &Stretch<T>) {
         let Some(kept) = &mut self.lag else { return };
         let h = stretch.h;

@@ -1,4 +1,4 @@
-//! Steps a structure from sample to sample.
+//! Simulation of a structure from sample to sample.
 
 mod construction;
 mod numbers;
@@ -13,38 +13,38 @@ use crate::{
 /// The command over one sampling interval \[input unit\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command {
-    /// At its beginning.
+    /// Command at the beginning of the interval.
     pub from: f64,
-    /// At its end, where it runs in a straight line; `None`: it is held.
+    /// Command at the end of a linear ramp; `None`: the command is held.
     pub to: Option<f64>,
 }
 
 impl Command {
-    /// A command that is held.
+    /// A held command (zero-order hold).
     #[must_use]
     pub fn held(u: f64) -> Self {
         Self { from: u, to: None }
     }
-    /// A command that runs in a straight line.
+    /// A linear ramp (first-order hold).
     #[must_use]
     pub fn ramp(from: f64, to: f64) -> Self {
         Self { from, to: Some(to) }
     }
 }
 
-/// A simulation in progress. Read first, then advance: `y[k]` is read before `u[k]` acts.
+/// A simulation in progress. Call [`Simulator::read`] before [`Simulator::advance`]: `y[k]` is read before `u[k]` acts.
 ///
-/// Linear plants without effects in their vessels are propagated exactly, in closed form; others by
-/// Runge-Kutta of order four in [`Simulator::set_substeps`] equal parts of the sampling interval, cut where the
-/// input jumps behind a dead time, where a level meets its rim and where a law jumps. Parts that are longer than a vessel's
-/// time constant are exponential Runge-Kutta steps (see the [front page](crate#steps-that-are-longer-than-a-time-constant)). Nothing is allocated per step,
-/// but for the queue behind a dead time while it fills.
+/// Linear plants without effects in their vessels are propagated exactly, in closed form. Other plants are integrated by a Runge-Kutta
+/// method of order four in [`Simulator::set_substeps`] equal parts of the sampling interval. The parts are cut where the delayed input
+/// jumps, where a level reaches its rim and where a law jumps. Parts longer than a vessel's time constant are exponential Runge-Kutta steps
+/// (see the [front page](crate#steps-longer-than-a-time-constant)). A step allocates no memory, except for the queue of a dead time while
+/// it fills.
 pub struct Simulator<T: Scalar> {
     actuator: Actuator<T>,
     layout: Layout<T>,
-    /// Of each output, with the vessel whose level it reads.
+    /// For each output, the vessel whose level it reads, and its sensor.
     sensors: Vec<(usize, Sensor<T>)>,
-    /// The output whose sensor lags.
+    /// The output whose sensor has a lag.
     lagging: Option<usize>,
     pump_gain: T,
     disturbance: Option<Disturbance<T>>,
@@ -52,7 +52,7 @@ pub struct Simulator<T: Scalar> {
     substeps: usize,
 }
 
-/// How the vessels stand to each other.
+/// How the vessels are connected.
 #[allow(
     clippy::large_enum_variant,
     reason = "vessels in series, which most simulations have, stay where the simulator is"
@@ -69,14 +69,15 @@ struct Joined<T: Scalar> {
 
 /// A measured disturbance that flows into a vessel.
 struct Disturbance<T> {
-    /// Inflow for one unit.
+    /// Inflow per unit of the disturbance.
     gain: T,
-    /// It is the lower one of two: what flows into the upper one, or an only one, flows in with what the pump brings.
+    /// The disturbance flows into the lower of two vessels. A flow into the upper vessel, or into the only one, is added to the pump's
+    /// inflow.
     into_lower: bool,
 }
 
 impl<T: Scalar> Disturbance<T> {
-    /// What it brings over an interval of length `h`.
+    /// The inflow by the disturbance over an interval of length `h`.
     fn over(&self, Command { from, to }: Command, time: f64, h: f64) -> Feed<T> {
         let rise = to.map_or(0.0, |to| to - from);
         let coefficients = [self.gain * from, self.gain * rise, T::constant(0.0)];
@@ -87,27 +88,27 @@ impl<T: Scalar> Disturbance<T> {
 struct SecondPump<T: Scalar> {
     actuator: Actuator<T>,
     gain: T,
-    /// Lengths and commands of its pieces in the present interval: scratch space.
+    /// Lengths and commands of the pump's pieces in the present interval (scratch space).
     pieces: Vec<(T, Signal<T>)>,
 }
 
 impl<T: SimulatorNumber> Simulator<T> {
-    /// Cuts every sampling interval into `n` equal parts (at least one).
+    /// Sets the number of equal parts of every sampling interval (at least one).
     pub fn set_substeps(&mut self, n: usize) {
         self.substeps = n.max(1);
     }
 
-    /// How many outputs there are.
+    /// Number of outputs.
     pub fn outputs(&self) -> usize {
         self.sensors.len()
     }
 
-    /// The reading of an output now. Sensors may have memory, so it is called once for each output and sample, in order of time.
+    /// The present reading of an output. Sensors may have memory: call it once for each output and sample, in order of time.
     pub fn read(&mut self, output: usize) -> T {
         T::read(self, output)
     }
 
-    /// The level of each vessel now; only the first [`crate::Plant::vessels`] entries are used.
+    /// The present level of each vessel; only the first [`crate::Plant::vessels`] entries are used.
     pub fn levels(&self) -> [T; MAX_VESSELS] {
         match &self.layout {
             Layout::Series(vessels) => {
@@ -119,29 +120,30 @@ impl<T: SimulatorNumber> Simulator<T> {
         }
     }
 
-    /// Where what the command to the first pump moves stands now: at the latest command, but for play and stiction. A simulation that has it
-    /// for `at_rest` goes on from there.
+    /// Present position of the element that the command to the first pump moves: the latest command, unless there is backlash or stiction.
+    /// A simulation that takes it as `at_rest` continues from there.
     pub fn stands(&self) -> f64 {
         self.actuator.stands()
     }
 
-    /// Time since the clock of drifts, steps and periods began \[s\]: since the record began, unless that is a later part.
+    /// Time on the clock of drifts, steps and periods \[s\]: zero when the record began, unless the record is a later part of an
+    /// experiment.
     pub fn time(&self) -> f64 {
         self.time
     }
 
-    /// Moves on by one sampling interval of length `h` \[s\]; a second pump, or a measured disturbance, stands at zero.
+    /// Advances by one sampling interval of length `h` \[s\], with a command of zero to the second pump and no measured disturbance.
     pub fn advance(&mut self, command: Command, h: f64) {
         self.advance_both([command, Command::held(0.0)], h);
     }
 
-    /// The same under a command to either pump, or under one and a measured disturbance, each held or a ramp; the second one is not looked
-    /// at where there is neither.
+    /// As [`Simulator::advance`], with two inputs, each held or a ramp: the commands to both pumps, or a command and a measured
+    /// disturbance. The second input is ignored if the plant has neither a second pump nor a disturbance.
     pub fn advance_both(&mut self, [command, second]: [Command; 2], h: f64) {
         T::step(self, T::constant(command.from), command.to, second, h);
     }
 
-    /// The same under a held command to the first pump that has derivatives, as a controller gives it.
+    /// As [`Simulator::advance`], with a held command to the first pump that has derivatives, as a controller computes it.
     pub fn advance_held(&mut self, command: T, second: Command, h: f64) {
         T::step(self, command, None, second, h);
     }
@@ -214,7 +216,7 @@ impl<T: Scalar> Simulator<T> {
                             pieces.push((length, signal));
                         });
                 }
-                // The pieces of the one are cut where those of the other end.
+                // The pieces of the one pump are cut where the pieces of the other pump end.
                 let mut next = 0;
                 let mut passed = T::constant(0.0);
                 actuator.pieces(from, to, *time, h, |actuator, length, signal| {
@@ -223,7 +225,7 @@ impl<T: Scalar> Simulator<T> {
                         let left = length - done;
                         let other = pump.as_ref().and_then(|pump| pump.pieces.get(next));
                         let other = other.map(|&(whole, signal)| (whole - passed, signal));
-                        // The last piece of the other ends with the interval, whatever rounding says.
+                        // The last piece of the other pump ends with the interval, whatever the rounding error.
                         let last = pump.as_ref().is_none_or(|p| next + 1 >= p.pieces.len());
                         let ends = other.filter(|(rest, _)| !last && rest.value() < left.value());
                         let stretch = ends.map_or(left, |(rest, _)| rest);
@@ -261,7 +263,7 @@ impl<T: Scalar> Simulator<T> {
     }
 }
 
-/// Equal parts of a piece of an interval of length `h`, and the length of each: a short piece needs no more than its share.
+/// Number and length of the equal parts of a piece; a short piece of an interval of length `h` has proportionally fewer parts.
 fn cut<T: Scalar>(length: T, h: f64, substeps: usize) -> (usize, T) {
     let parts = substeps as f64 * length.value() / h;
     let parts = ((parts - 1e-9).ceil() as usize).max(1);

@@ -1,4 +1,4 @@
-//! A structure: a plant, what is known of it, and the effects that are on, in chain order.
+//! A structure: a plant, its known constants, and its active effects in chain order.
 
 mod site;
 
@@ -8,31 +8,30 @@ use crate::{
     plant::Outlet, scales::OutputScales, scales::Picked, scales::Scales,
 };
 
-/// The most vessels a plant has.
+/// Largest number of vessels of a plant.
 pub const MAX_VESSELS: usize = 3;
-/// The most vessels of a plant whose vessels stand in series, each above the next. Three are joined by valves.
+/// Largest number of vessels in series, each above the next one. A plant with three vessels has them connected by valves.
 pub(crate) const SERIES: usize = 2;
 
-/// How many times wider the range of a size becomes that ended at its bound.
+/// Factor by which the range of an effect's size is widened if its estimate is at a bound.
 pub const WIDENED: f64 = 4.0;
 
 /// Constants that are known and not fitted.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Known {
-    /// Area of each vessel; `None`: one, the level is only known in units of the sensor.
+    /// Area of each vessel. `None`: the area is one, and the level is only known in units of the sensor.
     pub area: [Option<f64>; MAX_VESSELS],
-    /// The vessels whose levels are measured, in the order of the outputs; none: the last one alone.
+    /// The vessels whose levels are measured, in the order of the outputs; empty: the last vessel only.
     pub measured: Vec<usize>,
-    /// `S_n sqrt(2 g)` of the pipes that join tanks, `S_n` their cross-section: then flow coefficients are pure numbers
-    /// \[level^2.5/s\].
+    /// `S_n sqrt(2 g)` of the pipes between tanks, `S_n` their cross-section: flow coefficients are then dimensionless \[level^2.5/s\].
     pub orifice: Option<f64>,
     /// Height of the tanks \[level unit\].
     pub tank_height: Option<f64>,
     /// Largest command \[input unit\].
     pub input_range: Option<f64>,
-    /// The vessel into which the record's second input flows as a measured disturbance, with the gain `disturbance_gain`; a vessel that
-    /// there is not stands for the last one. `None`: a second input is not used, but for the second pump of joined tanks, whose second
-    /// input always is that pump's.
+    /// The vessel into which the record's second input flows as a measured disturbance, with the gain `disturbance_gain`; an index beyond
+    /// the last vessel means the last vessel. `None`: a second input is not used. For joined tanks, the second input is always the command
+    /// to the second pump.
     pub disturbance: Option<usize>,
 }
 
@@ -47,7 +46,7 @@ impl Known {
         }
     }
 
-    /// The name of an output where there are several: that of the vessel whose level it reads.
+    /// The name of an output if there are several: the name of the vessel whose level it reads.
     #[must_use]
     pub fn output_name(&self, plant: Plant, output: usize) -> Option<&'static str> {
         let outputs = self.outputs(plant);
@@ -55,7 +54,7 @@ impl Known {
         plant.vessel_name(*vessel)
     }
 
-    /// The vessel into which a measured disturbance flows, if one does.
+    /// The vessel into which a measured disturbance flows, if there is one.
     #[must_use]
     pub fn disturbed_vessel(&self, plant: Plant) -> Option<usize> {
         let vessel = self.disturbance.filter(|_| !plant.joined())?;
@@ -63,22 +62,22 @@ impl Known {
     }
 }
 
-/// A plant and the effects that are on.
+/// A plant and its active effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Structure {
     /// The plant.
     pub plant: Plant,
-    /// What is known of it.
+    /// Known constants of the plant.
     pub known: Known,
-    /// The effects that are on; kept in chain order, whatever the order they were added in.
+    /// The active effects, always in chain order, whatever the order in which they were added.
     effects: Vec<Placed>,
-    /// Effects whose sizes may go beyond what is plausible, as far as physics allows.
+    /// Effects whose size may exceed the plausible range, within physical limits.
     widened: Vec<&'static str>,
-    /// Terms of the user's own, in the order they were added in.
+    /// User-defined terms, in the order in which they were added.
     pub(crate) terms: Vec<Term>,
-    /// What the data visit.
+    /// The ranges of the data.
     pub scales: Scales,
-    /// Which effects are candidates. An effect that is on already stays, whatever the domain.
+    /// Selects the candidate effects. An active effect stays, whatever the domain.
     pub domain: Domain,
 }
 
@@ -120,7 +119,7 @@ impl Structure {
         structure
     }
 
-    /// The effects that are on, in chain order.
+    /// The active effects, in chain order.
     #[must_use]
     pub fn effects(&self) -> &[Placed] {
         &self.effects
@@ -129,7 +128,7 @@ impl Structure {
     /// The same structure with one more effect.
     ///
     /// # Errors
-    /// Where the effect is on already, does not act on this plant, or not in this vessel.
+    /// If the effect is active already, or does not apply to this plant or to this vessel.
     pub fn with(&self, placed: Placed) -> Result<Self, Error> {
         let Placed { effect, vessel } = placed;
         if self.effects.iter().any(|on| on.effect.id == effect.id) {
@@ -165,8 +164,8 @@ impl Structure {
         Ok(with)
     }
 
-    /// The same structure with the plausible range of an effect's size [`WIDENED`] times as wide, for a size that ended at its
-    /// bound; `None` where that bound is physical (a command that is never given, a share of one), or the range is wide already.
+    /// The same structure with the plausible range of an effect's size widened by the factor [`WIDENED`], for an estimate at its bound.
+    /// `None` if that bound is physical (a command that never occurs, a share of one) or the range is widened already.
     #[must_use]
     pub fn with_wider(&self, effect: &'static EffectInfo) -> Option<Self> {
         if effect.bound_is_physical() || self.widened.contains(&effect.id) {
@@ -185,7 +184,8 @@ impl Structure {
         without
     }
 
-    /// Every effect of the catalogue that the domain offers, that may act on this plant and is not on, at every place it may take.
+    /// The candidates: every effect of the catalogue that the domain offers, that applies to this plant and is not active, at each of its
+    /// possible places.
     #[must_use]
     pub fn candidates(&self) -> Vec<Placed> {
         effects::CATALOGUE
@@ -201,14 +201,14 @@ impl Structure {
             .collect()
     }
 
-    /// The pump of an effect at the actuator runs.
+    /// Whether an effect is not at the actuator, or its pump has a recorded command.
     fn runs(&self, placed: Placed) -> bool {
         placed.effect.place != Place::Actuator
             || placed.vessel == 0
             || self.scales.input_2.is_some()
     }
 
-    /// Where an effect of this structure finds itself.
+    /// The place of an effect in this structure.
     #[must_use]
     pub fn site(&self, placed: Placed) -> Site<'_> {
         Site {
@@ -218,8 +218,9 @@ impl Structure {
         }
     }
 
-    /// In how many ways a search can find an effect where there is nothing: every combination of its starts is one, and so is
-    /// every line of the spectrum, and every step of the reading, of which the strongest is a start.
+    /// Number of alternatives from which a search picks the start values of an effect, for the multiple-testing correction: all
+    /// combinations of its starts and, if a start is the strongest spectral line or the best quantisation step, all lines or steps from
+    /// which it was picked.
     #[must_use]
     pub fn ways(&self, placed: Placed) -> f64 {
         let parameters = self.effect_parameters(placed);
@@ -241,13 +242,13 @@ impl Structure {
             + picked(crate::Unit::LEVEL, self.hidden_step(placed))
     }
 
-    /// Of an effect at a sensor, the step that takes most out of what its readings leave unexplained.
+    /// For an effect at a sensor, the quantisation step that explains most of the residual of its readings.
     fn hidden_step(&self, placed: Placed) -> Option<Picked> {
         let at_sensor = placed.effect.place == Place::Sensor;
         at_sensor.then(|| self.site(placed).output().hidden_step)?
     }
 
-    /// The parameters of one effect here; their starts lie within their bounds, however short or narrow the record.
+    /// The parameters of one effect at its place; the starts are within the bounds, also for a short record or a narrow range.
     #[must_use]
     pub fn effect_parameters(&self, placed: Placed) -> Vec<ParameterInfo> {
         let mut parameters = (placed.effect.parameters)(&self.site(placed));
@@ -255,7 +256,7 @@ impl Structure {
             && let Some(size) = parameters.first_mut()
         {
             size.upper *= WIDENED;
-            // A flow or a gain does not fall by more than all of it.
+            // A flow or a gain cannot decrease by more than 100 %.
             if size.lower < -1.0 || (size.lower < 0.0 && size.unit != crate::Unit::ONE) {
                 size.lower *= WIDENED;
             }
@@ -269,7 +270,7 @@ impl Structure {
         parameters
     }
 
-    /// All parameters: the plant's, then each effect's in chain order, then each term's. Initial levels are apart.
+    /// All parameters: the plant's, then each effect's in chain order, then each term's; without initial levels.
     #[must_use]
     pub fn parameters(&self) -> Vec<ParameterInfo> {
         let mut all = self.plant.parameters(&self.scales);
@@ -282,12 +283,12 @@ impl Structure {
         all
     }
 
-    /// The effects that are on and lag, in chain order. Each has a state that a record may begin with: what stands
-    /// behind the lag may not have settled.
+    /// The active effects that are lags, in chain order. Each has an initial state, because its output need not be in steady state when the
+    /// record begins.
     ///
-    /// Its initial value, `before`, says by how much what is behind the lag exceeded what it follows one (median)
-    /// sampling interval before the record begins, in units of the input at the actuator and of the level at the
-    /// sensor; zero is at rest. An interval before, and not at the beginning, so that it vanishes with the lag.
+    /// The initial value, `before`, is the excess of the lag output over the lag input one (median) sampling interval before the record
+    /// begins, in units of the input at the actuator and of the level at the sensor; zero means steady state. It is given one interval
+    /// before the record, so that its influence vanishes with the time constant.
     #[must_use]
     pub fn lags(&self) -> Vec<Placed> {
         let lags = |placed: &Placed| {
@@ -299,14 +300,15 @@ impl Structure {
         self.effects.iter().copied().filter(lags).collect()
     }
 
-    /// The name and bounds of the initial value of one of [`Structure::lags`], `at_rest` the first command: what is
-    /// behind the lag lay within the range of the record, and a pump may have stood still or run as fast as it can.
+    /// Name and bounds of the initial state of one of [`Structure::lags`]; `at_rest` is the first command. The bounds assume that the lag
+    /// output was within the range of the record, and that a pump ran between zero and its largest command.
     #[must_use]
     pub fn lag_before(&self, lag: Placed, at_rest: f64) -> (String, (f64, f64)) {
         let (low, high) = if lag.effect.place == Place::Actuator {
             let (low, high) = self.site(lag).input();
             let (low, high) = (low.min(0.0), high.max(self.scales.input_range.abs()));
-            // So much when the record begins: an interval before it was more, by the factor of e for a lag of that length.
+            // These are bounds at the beginning of the record. One interval earlier the excess was larger, by e if the time constant is one
+            // interval.
             let more = std::f64::consts::E;
             let at = |bound: f64| more * (bound - at_rest);
             (at(low.min(at_rest)), at(high.max(at_rest)))
@@ -317,7 +319,7 @@ impl Structure {
         (format!("{}.before", lag.effect.id), (low, high))
     }
 
-    /// Names of all parameters, an effect's as `effect.parameter`, in the order of [`Structure::parameters`].
+    /// Names of all parameters, those of an effect as `effect.parameter`, in the order of [`Structure::parameters`].
     #[must_use]
     pub fn parameter_names(&self) -> Vec<String> {
         let mut all: Vec<String> = self
@@ -344,7 +346,7 @@ impl Structure {
         all
     }
 
-    /// A parameter's unit in words.
+    /// The text of a parameter's unit.
     #[must_use]
     pub fn unit_label(&self, parameter: &ParameterInfo, level: &str, input: &str) -> String {
         let area_known = self.plant.outlet() == Outlet::Torricelli && self.known.area[0].is_some();
@@ -373,7 +375,7 @@ mod tests {
             })
         };
         assert_eq!(at(None, 1), [35.0; 2]);
-        // The level of the upper tank is known from the believed model alone.
+        // The level of the upper tank is known from the believed model only.
         assert_eq!(at(None, 0), [85.0; 2]);
         assert_eq!(at(Some(28.0), 0), [28.0; 2]);
         assert_eq!(at(Some(28.0), 1), [28.0; 2]);

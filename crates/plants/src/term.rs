@@ -1,30 +1,29 @@
-//! A term of the user's own: what the model is missing, as a polyline in one variable.
+//! A user-defined term for a part that the model lacks: a polyline in one variable.
 //!
-//! `f(v) = s sum_i a_i hat_i(v)`: ordinates `a_i` at knots of the variable `v`, straight lines between them. Beyond the
-//! outermost knots it keeps their value, since nothing is known there. It adds
-//! - at the actuator to the command \[input unit\], `v` the command or the time;
-//! - in a vessel to the net inflow \[flow\], `v` the level, the net inflow itself (the direction and the speed of the
-//!   change) or the time;
-//! - at the sensor to the reading \[level unit\], `v` the reading or the time.
+//! `f(v) = s sum_i a_i hat_i(v)`: ordinates `a_i` at knots of the variable `v`, linear in between, constant beyond the outermost knots,
+//! because nothing is known there. It is added
+//! - at the actuator to the command \[input unit\]; `v` is the command or the time;
+//! - in a vessel to the net inflow \[flow\]; `v` is the level, the net inflow itself (sign and magnitude of the level's rate) or the time;
+//! - at the sensor to the reading \[level unit\]; `v` is the reading or the time.
 //!
-//! **What is fitted** is the scale `s` alone, one where the shape holds as it stands, zero where the term is absent. Free
-//! ordinates would have no unique values: a pump gain times the command is a line in the command, and an outflow coefficient
-//! comes near to any slow shape in the level. And a scale tells on any other record whether the shape holds there.
-//! [`Fitted::Ordinates`] is for who knows how to deal with that: the estimate of the shape itself.
+//! **Fitted parameter**: by default only the scale `s`: one if the shape is right as given, zero if the term is absent. Free ordinates
+//! would not be identifiable: a change of the pump gain is a line in the command, and a change of the outflow coefficient is close to any
+//! smooth shape in the level. The scale also tests the shape on any other record. [`Fitted::Ordinates`] fits the shape itself; the user
+//! then has to remove this ambiguity.
 
 use crate::{
     Balance, Error, Law, ParameterInfo, Place, Plant, Scalar, Scales, Structure, Unit, effects,
 };
 
-/// The most knots of a term.
+/// Largest number of knots of a term.
 pub const MOST_KNOTS: usize = 512;
 
-/// What a term depends on.
+/// The variable of a term.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Variable {
     /// The level of the vessel, or the reading at the sensor \[level unit\].
     Level,
-    /// The net inflow of the vessel \[flow\]: its sign is the direction of the change.
+    /// The net inflow of the vessel \[flow\]; its sign is the sign of the level's rate.
     Rate,
     /// The command \[input unit\].
     Input,
@@ -33,10 +32,10 @@ pub enum Variable {
 }
 
 impl Variable {
-    /// All of them.
+    /// All variables.
     pub const ALL: [Self; 4] = [Self::Level, Self::Rate, Self::Input, Self::Time];
 
-    /// Its name in files.
+    /// The name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -57,7 +56,7 @@ impl Variable {
         }
     }
 
-    /// Its unit.
+    /// The unit of the variable.
     #[must_use]
     pub fn unit(self) -> Unit {
         match self {
@@ -72,33 +71,33 @@ impl Variable {
 /// Which parameters of a term a fit may change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fitted {
-    /// One factor on all ordinates.
+    /// One common factor of all ordinates.
     Scale,
     /// Every ordinate.
     Ordinates,
 }
 
-/// A term of the user's own.
+/// A user-defined term.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// Its name: letters, digits and underscores; none of the catalogue's.
+    /// Name: letters, digits and underscores; not a name of the catalogue.
     pub name: String,
-    /// Where it acts.
+    /// The place where the term acts.
     pub place: Place,
-    /// The vessel it acts in, or at the sensor the output; zero for the actuator.
+    /// Index of the vessel or, at the sensor, of the output; zero for the actuator.
     pub vessel: usize,
-    /// What it depends on.
+    /// The variable of the term.
     pub variable: Variable,
-    /// Knots, in the unit of the variable, rising, 1 to [`MOST_KNOTS`] of them.
+    /// Knots in increasing order, 1 to [`MOST_KNOTS`] of them \[unit of the variable\].
     pub knots: Vec<f64>,
     /// Ordinates at the knots, in [`Term::unit`].
     pub ordinates: Vec<f64>,
-    /// What a fit may change.
+    /// The fitted parameters.
     pub fitted: Fitted,
 }
 
 impl Term {
-    /// The unit of its ordinates.
+    /// The unit of the ordinates.
     #[must_use]
     pub fn unit(&self) -> Unit {
         match self.place {
@@ -108,13 +107,13 @@ impl Term {
         }
     }
 
-    /// The term's value, its scale one.
+    /// The value of the term for a scale of one.
     #[must_use]
     pub fn value(&self, at: f64) -> f64 {
         polyline(&self.knots, &self.ordinates, at)
     }
 
-    /// Its parameters, in the order in which the simulator takes them.
+    /// The parameters, in the order in which the simulator takes them.
     #[must_use]
     pub fn parameters(&self, scales: &Scales) -> Vec<ParameterInfo> {
         if self.fitted == Fitted::Scale {
@@ -150,10 +149,10 @@ impl Term {
             .collect()
     }
 
-    /// Whether it can act on a plant.
+    /// Checks that the term is valid for a plant.
     ///
     /// # Errors
-    /// Where its name, its place, its variable or its numbers cannot be.
+    /// If its name, place, variable or numbers are not valid.
     pub fn check(&self, plant: Plant) -> Result<(), Error> {
         let refuse = |what: String| {
             Err(Error::Term {
@@ -216,7 +215,7 @@ impl Term {
 static ORDINATES: std::sync::LazyLock<Vec<String>> =
     std::sync::LazyLock::new(|| (1..=MOST_KNOTS).map(|i| format!("at_{i}")).collect());
 
-/// The polyline through the ordinates at a point, level beyond the outermost knots.
+/// The polyline through the ordinates at a point, constant beyond the outermost knots.
 fn polyline<T: Scalar>(knots: &[f64], ordinates: &[T], at: T) -> T {
     let above = knots.partition_point(|knot| *knot <= at.value());
     match (
@@ -239,7 +238,7 @@ struct TermLaw<T> {
     ordinates: Vec<T>,
 }
 
-/// The law of a term with its parameters, in the order of [`Term::parameters`].
+/// The law of a term with numerical parameters, in the order of [`Term::parameters`].
 pub(crate) fn bind<T: Scalar>(term: &Term, parameters: &[T]) -> Box<dyn Law<T>> {
     let ordinates = match term.fitted {
         Fitted::Ordinates => parameters.to_vec(),
@@ -253,7 +252,7 @@ pub(crate) fn bind<T: Scalar>(term: &Term, parameters: &[T]) -> Box<dyn Law<T>> 
 }
 
 impl<T: Scalar> TermLaw<T> {
-    /// `own` is what the term is added to.
+    /// `own`: the signal to which the term is added.
     fn value(&self, own: T, level: T, t: T) -> T {
         let at = match self.variable {
             Variable::Level => level,
@@ -283,7 +282,7 @@ impl<T: Scalar> Law<T> for TermLaw<T> {
 }
 
 impl Structure {
-    /// The terms of the user's own that are on; they act after the catalogue's effects at their place.
+    /// The active user-defined terms; they act after the catalogue's effects at their place.
     #[must_use]
     pub fn terms(&self) -> &[Term] {
         &self.terms
@@ -292,7 +291,7 @@ impl Structure {
     /// The same structure with one more term.
     ///
     /// # Errors
-    /// Where [`Term::check`] refuses it, or one of that name is on.
+    /// If [`Term::check`] rejects the term, or a term of that name exists.
     pub fn with_term(&self, term: Term) -> Result<Self, Error> {
         term.check(self.plant)?;
         let outputs = self.scales.outputs.len();

@@ -1,7 +1,7 @@
 //! Units of fitted parameters, built from the units of the record.
 
-/// A product of powers of the units that a tank knows. The level's power counts in halves, because
-/// Torricelli's coefficient has one.
+/// A product of powers of a tank's units. The power of the level's unit counts in halves, because Torricelli's coefficient has a
+/// half-integer power.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Unit {
     /// Twice the power of the level's unit.
@@ -37,7 +37,7 @@ impl Unit {
         time: 1,
         ..Self::ONE
     };
-    /// Area times level a second.
+    /// Area times level per second.
     pub const FLOW: Self = Self {
         level_halves: 2,
         area: 1,
@@ -45,8 +45,8 @@ impl Unit {
         ..Self::ONE
     };
 
-    /// The unit in words, for example `cm^2.5/s`; `area_known` says that the area carries the level's unit squared
-    /// rather than being one.
+    /// The text of the unit, for example `cm^2.5/s`. `area_known`: the area has the square of the level's unit; otherwise it is
+    /// dimensionless.
     #[must_use]
     pub fn label(self, level: &str, input: &str, area_known: bool) -> String {
         let halves = self.level_halves + if area_known { 4 * self.area } else { 0 };

@@ -1,12 +1,12 @@
-//! What was a time ago: the past of every delayed expression, in pieces between its jumps.
+//! Delayed expressions: the past values of each one, stored in pieces that are smooth between jumps.
 //!
-//! A jump of an input comes out of the delay at a time that depends on the delay: steps end there, at a time that carries the derivative.
+//! A jump of an input reaches the delay's output at a time that depends on the delay. Steps end there, and the time carries derivatives.
 
 use std::collections::VecDeque;
 
 use crate::scalar::Scalar;
 
-/// Points of a piece at which its values are kept, at equal distances.
+/// Number of equidistant points at which the values of a piece are stored.
 pub(super) const POINTS: usize = 5;
 
 #[derive(Debug, Clone)]
@@ -14,12 +14,12 @@ pub(super) struct Piece<T> {
     pub begin: T,
     pub length: T,
     pub values: [T; POINTS],
-    /// How many jumps lie before it.
+    /// Number of jumps before the piece.
     jumps: usize,
 }
 
 impl<T: Scalar> Piece<T> {
-    /// The polynomial of degree four through its points.
+    /// The interpolating polynomial of degree four through the piece's points.
     fn at(&self, time: T) -> T {
         let share = (time - self.begin) / self.length;
         let z = share.value() * (POINTS - 1) as f64;
@@ -44,18 +44,18 @@ impl<T: Scalar> Piece<T> {
 /// One delayed expression.
 #[derive(Debug, Clone)]
 pub(super) struct Delay<T> {
-    /// By how much.
+    /// The delay.
     pub by: T,
-    /// It is made of inputs and the time alone: its values in an interval are known when the interval begins.
+    /// The expression depends only on inputs and time, so its values in an interval are known at the beginning of the interval.
     pub known_ahead: bool,
-    /// Before the record.
+    /// The value before the record.
     before: T,
     pieces: VecDeque<Piece<T>>,
-    /// Jumps that have not come out yet: when they went in.
+    /// Times at which jumps entered the delay, for those that have not left it.
     jumps: VecDeque<T>,
-    /// How many have gone in.
+    /// Number of jumps that have entered the delay.
     gone_in: usize,
-    /// How many have come out.
+    /// Number of jumps that have left the delay.
     out: usize,
 }
 
@@ -77,19 +77,19 @@ impl<T: Scalar> Delay<T> {
         }
     }
 
-    /// The record begins, with this value.
+    /// Starts the record; `value` is also the value before the record.
     pub fn begin(&mut self, time: T, value: T) {
         self.before = value;
         self.jump(time);
     }
 
-    /// It jumps, or bends.
+    /// Notes a jump of the expression or of its slope at this time.
     pub fn jump(&mut self, time: T) {
         self.jumps.push_back(time);
         self.gone_in += 1;
     }
 
-    /// Its values over an interval.
+    /// Stores the values of the expression over an interval.
     pub fn push(&mut self, begin: T, length: T, values: [T; POINTS]) {
         self.pieces.push_back(Piece {
             begin,
@@ -99,19 +99,19 @@ impl<T: Scalar> Delay<T> {
         });
     }
 
-    /// When the next jump comes out.
+    /// The time at which the next jump leaves the delay.
     pub fn next_out(&self) -> Option<T> {
         Some(*self.jumps.front()? + self.by)
     }
 
-    /// The next jump is out.
+    /// Notes that the next jump has left the delay.
     pub fn let_out(&mut self) {
         if self.jumps.pop_front().is_some() {
             self.out += 1;
         }
     }
 
-    /// Drops what is not needed any more from a time on.
+    /// Drops the pieces that are not needed from this time on.
     pub fn forget(&mut self, time: f64) {
         let oldest = time - self.by.value();
         let passed = |piece: &Piece<T>| piece.jumps <= self.out && piece.begin.value() < oldest;
@@ -131,7 +131,7 @@ impl<T: Scalar> Delay<T> {
             piece.jumps < self.out || since_jump
         };
         let later = self.pieces.partition_point(begun).saturating_sub(1);
-        // Before the first piece since the jump, or where none is there yet, the nearest one is carried on.
+        // Before the first piece after the jump, or if there is none yet, the nearest piece is extrapolated.
         let at = later.max(first).min(self.pieces.len().saturating_sub(1));
         self.pieces
             .get(at)

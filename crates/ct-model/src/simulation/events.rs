@@ -1,4 +1,4 @@
-//! Changes of branches within a step: found, timed with their derivatives, and made.
+//! Events: changes of branches within a step. They are detected, their times are computed with derivatives, and the branches are switched.
 
 use super::SimulationState;
 use super::delays::Delays;
@@ -6,16 +6,16 @@ use super::step::{Drive, Interval, Step};
 use crate::scalar::Scalar;
 use crate::tape::{Register, Registers, Tape};
 
-/// After two events of one guard that lie nearer to each other than this share of an interval a step of this length is taken.
+/// If one guard has two events within this share of an interval, the next step has this length, to avoid chattering.
 const SLIDE: f64 = 1e-2;
-/// An event's time is found to this share of the step.
+/// Tolerance of an event time, as a share of the step.
 const EVENT: f64 = 1e-13;
-/// Distance of the differences from which the speed of a guard is computed, as a share of the step.
+/// Perturbation for the finite difference that gives the rate of a guard, as a share of the step.
 const SPEED: f64 = 1e-4;
 
 impl<T: Scalar> SimulationState<T> {
-    /// Where an equation has no value within a step: the change of a branch before that, `sqrt(max(x, 0))` at zero, and the error of the step
-    /// to it, which stands computed.
+    /// For a step within which an equation has no value: the branch change before that point, for example of `sqrt(max(x, 0))` at zero, and
+    /// the error of the step up to it. That step is the last one computed.
     pub(super) fn branch_before(
         &mut self,
         tape: &Tape,
@@ -39,7 +39,7 @@ impl<T: Scalar> SimulationState<T> {
         found
     }
 
-    /// Changes branches where a step has ended at an event; what drives the model stands in the registers.
+    /// Switches branches at the end of a step that ends at an event; the registers hold the inputs and states at that time.
     pub(super) fn change(&mut self, tape: &Tape, drive: &Drive<'_, T>, change: Change) {
         let Step {
             sliding, registers, ..
@@ -70,7 +70,7 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
-    /// Puts states back onto the guards that stay at zero.
+    /// Projects the states onto the switching surfaces on which they slide.
     pub(super) fn put_back(&mut self, tape: &Tape, drive: &Drive<'_, T>) {
         drive.load(tape, &mut self.work, self.time, &self.state);
         self.work.evaluate_slopes(tape, drive);
@@ -80,8 +80,8 @@ impl<T: Scalar> SimulationState<T> {
         sliding.put_back(registers, &mut self.state);
     }
 
-    /// Guards stay at zero where every guard has answered by its difference, but for those that an input has moved off or whose sides do not
-    /// both lead there any more.
+    /// Restores sliding after every guard was evaluated from the sign of its difference. Sliding ends for guards that an input has moved
+    /// away from zero, and for guards to which no longer both sides lead.
     pub(super) fn slide_on(&mut self, tape: &Tape, drive: &Drive<'_, T>) {
         while !self.work.sliding.is_empty() {
             self.work.follow_sliding(tape);
@@ -97,7 +97,7 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
-    /// What may change within a step: what of it has to stay above zero, where the registers are.
+    /// The monitored quantity, which stays positive or negative as long as no event occurs, from the present registers.
     fn distance(&self, tape: &Tape, watched: Watched) -> T {
         let Step {
             sliding, registers, ..
@@ -112,7 +112,7 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
-    /// The first change of a branch within the step that has been computed.
+    /// The first event within the step that was computed last.
     pub(super) fn first_event(
         &mut self,
         tape: &Tape,
@@ -169,7 +169,7 @@ impl<T: Scalar> SimulationState<T> {
                 continue;
             }
             let begins_with = at(self, watched, 0.0).value();
-            // It may have been on the other side when the step began.
+            // The quantity may have been on the other side when the step began.
             let share = if is_crossed(watched, begins_with) || begins_with == 0.0 {
                 0.0
             } else {
@@ -181,7 +181,7 @@ impl<T: Scalar> SimulationState<T> {
         let (share, watched, positive) = first?;
         let mut after = T::constant(h.value() * share);
         let guard = match watched {
-            // Slopes are the same with the share at its end and without: the time needs no derivative.
+            // At the end of the range of the share, the slopes with and without sliding are equal, so the time needs no derivative.
             Watched::Share(k, upper) => {
                 return Some(Event {
                     after,
@@ -194,7 +194,7 @@ impl<T: Scalar> SimulationState<T> {
         let slide = SLIDE * interval.length;
         let since = self.time.value() - self.changed[guard];
         if since < slide && share * h.value() < 1e-3 * slide {
-            // It changes back at once, by rounding: to either side in turn.
+            // Rounding makes the guard change back at once, repeatedly: one step of fixed length is taken instead.
             let after = T::constant(slide.min(h.value()));
             self.attempt(tape, interval, after, delays);
             tape.evaluate_guards(&mut self.work.registers);
@@ -220,7 +220,7 @@ impl<T: Scalar> SimulationState<T> {
     }
 }
 
-/// Where a function changes its sign between two points, by regula falsi with halved ordinates (Illinois); the point on the far side.
+/// The sign change of a function between two points, by the Illinois variant of regula falsi; returns the point after the change.
 fn change_of_sign(
     mut f: impl FnMut(f64) -> f64,
     (mut a, mut fa): (f64, f64),
@@ -258,9 +258,9 @@ fn change_of_sign(
     b
 }
 
-/// A change of branches within a step.
+/// An event: a change of branches within a step.
 pub(super) struct Event<T> {
-    /// How long after its beginning.
+    /// Time of the event after the beginning of the step.
     pub(super) after: T,
     pub(super) change: Change,
 }
@@ -268,16 +268,16 @@ pub(super) struct Event<T> {
 #[derive(Clone, Copy)]
 pub(super) enum Change {
     None,
-    /// A difference has changed its sign; whether to a positive one.
+    /// A difference has changed its sign; `true`: it is now positive.
     Crossed(Register, bool),
-    /// A guard that stayed at zero does so no more; whether it turns positive.
+    /// Sliding on a guard ends; `true`: the guard becomes positive.
     LetGo(usize, bool),
 }
 
-/// What is looked at after each step.
+/// A quantity that is monitored for events after each step.
 #[derive(Clone, Copy)]
 enum Watched {
     Guard(usize),
-    /// The share of a guard that stays at zero, at its upper or lower end.
+    /// The share of a guard on which the states slide, monitored at the upper end (`true`) or the lower end of its range.
     Share(usize, bool),
 }

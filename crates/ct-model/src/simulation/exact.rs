@@ -1,4 +1,4 @@
-//! Exact steps of linear models, `dx/dt = A x + v`, where `v` is held or runs in a straight line.
+//! Exact steps of linear models, `dx/dt = A x + v`, where `v` is constant or linear in time over the interval.
 //!
 //! `x(h) = x + h phi1(hA) (A x + v) + h^2 phi2(hA) dv/dt`, with `phi1(z) = (e^z - 1)/z` and `phi2(z) = (phi1(z) - 1)/z`, by scaling and
 //! squaring of the Taylor series of `phi2`.
@@ -10,16 +10,17 @@ use crate::tape::Tape;
 
 use super::step::Step;
 
-/// Terms of the Taylor series: with a norm of at most a half the first one left out is below the rounding.
+/// Terms of the Taylor series: for a norm of at most 1/2, the first omitted term is below the rounding error.
 const TERMS: usize = 15;
-/// Intervals whose matrices are kept.
+/// Number of interval lengths whose matrices are stored.
 const KEPT: usize = 8;
-/// Intervals whose lengths differ by less than this share are steps of one length and a remainder, over which the slope is constant.
+/// Two intervals whose lengths differ by less than this share use the same matrices; the remainder of the time is a step with constant
+/// slope.
 const SAME: f64 = 1e-6;
 
 #[derive(Debug, Clone)]
 pub(super) struct Exact<T> {
-    /// By rows.
+    /// The matrix A, row by row.
     a: Vec<T>,
     kept: Vec<Kept<T>>,
     oldest: usize,
@@ -33,7 +34,7 @@ struct Kept<T> {
 }
 
 impl<T: Scalar> Exact<T> {
-    /// Reads the matrix from the slopes at the unit vectors.
+    /// Computes the matrix A from the slopes at the unit vectors.
     pub fn new(tape: &Tape, work: &mut Step<T>) -> Self {
         let n = tape.states;
         let zero = T::constant(0.0);
@@ -53,7 +54,7 @@ impl<T: Scalar> Exact<T> {
         for j in 0..n {
             work.registers.values[first + j] = T::constant(1.0);
             tape.evaluate(&mut work.registers);
-            // Read before the state is set back: in `der(s) = v` the derivative is the state's own register.
+            // The slopes are read before the state is reset: for `der(s) = v` the derivative is the state's own register.
             for (i, slope) in slopes(work).into_iter().enumerate() {
                 a[i * n + j] = slope - constant[i];
             }
@@ -66,12 +67,12 @@ impl<T: Scalar> Exact<T> {
         }
     }
 
-    /// Whether the matrix has a value.
+    /// Whether all entries of the matrix are finite.
     pub fn is_finite(&self) -> bool {
         self.a.iter().all(|value| value.value().is_finite())
     }
 
-    /// The states after an interval, from their slope at its beginning and what the inputs add to it per unit of time.
+    /// The states after an interval, from their slope at its beginning and the change of the slope per unit of time that the inputs cause.
     pub fn step(&mut self, x: &mut [T], slope: &[T], rise: &[T], h: f64) {
         let n = x.len();
         let times = |matrix: &[T], i: usize, vector: &[T]| {
@@ -94,7 +95,7 @@ impl<T: Scalar> Exact<T> {
         }
     }
 
-    /// Where the matrices of an interval of this length stand.
+    /// Index of the matrices for an interval of this length.
     fn of(&mut self, h: f64) -> usize {
         let same = |kept: &Kept<T>| (kept.h - h).abs() <= SAME * h;
         if let Some(at) = self.kept.iter().position(same) {
@@ -120,7 +121,7 @@ fn phis<T: Scalar>(a: &[T], h: f64) -> (Vec<T>, Vec<T>) {
         .map(|row| row.iter().map(|v| (h * v.value()).abs()).sum());
     let norm = norm.fold(0.0, f64::max);
     let mut doublings = 0;
-    // A norm that is no number gives numbers that are none.
+    // A NaN norm ends the loop; the result is then NaN.
     while doublings < 1000 && norm > 0.5 * 2f64.powi(doublings) {
         doublings += 1;
     }

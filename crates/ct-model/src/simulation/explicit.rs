@@ -36,7 +36,7 @@ const A: [&[f64]; STAGES] = [
         11.0 / 84.0,
     ],
 ];
-/// The result less that of order four.
+/// Weights of the error estimate: the result minus the result of order four.
 const ERROR: [f64; STAGES] = [
     71.0 / 57600.0,
     0.0,
@@ -46,7 +46,7 @@ const ERROR: [f64; STAGES] = [
     22.0 / 525.0,
     -1.0 / 40.0,
 ];
-/// What makes the interpolation one of order four.
+/// Weights of the term that makes the interpolation one of order four.
 const BEND: [f64; STAGES] = [
     -12_715_105_075.0 / 11_282_082_432.0,
     0.0,
@@ -57,7 +57,7 @@ const BEND: [f64; STAGES] = [
     69_997_945.0 / 29_380_423.0,
 ];
 
-/// Steps from `x` at `time` by `h`, to `work.next`; where `work.begun`, the slope there stands in the first stage.
+/// A step of length `h` from `x` at `time`; the result is in `work.next`. If `work.begun`, the first stage holds the slope at `x` already.
 pub(super) fn step<T: Scalar>(
     tape: &Tape,
     work: &mut Step<T>,
@@ -65,7 +65,7 @@ pub(super) fn step<T: Scalar>(
     (time, x, h): (T, &[T], T),
 ) {
     let n = x.len();
-    // A length without derivatives, as most are.
+    // Whether the length has no derivatives, as for most steps.
     let plain = h.same_derivatives(T::constant(0.0));
     // The slope at the beginning may be known from the end of the last step.
     for (stage, row) in A.iter().enumerate().skip(usize::from(work.begun)) {
@@ -107,7 +107,7 @@ fn combine<T: Scalar>(work: &mut Step<T>, x: &[T], row: &[f64], h: f64) {
     }
 }
 
-/// The same of a fixed number of stages, which the compiler writes out.
+/// [`combine`] for a fixed number of stages, for which the compiler unrolls the loop.
 fn combine_stages<T: Scalar, const K: usize>(work: &mut Step<T>, x: &[T], row: &[f64], h: f64) {
     let n = x.len();
     let weights: [f64; K] = std::array::from_fn(|k| row[k] * h);
@@ -120,7 +120,7 @@ fn combine_stages<T: Scalar, const K: usize>(work: &mut Step<T>, x: &[T], row: &
     }
 }
 
-/// The error of the step against the tolerance: at most one where it is good.
+/// The error of the step relative to the tolerance: at most one for an acceptable step.
 pub(super) fn error<T: Scalar>(work: &Step<T>, h: f64, scale: &[f64]) -> f64 {
     let n = scale.len();
     let of = |i: usize| {
@@ -128,13 +128,13 @@ pub(super) fn error<T: Scalar>(work: &Step<T>, h: f64, scale: &[f64]) -> f64 {
         let sum: f64 = slopes.map(|(k, e)| k[i].value() * e).sum();
         (h * sum).abs() / scale[i]
     };
-    // A maximum that keeps what is no number.
+    // A maximum that propagates NaN.
     (0..n)
         .map(of)
         .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
 }
 
-/// The states within the last step, at a share of it.
+/// The states at a share of the last step, by interpolation.
 pub(super) fn within<T: Scalar>(work: &Step<T>, x: &[T], h: T, share: f64, into: &mut [T]) {
     let n = x.len();
     for i in 0..n {

@@ -1,7 +1,7 @@
-//! One step of a diagonally implicit Runge-Kutta method of order four, L-stable, with an error estimate of order three: for stiff models.
+//! One step of a diagonally implicit, L-stable Runge-Kutta method of order four, with an error estimate of order three, for stiff models.
 //!
-//! Each stage is solved by simplified Newton steps, with the Jacobian of the right-hand side at the beginning of the step. They run on
-//! numbers with derivatives like everything else: what they converge to has the derivatives of the solution.
+//! Each stage is solved by simplified Newton iterations, with the Jacobian of the right-hand side at the beginning of the step. The
+//! iterations run on numbers with derivatives, so that their limit has the derivatives of the solution.
 //!
 //! **Reference**: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition, section IV.6, table 6.5.
 
@@ -21,7 +21,7 @@ const A: [&[f64]; STAGES] = [
     &[371.0 / 1360.0, -137.0 / 2720.0, 15.0 / 544.0],
     &[25.0 / 24.0, -49.0 / 48.0, 125.0 / 16.0, -85.0 / 12.0],
 ];
-/// The result less that of order three.
+/// Weights of the error estimate: the result minus the result of order three.
 const ERROR: [f64; STAGES] = [
     25.0 / 24.0 - 59.0 / 48.0,
     -49.0 / 48.0 + 17.0 / 96.0,
@@ -29,15 +29,15 @@ const ERROR: [f64; STAGES] = [
     0.0,
     0.25,
 ];
-/// Newton steps after which a stage counts as not to be solved.
+/// Largest number of Newton iterations of a stage; without convergence by then, the step fails.
 const NEWTON_STEPS: usize = 15;
-/// Values have converged below this share of the tolerance; derivatives follow in one step more.
+/// Values have converged below this share of the tolerance; derivatives converge one iteration later.
 const CONVERGED: f64 = 1e-3;
 
-/// Distance of differences, in tolerances: some 1e-7 of a state's size.
+/// Perturbation for finite differences, in tolerances: about 1e-7 of a state's size.
 const DIFFERENCE: f64 = 1e3;
 
-/// Lanes in which columns of the Jacobian are computed.
+/// Number of columns of the Jacobian that are computed together, as derivatives of one dual.
 const LANES: usize = 4;
 
 /// The Jacobian of the right-hand side by the states.
@@ -56,7 +56,7 @@ impl Jacobian {
         }
     }
 
-    /// Computes it where these registers are.
+    /// Computes the Jacobian at the point that the registers hold.
     pub fn compute<T: Scalar>(&mut self, tape: &Tape, at: &Registers<T>) {
         let n = tape.states;
         let up_to = tape.delayed(tape.delays.len() + tape.plays.len());
@@ -78,7 +78,7 @@ impl Jacobian {
         }
     }
 
-    /// Computes it by differences where states slide; the slopes there stand in the first stage.
+    /// Computes the Jacobian by finite differences while states slide; the first stage holds the slopes at the point.
     fn compute_sliding<T: Scalar>(
         &mut self,
         tape: &Tape,
@@ -101,7 +101,7 @@ impl Jacobian {
         }
     }
 
-    /// The largest sum of a row's absolute values.
+    /// The infinity norm: the largest row sum of absolute values.
     pub fn norm(&self) -> f64 {
         let rows = self.matrix.row_iter();
         rows.map(|row| row.iter().map(|v| v.abs()).sum())
@@ -109,7 +109,8 @@ impl Jacobian {
     }
 }
 
-/// Steps from `x` at `time` by `h`, to `work.next`; the step's error against the tolerance, `None` where a stage cannot be solved.
+/// A step of length `h` from `x` at `time`; the result is in `work.next`. Returns the error relative to the tolerance, or `None` if a stage
+/// does not converge.
 pub(super) fn step<T: Scalar>(
     tape: &Tape,
     work: &mut Step<T>,
@@ -185,7 +186,7 @@ pub(super) fn step<T: Scalar>(
         }
         work.next[i] = x[i] + h * sum;
     }
-    // Filtered by the Newton matrix: what decays within the step is no error.
+    // The error is filtered by the Newton matrix, so that components that decay within the step do not count.
     let errors = nalgebra::DVector::from_fn(n, |i, _| {
         let slopes = work.slopes.chunks_exact(n).zip(ERROR);
         h.value() * slopes.map(|(k, e)| k[i].value() * e).sum::<f64>()

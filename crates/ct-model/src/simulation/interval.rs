@@ -1,4 +1,4 @@
-//! One interval between rows: steps as long as their error allows, which end where something jumps.
+//! Simulation over one sampling interval, with step-size control; steps end at jumps and events.
 
 use super::delays::{Delays, POINTS};
 use super::events::Event;
@@ -7,27 +7,26 @@ use super::{Method, NoSolution, SimulationState, explicit, implicit};
 use crate::scalar::Scalar;
 use crate::tape::Tape;
 
-/// Error of a step, as a share of the largest absolute value that a state has had. Derivatives are those of the steps that follow: at twice
-/// this they are off by some 1e-3 where a right-hand side bends sharply.
+/// Tolerance of a step, as a share of the largest absolute value that a state has had. Derivatives are those of the computed steps: with
+/// twice this tolerance, their error is about 1e-3 if the right-hand side has a sharp bend.
 const TOLERANCE: f64 = 1e-10;
-/// The shortest step, as a share of an interval between rows.
+/// Shortest step, as a share of a sampling interval.
 const SHORTEST: f64 = 1e-9;
-/// A step is at most so many times as long as the last one.
+/// Largest ratio of a step to the previous one.
 const LONGER: f64 = 5.0;
-/// A step that is longer than the error asked for by this much is tried, where it is the last one of an interval.
+/// If the step that the error allows, times this factor, reaches the end of the interval, the step goes to the end.
 const STRETCH: f64 = 1.1;
-/// Steps in an interval beyond which the simulation has failed, ...
+/// Largest number of steps: the initial budget and the upper limit of what is left of it, ...
 pub(super) const MOST_STEPS: usize = 50_000;
-/// ... and those that every interval adds to what is left of them: a trial whose steps are short all along ends within seconds.
+/// ... and the number that every interval adds to the budget. A simulation whose steps are always short therefore fails within seconds.
 const STEPS_PER_INTERVAL: usize = 300;
-/// Steps in an interval from which on the model may be stiff.
+/// If an interval has more steps than this, the model is tested for stiffness.
 const MANY_STEPS: usize = 40;
-/// It is where the length of such steps times the norm of the Jacobian is above this: the stability of the method, and not its error, limits
-/// them.
+/// The model is stiff if the step length times the norm of the Jacobian is above this: stability, not accuracy, then limits the steps.
 const STABILITY: f64 = 1.5;
 
 impl<T: Scalar> SimulationState<T> {
-    /// The guards' answers where an interval begins, and what delays know of it.
+    /// Evaluates the guards at the beginning of an interval, and stores the known values of delayed expressions.
     pub(super) fn begin_interval(
         &mut self,
         tape: &Tape,
@@ -68,18 +67,18 @@ impl<T: Scalar> SimulationState<T> {
             self.remember(tape);
             self.slide_on(tape, &drive);
         }
-        // Whatever made the registers, it was computed for the inputs of this interval.
+        // The registers hold the inputs of this interval, whichever code has evaluated them.
         self.work.registers.held = !bends;
         self.work.keep_slope(tape, 0);
         self.work.begun = true;
     }
 
-    /// Whether the registers hold what these inputs give at the present row.
+    /// Whether the registers hold the values for these inputs at the present sample.
     pub(super) fn is_computed(&self, inputs: &[f64]) -> bool {
         self.computed && self.read == inputs
     }
 
-    /// Keeps what is delayed over the next or the last step: what is known ahead for a whole interval, everything else after each step.
+    /// Stores the values of delayed expressions: those that are known ahead for the whole next interval, all others for the last step.
     fn keep_past(
         &mut self,
         tape: &Tape,
@@ -139,7 +138,7 @@ impl<T: Scalar> SimulationState<T> {
         loop {
             let now = self.time.value();
             let left = T::constant(until) - self.time;
-            // The end of what is smooth: the row, or a jump that comes out of a delay.
+            // The end of the smooth part of the interval: the next sample, or a jump that leaves a delay.
             let mut limit = left;
             let mut out = None;
             for (i, delay) in delays.all.iter().enumerate() {
@@ -152,7 +151,7 @@ impl<T: Scalar> SimulationState<T> {
                 }
             }
             if out.is_none() && left.value() <= 1e-14 * interval.length {
-                // What is left of the interval has a derivative, where its last step ended at an event.
+                // The remaining time has a derivative if the last step ended at an event.
                 self.finish(tape, interval, left, delays);
                 return Ok(());
             }
@@ -176,7 +175,7 @@ impl<T: Scalar> SimulationState<T> {
                 (h, error) = (event.after, *error_there);
             }
             if (error > 1.0 || error.is_nan()) && h.value() > shortest {
-                // What is no number asks for a much shorter step.
+                // A NaN error asks for a much shorter step.
                 let factor = if error.is_finite() {
                     (0.9 * error.powf(-0.2)).clamp(0.1, 0.9)
                 } else {
@@ -233,7 +232,7 @@ impl<T: Scalar> SimulationState<T> {
             } else if let Some(out) = out.filter(|_| whole) {
                 delays.all[out].let_out();
                 self.work.begun = false;
-                // A branch may stand on what jumps.
+                // A branch may depend on the signal that jumps.
                 let drive = Drive::new(interval, delays);
                 drive.load(tape, &mut self.work, self.time, &self.state);
                 tape.evaluate_with_guards(&mut self.work.registers);
@@ -250,7 +249,7 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
-    /// Carries the derivative of what is left of an interval whose last step ended at its very end.
+    /// Adds the derivative of the remaining time if the last step ended at an event at the very end of the interval.
     fn finish(&mut self, tape: &Tape, interval: Interval<'_>, left: T, delays: &Delays<T>) {
         let drive = Drive::new(interval, delays);
         drive.load(tape, &mut self.work, self.time, &self.state);
@@ -275,7 +274,7 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
-    /// Computes a step, with the answers of the guards as they are, and its error against the tolerance.
+    /// Computes a step with the present branches; returns its error relative to the tolerance.
     pub(super) fn attempt(
         &mut self,
         tape: &Tape,

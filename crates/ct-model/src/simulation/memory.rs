@@ -1,7 +1,8 @@
-//! What the first row settles, and what plays remember from row to row.
+//! Initialisation at the first sample, and the memory of play operators (backlash) from sample to sample.
 //!
-//! A play moves with what goes into it at a distance of at most its half-width. Within an interval between rows it starts from what it
-//! gave at the row: exact where what goes in is held or runs in one direction, as every input does. It comes to rest in the middle before the record.
+//! The output of a play operator differs from its input by at most the half-width. Within a sampling interval the output is computed from
+//! its value at the last sample: this is exact for an input that is held or monotone in the interval, as every model input is. Before the
+//! record, the play is in the middle position.
 
 use super::SimulationState;
 use super::delays::{Delay, Delays};
@@ -10,9 +11,10 @@ use crate::scalar::Scalar;
 use crate::tape::Tape;
 
 impl<T: Scalar> SimulationState<T> {
-    /// Before the record everything was as at its beginning: what a delay lets through, what plays hold, and settled states, too.
+    /// Sets the values before the record to those at its beginning: of delays, of play operators, and of states whose initial values depend
+    /// on inputs or other states (`settled`).
     pub(super) fn before_the_record(&mut self, tape: &Tape) {
-        // One may stand on what another one gives.
+        // One of these values may depend on another one, so the evaluation is repeated.
         for _ in 0..=tape.delays.len() + tape.plays.len() + tape.settled.len() {
             tape.evaluate_with_guards(&mut self.work.registers);
             let values = &mut self.work.registers.values;
@@ -37,7 +39,7 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
-    /// Gives the settled states their initial values, and plays theirs, from the inputs of the first row.
+    /// Sets the initial values of play operators and of states whose initial values depend on inputs, from the inputs of the first sample.
     pub(super) fn settle(&mut self, tape: &Tape, inputs: &[f64], delays: &Delays<T>) {
         if self.settled || (tape.settled.is_empty() && tape.plays.is_empty()) {
             return;
@@ -47,7 +49,7 @@ impl<T: Scalar> SimulationState<T> {
         self.before_the_record(tape);
     }
 
-    /// Evaluates a reading: what is delayed by nothing is there at once.
+    /// Evaluates the outputs; an expression with a delay of zero takes its present value.
     pub(super) fn let_through(&mut self, tape: &Tape, delays: &Delays<T>) {
         tape.evaluate_with_guards(&mut self.work.registers);
         let at_once = |delay: &Delay<T>| delay.by.value() == 0.0;
@@ -62,7 +64,7 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
-    /// Plays start anew from what they give at this row.
+    /// Stores the outputs of the play operators at this sample as their new initial values.
     pub(super) fn remember(&mut self, tape: &Tape) {
         for play in &tape.plays {
             self.work.registers.values[play.held] = self.work.registers.values[play.to];

@@ -1,12 +1,12 @@
-//! Simulates a model, with exact derivatives by parameters and initial states.
+//! Simulation of a model, with exact derivatives by parameters and initial states.
 //!
-//! - Models without delays whose states go linearly into their equations, and inputs that are held in any way, go from row to row exactly;
-//!   with inputs in straight lines where these go in linearly too.
-//! - All others by an explicit method of order five whose steps follow its error, until its steps are far shorter than the error asks for:
-//!   then the model is stiff there, and an implicit method of order four goes on ([`Method`]).
-//! - Steps end where an input jumps, where a delay lets a jump through, and where a branch changes (`if`, `min`, `max`, `abs`, `sign`).
-//!   Such a time depends on the parameters, and the length of the step carries its derivative: what comes after has the derivatives of the
-//!   true solution.
+//! - Models without delays whose equations are linear in the states are integrated exactly from sample to sample: for held inputs in all
+//!   cases, for linearly interpolated inputs if the equations are linear in the inputs too.
+//! - All other models are integrated by an explicit method of order five with step-size control. If its steps become far shorter than the
+//!   error requires, the model is stiff, and an implicit method of order four continues ([`Method`]).
+//! - Steps end where an input jumps, where a jump leaves a delay, and where a branch changes (`if`, `min`, `max`, `abs`, `sign`). Such a
+//!   time depends on the parameters, and the step length carries its derivative, so that the later states have the derivatives of the exact
+//!   solution.
 //!
 //! **Reference** for the derivatives through events: S. Galan, W. F. Feehery, P. I. Barton, Applied Numerical Mathematics 31 (1999) 17-47.
 
@@ -36,28 +36,30 @@ use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
 use crate::tape::Tape;
 
-/// How a model is simulated.
+/// The integration method of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
-    /// Linear: exactly.
+    /// Exact steps of a linear model.
     Exact,
     /// Explicit Runge-Kutta steps of order five (Dormand and Prince).
     Explicit,
-    /// Stiff: implicit Runge-Kutta steps of order four.
+    /// Implicit Runge-Kutta steps of order four, for stiff models.
     Implicit,
 }
 
-/// The simulation cannot go on: states that grow beyond all bounds, or an equation that has no value there.
+/// The simulation has failed: a state grows beyond all bounds, or an equation has no value.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "the simulation cannot go on beyond time {time}: a state grows without bound, or an equation has no value there"
 )]
 pub struct NoSolution {
-    /// When \[unit of the record's time\].
+    /// Time of the failure \[unit of the record's time\].
     pub time: f64,
 }
 
-/// A simulation in progress, without its model: whoever owns it hands over the same model in every call.
+/// A simulation in progress.
+///
+/// No memory is allocated from sample to sample, except for the past of delayed expressions.
 pub struct SimulationState<T> {
     method: Method,
     time: T,
@@ -66,33 +68,33 @@ pub struct SimulationState<T> {
     exact: Option<Exact<T>>,
     jacobian: Option<Jacobian>,
     delays: Option<Delays<T>>,
-    /// When each guard changed its answer last.
+    /// Time at which each guard last changed its branch.
     changed: Vec<f64>,
-    /// The largest absolute value that each state has had, times the tolerance.
+    /// Absolute tolerance of each state: the largest absolute value that it has had, times the relative tolerance.
     scale: Vec<f64>,
     largest: Vec<f64>,
-    /// Steps that may be taken beside [`STEPS_PER_INTERVAL`].
+    /// Steps that may be taken in addition to [`STEPS_PER_INTERVAL`].
     steps_left: usize,
-    /// Length of the last step that the error allowed.
+    /// Step length that the error of the last step allows.
     length: f64,
     rise: Vec<f64>,
     /// The inputs at the end of the last interval.
     last: Vec<f64>,
     /// Length of the last interval.
     last_length: f64,
-    /// The inputs of the last reading.
+    /// The inputs at the last call of [`Simulation::read`].
     read: Vec<f64>,
-    /// No rise.
+    /// A zero slope for each input, for held inputs.
     held: Vec<f64>,
-    /// The registers hold what these and the present states give.
+    /// The registers hold the values for the inputs `read` and the present states.
     computed: bool,
-    /// What the rise of the inputs adds to the slopes, per unit of time: of exact steps.
+    /// For exact steps: change of the states' slopes per unit of time that the inputs' slopes cause.
     added: Vec<T>,
     scratch: Vec<T>,
     begun: bool,
-    /// The registers hold slopes and guards where the last interval ended, with inputs that were held in it.
+    /// The registers hold slopes and guards at the end of the last interval, whose inputs were held.
     ended_within: bool,
-    /// Settled states have their initial values.
+    /// States whose initial values depend on inputs or other states have received these values.
     settled: bool,
 }
 
@@ -103,13 +105,13 @@ impl<T: Scalar> SimulationState<T> {
         assert_eq!(initial.len(), tape.states, "initial states");
         let mut work = Step::new(tape, parameters);
         let exact = (model.exact != ExactSteps::No).then(|| Exact::new(tape, &mut work));
-        // A function of inputs may have no value at zero, where the matrix is read.
+        // A function of inputs may have no value at inputs of zero, where the matrix is computed.
         let exact = exact.filter(Exact::is_finite);
         let zero = T::constant(0.0);
         let delays = tape.delays.iter().zip(tape.known_ahead());
         let delays = delays.map(|(&(_, by), ahead)| {
             let by = work.registers.values[by];
-            // Nothing comes out before it went in.
+            // A negative delay is replaced by zero.
             Delay::new(if by.value() < 0.0 { zero } else { by }, ahead)
         });
         let plain: Vec<f64> = parameters.iter().map(|value| value.value()).collect();
@@ -153,7 +155,7 @@ impl<T: Scalar> SimulationState<T> {
         let drive = Drive::held(inputs, &self.held, &delays);
         let tape = &model.tape;
         if self.ended_within && inputs == self.last {
-            // The last step's end is this reading.
+            // The reading is that at the end of the last step.
             tape.evaluate_outputs(&mut self.work.registers);
         } else {
             self.work.registers.held = false;
@@ -167,7 +169,7 @@ impl<T: Scalar> SimulationState<T> {
         }
         self.ended_within = false;
         self.read.copy_from_slice(inputs);
-        // A delay may let something through, and a play move, where the interval begins.
+        // At the beginning of an interval, a jump may leave a delay and a play operator may move.
         self.computed = tape.delays.is_empty() && tape.plays.is_empty();
         for (output, &register) in outputs.iter_mut().zip(&tape.outputs) {
             *output = self.work.registers.values[register];
@@ -250,7 +252,7 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
-    /// From here on the inputs go in straight lines through what is not linear.
+    /// Changes from exact steps to explicit ones: the inputs are no longer held, and the model is nonlinear in them.
     fn go_on_in_steps(&mut self, tape: &Tape) {
         if self.exact.take().is_none() {
             return;
@@ -271,11 +273,11 @@ impl<T: Scalar> SimulationState<T> {
     ) -> Result<(), NoSolution> {
         let n = tape.states;
         let delays = Delays { all: Vec::new() };
-        // `time` plays no part in what is linear; held inputs first, then what their rise adds.
+        // Linear models do not depend on `time`. The slope for held inputs comes first, then the contribution of the inputs' slopes.
         if !self.is_computed(from) {
             let drive = Drive::held(from, &self.held, &delays);
             drive.load(tape, &mut self.work, self.time, &self.state);
-            // A branch may stand on an input.
+            // A branch may depend on an input.
             tape.evaluate_with_guards(&mut self.work.registers);
         }
         self.work.keep_slope(tape, 0);

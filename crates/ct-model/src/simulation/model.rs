@@ -6,7 +6,7 @@ use crate::scalar::Scalar;
 use crate::spec::ModelSpec;
 use crate::tape::Tape;
 
-/// A model that is ready to be simulated.
+/// A compiled model, which can be simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
     spec: ModelSpec,
@@ -27,25 +27,25 @@ impl Model {
         Self { spec, tape, exact }
     }
 
-    /// What it was compiled from.
+    /// The specification from which the model was compiled.
     #[must_use]
     pub fn spec(&self) -> &ModelSpec {
         &self.spec
     }
 
-    /// Its operations.
+    /// The compiled operations.
     pub(crate) fn tape(&self) -> &Tape {
         &self.tape
     }
 
-    /// The values of its parameters as the text has them, in the order of [`ModelSpec::parameters`].
+    /// The parameter values of the model text, in the order of [`ModelSpec::parameters`].
     #[must_use]
     pub fn parameters(&self) -> Vec<f64> {
         let parameters = self.spec.parameters.iter();
         parameters.map(|parameter| parameter.value).collect()
     }
 
-    /// The initial values of the states as the text has them, of these parameters.
+    /// The initial values of the states by the model text, for these parameters.
     #[must_use]
     pub fn starts<T: Scalar>(&self, parameters: &[T]) -> Vec<T> {
         let mut registers = self.tape.registers(parameters);
@@ -54,16 +54,16 @@ impl Model {
         starts.map(|&register| registers.values[register]).collect()
     }
 
-    /// Simulates the model from its initial values, with evenly sampled inputs that are held; returns a series for each output.
+    /// Simulates the model from its initial values, with evenly sampled, held inputs; returns a series for each output.
     ///
-    /// `parameters`: in the order of [`ModelSpec::parameters`]. `interval` \[the model's unit of time\]. `inputs`: a series for each input, of
-    /// equal length.
+    /// `parameters`: in the order of [`ModelSpec::parameters`]. `interval` \[the model's unit of time\]. `inputs`: a series for each input,
+    /// of equal length.
     ///
     /// # Errors
-    /// Where the simulation cannot go on.
+    /// If the simulation fails.
     ///
     /// # Panics
-    /// Where the number of parameters or inputs is not the model's.
+    /// If the number of parameters or inputs is not that of the model.
     pub fn simulate(
         &self,
         parameters: &[f64],

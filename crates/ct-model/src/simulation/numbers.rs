@@ -1,12 +1,12 @@
-//! The numbers that a simulation is compiled for.
+//! The number types for which the simulation is compiled.
 //!
-//! A generic function is compiled again in every crate that calls it, and the code of a simulation is large: its entry points belong to the
-//! number instead, so that the code for each number is compiled in this crate alone.
+//! A generic function is compiled again in every crate that calls it, and the code of a simulation is large. Its entry points are therefore
+//! methods of the number type, so that the code for each type is compiled in this crate only.
 
 use super::{Model, NoSolution, SimulationState};
 use crate::scalar::{Dual, Scalar};
 
-/// Entry points of a simulation, for one kind of number.
+/// The methods of [`Simulation`] for one number type.
 pub trait Compiled: Scalar {
     /// [`Simulation::new`](super::Simulation::new).
     fn begin(
@@ -22,7 +22,7 @@ pub trait Compiled: Scalar {
     /// [`Simulation::advance`](super::Simulation::advance), with the inputs at the beginning and at the end.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Simulation::advance`].
     fn advance(
         state: &mut SimulationState<Self>,
         model: &Model,
@@ -31,7 +31,7 @@ pub trait Compiled: Scalar {
     ) -> Result<(), NoSolution>;
 }
 
-/// The numbers that a [`Simulation`](super::Simulation) runs on: `f64`, and duals with 2, 4, 8, 12 or 15 derivatives.
+/// The number types of a [`Simulation`]: `f64`, and duals with 2, 4, 8, 12 or 15 derivatives.
 pub trait SimulationNumber: Compiled {}
 
 impl<T: Compiled> SimulationNumber for T {}
@@ -69,5 +69,5 @@ macro_rules! compile_for {
     )*};
 }
 
-// With one derivative more than 15 a compiler copies a dual by a call instead of in registers: half as fast.
+// With more than 15 derivatives the compiler copies a dual by a function call instead of in registers, which is half as fast.
 compile_for!(f64, Dual<2>, Dual<4>, Dual<8>, Dual<12>, Dual<15>);

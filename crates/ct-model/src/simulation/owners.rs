@@ -6,18 +6,17 @@ use super::{Method, Model, NoSolution, SimulationNumber, SimulationState};
 
 /// A simulation in progress, which borrows its model.
 ///
-/// Nothing is allocated from row to row, but for the past of what is delayed.
+/// No memory is allocated from sample to sample, except for the past of delayed expressions.
 pub struct Simulation<'a, T> {
     model: &'a Model,
     state: SimulationState<T>,
 }
 
 impl<'a, T: SimulationNumber> Simulation<'a, T> {
-    /// Begins at `start` on the clock that `time` follows, with parameters in the order of [`crate::ModelSpec::parameters`] and a value for
-    /// each state.
+    /// Starts at time `start`, with parameters in the order of [`crate::ModelSpec::parameters`] and an initial value for each state.
     ///
     /// # Panics
-    /// Where the numbers of parameters or states are not the model's.
+    /// If the number of parameters or states is not that of the model.
     #[must_use]
     pub fn new(model: &'a Model, parameters: &[T], initial: &[T], start: f64) -> Self {
         Self {
@@ -26,15 +25,15 @@ impl<'a, T: SimulationNumber> Simulation<'a, T> {
         }
     }
 
-    /// The outputs now, with the inputs of this row.
+    /// The present outputs, with the inputs of this sample.
     pub fn read(&mut self, inputs: &[f64], outputs: &mut [T]) {
         T::read(&mut self.state, self.model, inputs, outputs);
     }
 
-    /// Goes on to `until`, the inputs in straight lines from one value to the other (the same where they are held).
+    /// Advances to time `until`, with inputs that are linear in time between the two values (equal values: held).
     ///
     /// # Errors
-    /// Where the simulation cannot go on.
+    /// If the simulation fails.
     pub fn advance(&mut self, from: &[f64], to: &[f64], until: f64) -> Result<(), NoSolution> {
         T::advance(&mut self.state, self.model, (from, to), until)
     }
@@ -64,7 +63,7 @@ impl<T: SimulationNumber> SharedSimulation<T> {
     /// As [`Simulation::new`].
     ///
     /// # Panics
-    /// Where the numbers of parameters or states are not the model's.
+    /// If the number of parameters or states is not that of the model.
     #[must_use]
     pub fn new(model: Arc<Model>, parameters: &[T], initial: &[T], start: f64) -> Self {
         Self {

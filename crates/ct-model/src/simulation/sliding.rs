@@ -1,12 +1,12 @@
-//! States that slide along a switch: a right-hand side that jumps where `g(t, x) = 0`, and drives the states back there from either side.
+//! Sliding modes: the right-hand side is discontinuous at `g(t, x) = 0` and drives the states towards this surface from both sides.
 //!
-//! They stay on `g = 0` with the mean of the slopes of both sides that keeps them there (Filippov): with `f_0` where every such `g` is
-//! negative and `f_k` where the `k`-th is positive,
+//! The states stay on `g = 0`. Their slope is the convex combination of the slopes of both sides that keeps them there (Filippov): with
+//! `f_0` where every such `g` is negative and `f_k` where the `k`-th is positive,
 //! `dx/dt = f_0 + sum_k a_k (f_k - f_0)`, `a` such that `dg_j/dt = 0` for all `j`.
-//! They leave a switch once its `a` leaves the range from 0 to 1. Friction that holds a mass and a relay that holds a level are of this kind.
-//! For several switches at a time the jumps are taken to add up, as those of separate terms do.
+//! Sliding on a surface ends when its `a` leaves the range from 0 to 1. Examples: a mass that dry friction holds, a level that a relay
+//! holds. For several surfaces at a time, the jumps of the slope are assumed to add up, as for separate terms.
 //!
-//! After each step the states are put back on `g = 0` along the jumps, which is exact in the derivatives, too.
+//! After each step the states are projected onto `g = 0` along the jumps of the slope; the projection is exact for the derivatives too.
 //!
 //! **Reference**: A. F. Filippov, Differential Equations with Discontinuous Righthand Sides, Kluwer 1988, section 4.
 
@@ -14,31 +14,32 @@ use super::step::Drive;
 use crate::scalar::Scalar;
 use crate::tape::{Register, Registers, Tape};
 
-/// Distance of the differences that give the rate of a guard, as a share of the interval.
+/// Perturbation for the finite differences that give the rate of a guard, as a share of the interval.
 const DISTANCE: f64 = 1e-4;
-/// The right-hand side jumps where a state moves apart by more than this share of its size in an interval.
+/// The right-hand side has a jump if the slopes of both sides change a state differently by more than this share of its size in an
+/// interval.
 const JUMP: f64 = 1e-9;
-/// A guard has been moved off zero, by an input that jumps, where it is further away than this share of what its rate makes of an interval.
+/// An input jump has moved a guard off zero if its distance from zero exceeds this share of the change that its rate causes in an interval.
 const OFF: f64 = 1e-9;
 
-/// A guard that stays at zero.
+/// A guard on whose surface the states slide.
 #[derive(Debug, Clone, Copy)]
 struct Surface {
     difference: Register,
-    /// The state whose rate is the guard's, and its sign: of a state against a number.
+    /// If the guard compares a state with a number: the state, and the sign with which it enters.
     state: Option<(usize, f64)>,
 }
 
 #[derive(Debug, Clone)]
 pub(super) struct Sliding<T> {
     surfaces: Vec<Surface>,
-    /// With all guards negative, then with each of them positive.
+    /// Registers with all guards negative, then with each guard positive in turn.
     sides: Vec<Registers<T>>,
-    /// What each side gives: slopes of the states, one side after the other.
+    /// The slopes of the states on each side, one side after the other.
     slopes: Vec<T>,
     /// Rate of each guard (rows) on each side.
     rates: Vec<T>,
-    /// The share of each guard's positive side.
+    /// The weight `a` of each guard's positive side.
     shares: Vec<T>,
     matrix: Vec<T>,
 }
@@ -63,17 +64,17 @@ impl<T: Scalar> Sliding<T> {
         self.surfaces.len()
     }
 
-    /// Whether this difference is kept at zero.
+    /// Whether the states slide on the surface of this difference.
     pub fn holds(&self, difference: Register) -> bool {
         self.surfaces.iter().any(|s| s.difference == difference)
     }
 
-    /// The share of a guard's positive side in the last slopes that were computed.
+    /// The weight of a guard's positive side in the slopes that were computed last.
     pub fn share(&self, k: usize) -> f64 {
         self.shares[k].value()
     }
 
-    /// Keeps one difference more at zero. The registers answer for its negative side from here on.
+    /// Adds a surface on which the states slide. From here on, the registers take the branches of its negative side.
     pub fn add(&mut self, tape: &Tape, registers: &mut Registers<T>, difference: Register) {
         self.surfaces.push(Surface {
             difference,
@@ -82,7 +83,7 @@ impl<T: Scalar> Sliding<T> {
         self.follow(tape, registers);
     }
 
-    /// Lets one go, to a side.
+    /// Ends the sliding on a surface; the guard goes to the given side.
     pub fn remove(
         &mut self,
         tape: &Tape,
@@ -96,7 +97,7 @@ impl<T: Scalar> Sliding<T> {
         surface.difference
     }
 
-    /// Has all sides answer as the registers do, but for the guards that stay at zero.
+    /// Sets the branches of all sides to those of the registers, except for the guards on which the states slide.
     pub fn follow(&mut self, tape: &Tape, registers: &mut Registers<T>) {
         for surface in &self.surfaces {
             tape.answer(registers, surface.difference, false);
@@ -122,7 +123,7 @@ impl<T: Scalar> Sliding<T> {
         }
     }
 
-    /// Puts the mean of the slopes in the place of those that the registers hold, which stand for the negative side.
+    /// Replaces the slopes in the registers, which are those of the negative side, by the convex combination of all sides.
     pub fn mean_slopes(&mut self, tape: &Tape, registers: &mut Registers<T>, drive: &Drive<'_, T>) {
         let (n, m) = (tape.states, self.surfaces.len());
         let up_to = tape.delayed(tape.delays.len() + tape.plays.len());
@@ -151,7 +152,7 @@ impl<T: Scalar> Sliding<T> {
         self.shares.copy_from_slice(&wanted);
         self.solve();
         for (i, &register) in tape.derivatives.iter().enumerate() {
-            // What is a state or made of inputs alone is the same on all sides.
+            // States and functions of inputs alone have the same values on all sides.
             if register >= up_to && !tape.of_inputs[register] {
                 registers.values[register] = self.mean(i, n);
             }
@@ -196,7 +197,7 @@ impl<T: Scalar> Sliding<T> {
         (ends[0] - ends[1]) * (0.5 / distance)
     }
 
-    /// Solves `sum_k (r_jk - r_j0) a_k = b_j`, with `b` in the place of the shares, by elimination.
+    /// Solves `sum_k (r_jk - r_j0) a_k = b_j` by elimination; on entry the shares hold `b`, on return `a`.
     fn solve(&mut self) {
         let m = self.surfaces.len();
         let rates = self.rates.chunks_exact(m + 1);
@@ -228,7 +229,7 @@ impl<T: Scalar> Sliding<T> {
         }
     }
 
-    /// Whether both sides drive the states onto the guard that was added last, of the slopes computed last.
+    /// Whether both sides drive the states onto the surface that was added last, by the slopes that were computed last.
     pub fn is_attractive(&self, interval: f64, largest: &[f64]) -> bool {
         let (n, m) = (largest.len(), self.surfaces.len());
         let row = &self.rates[(m - 1) * (m + 1)..];
@@ -240,7 +241,7 @@ impl<T: Scalar> Sliding<T> {
         row[m].value() < row[0].value() && share > 0.0 && share < 1.0 && (0..n).any(jumps)
     }
 
-    /// A guard that is not kept at zero any more, and to which side it goes, of the slopes computed last.
+    /// A guard on which sliding ends, and whether it becomes positive, by the slopes that were computed last.
     pub fn let_go(&self, registers: &Registers<T>, interval: f64) -> Option<(usize, bool)> {
         let m = self.surfaces.len();
         (0..m).find_map(|k| {
@@ -255,7 +256,7 @@ impl<T: Scalar> Sliding<T> {
         })
     }
 
-    /// Puts states back onto the guards, of the slopes computed last.
+    /// Projects the states onto the surfaces, with the slopes that were computed last.
     pub fn put_back(&mut self, registers: &Registers<T>, x: &mut [T]) {
         let n = x.len();
         for (share, surface) in self.shares.iter_mut().zip(&self.surfaces) {
@@ -267,7 +268,7 @@ impl<T: Scalar> Sliding<T> {
         }
     }
 
-    /// The mean of the outputs of the sides, of the slopes computed last.
+    /// The weighted mean of the outputs of all sides, with the weights that were computed last.
     pub fn read(&mut self, tape: &Tape, registers: &mut Registers<T>, outputs: &mut [T]) {
         tape.evaluate(registers);
         for (output, &register) in outputs.iter_mut().zip(&tape.outputs) {

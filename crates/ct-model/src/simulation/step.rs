@@ -1,4 +1,4 @@
-//! What a step works with: registers, slopes at the stages, and what drives the model.
+//! Working storage of a step: registers, slopes at the stages, and the inputs of the model.
 
 use super::delays::Delays;
 use super::explicit;
@@ -12,11 +12,11 @@ pub(super) struct Step<T> {
     pub registers: Registers<T>,
     /// The derivative of the states at each stage, one stage after the other.
     pub slopes: Vec<T>,
-    /// The states at the end.
+    /// The states at the end of the step.
     pub next: Vec<T>,
-    /// The slope at the beginning stands in the first stage.
+    /// The first stage holds the slope at the beginning of the step already.
     pub begun: bool,
-    /// Guards that stay at zero.
+    /// Guards on whose surfaces the states slide.
     pub sliding: Sliding<T>,
 }
 
@@ -32,7 +32,7 @@ impl<T: Scalar> Step<T> {
         }
     }
 
-    /// Computes slopes from what is loaded, and the differences of guards where states slide.
+    /// Computes the slopes from the registers and, while states slide, the differences of the guards.
     pub fn evaluate_slopes(&mut self, tape: &Tape, drive: &Drive<'_, T>) {
         tape.evaluate_slopes(&mut self.registers);
         if !self.sliding.is_empty() {
@@ -41,12 +41,12 @@ impl<T: Scalar> Step<T> {
         }
     }
 
-    /// Guards that stay at zero answer for their sides again, whatever they answered by their differences.
+    /// Sets the guards on which the states slide to their sides again, whatever the signs of their differences.
     pub fn follow_sliding(&mut self, tape: &Tape) {
         self.sliding.follow(tape, &mut self.registers);
     }
 
-    /// What follows a step: the slope at its end is that at the next one's beginning, where nothing jumps between.
+    /// Prepares the next step: its initial slope is the slope at the end of this step, unless there is a jump in between.
     pub fn go_on(&mut self, smooth: bool) {
         let n = self.next.len();
         if smooth {
@@ -55,7 +55,7 @@ impl<T: Scalar> Step<T> {
         self.begun = smooth;
     }
 
-    /// Keeps the derivative that the registers hold as that of a stage.
+    /// Stores the derivative that the registers hold as the slope of a stage.
     pub fn keep_slope(&mut self, tape: &Tape, stage: usize) {
         let slopes = &mut self.slopes[stage * tape.states..];
         for (slope, &register) in slopes.iter_mut().zip(&tape.derivatives) {
@@ -64,17 +64,17 @@ impl<T: Scalar> Step<T> {
     }
 }
 
-/// An interval between rows, and the inputs in it, each in a straight line.
+/// A sampling interval and the inputs in it, each linear in time.
 #[derive(Clone, Copy)]
 pub(super) struct Interval<'a> {
     pub begin: f64,
     pub length: f64,
     pub from: &'a [f64],
-    /// Rise of each input per unit of time.
+    /// Slope of each input.
     pub rise: &'a [f64],
 }
 
-/// What drives the model over an interval: inputs, and what is delayed.
+/// The inputs and delayed expressions over an interval.
 #[derive(Clone, Copy)]
 pub(super) struct Drive<'a, T> {
     pub interval: Interval<'a>,
@@ -86,7 +86,7 @@ impl<'a, T: Scalar> Drive<'a, T> {
         Self { interval, delays }
     }
 
-    /// Inputs that are held; `still`: a zero for each.
+    /// Inputs that are held; `still`: a zero slope for each.
     pub fn held(inputs: &'a [f64], still: &'a [f64], delays: &'a Delays<T>) -> Self {
         let interval = Interval {
             begin: 0.0,
@@ -97,7 +97,7 @@ impl<'a, T: Scalar> Drive<'a, T> {
         Self { interval, delays }
     }
 
-    /// Writes time, inputs, states and delayed values into the registers; inputs that are held stand there.
+    /// Writes time, inputs, states and delayed values into the registers; held inputs are in the registers already.
     pub fn load(&self, tape: &Tape, work: &mut Step<T>, time: T, x: &[T]) {
         let held = work.registers.held;
         let values = &mut work.registers.values;

@@ -1,4 +1,4 @@
-//! A setup from a structure and its records.
+//! Construction of a setup from a structure and its records.
 
 use ct_signals::{Channel, Record};
 use plants::{Domain, Known, MAX_VESSELS, OutputScales, Plant, Scales, Structure, deciles};
@@ -10,7 +10,7 @@ use crate::clock::{Clock, span};
 use crate::feedback::Feedback;
 use crate::reading_step::reading_step;
 
-/// Scales of records as the structure meets them first.
+/// Initial scales of records for a structure, before any simulation.
 pub(crate) fn scales_of(records: &[Record], plant: Plant, known: &Known) -> Option<Scales> {
     let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
     let input = records.iter().map(Record::input_range).reduce(wider)?;
@@ -41,7 +41,7 @@ pub(crate) fn scales_of(records: &[Record], plant: Plant, known: &Known) -> Opti
         deciles(outputs.flat_map(Channel::present).collect())
     };
     let vessels = known.outputs(plant);
-    // A level that nobody reads is taken for one like the lowest that is read.
+    // The range of a level that is not measured is assumed to be that of the lowest measured level.
     let lowest = (0..vessels.len()).max_by_key(|&o| vessels[o])?;
     scales.level_deciles = [readings(lowest); MAX_VESSELS];
     for (o, (vessel, (low, high))) in vessels.into_iter().zip(ranges).enumerate() {
@@ -49,7 +49,7 @@ pub(crate) fn scales_of(records: &[Record], plant: Plant, known: &Known) -> Opti
         scales.operating_level[vessel] = 0.5 * (low + high);
         scales.level_deciles[vessel] = readings(o);
     }
-    // A disturbance says nothing of how far the actuator goes.
+    // The second input is a command only for joined tanks; a measured disturbance gives no information on the actuator's range.
     if let Some((low, high)) = input_2.filter(|_| plant.joined()) {
         scales.input_range = scales.input_range.max(low.abs()).max(high.abs());
     }
@@ -74,10 +74,10 @@ fn output_range(records: &[Record], output: usize) -> Option<(f64, f64)> {
 }
 
 impl<'a> Setup<'a> {
-    /// A structure against records.
+    /// A setup of a structure and records.
     ///
     /// # Errors
-    /// Where there is no record, a record is not sound or lacks samples of an input, or `fixed` names a parameter that there is not.
+    /// If there is no record, a record is invalid or lacks samples of an input, or `fixed` names a parameter that does not exist.
     pub fn new(
         structure: Structure,
         records: &'a [Record],
@@ -115,7 +115,7 @@ impl<'a> Setup<'a> {
             .map(|p| (p.lower, p.upper))
             .collect();
         for name in fixed.keys() {
-            // A name of an effect that is not on in this structure is no mistake: it waits.
+            // A fixed parameter of an effect that is not active is not an error: the value is used once the effect is active.
             let effect_known = name
                 .split_once('.')
                 .is_some_and(|(effect, _)| plants::EffectInfo::find(effect).is_some());
@@ -130,7 +130,8 @@ impl<'a> Setup<'a> {
             .filter(|&i| !fixed.contains_key(&names[i]))
             .collect();
         let reach = structure.scales.largest_level().max(f64::MIN_POSITIVE);
-        // An empty tank is a trap: the outflow's slope is infinite there, and a step that overshot to it would stay.
+        // The lower bound is above zero: the slope of the outflow is infinite for an empty tank, and an iterate that reached it could not
+        // leave.
         let lowest = if plant.outlet() == plants::Outlet::Torricelli {
             1e-6 * reach
         } else {
@@ -149,7 +150,7 @@ impl<'a> Setup<'a> {
                 names.push(format!("{}(0){of}", plant.level_name(vessel)));
                 bounds.push((lowest, 1e3 * reach));
             }
-            // Before the record anything may have happened, and a lag remembers it.
+            // The input before the record is unknown, so the initial state of a lag is a free parameter.
             for &lag in &lags {
                 let (name, range) = structure.lag_before(lag, at_rest(record)[pump_of(lag)]);
                 let name = name + &of;
@@ -176,7 +177,7 @@ impl<'a> Setup<'a> {
                 .map(|output| output.values.len() - output.missing())
                 .sum()
         };
-        // A millionth of the range or, of a level that stands still, of the largest level.
+        // One millionth of the output's range or, for a constant reading, of the largest level.
         let floor = |o: usize| match output_range(records, o) {
             Some((low, high)) if outputs > 1 && low < high => 1e-6 * (high - low),
             Some(_) if outputs > 1 => 1e-6 * reach,
@@ -203,7 +204,7 @@ impl<'a> Setup<'a> {
         })
     }
 
-    /// A setup from records alone: the scales and the domain are taken from them.
+    /// A setup with scales and domain from the records alone.
     ///
     /// # Errors
     /// As [`Setup::new`].

@@ -1,4 +1,4 @@
-//! A structure set against records: the vector that is fitted, and its bounds.
+//! A structure with its records: the parameter vector that is fitted, and its bounds.
 
 mod build;
 mod priors;
@@ -20,62 +20,62 @@ use crate::{Error, LinearPlant, Replay, TimeLimit, clock::Clock, feedback::Feedb
 
 /// A structure, the records, and which parameters are free.
 ///
-/// The fitted vector holds the structure's parameters (free ones and fixed ones), then for every record the initial
-/// level of every vessel and what stood behind every lag ([`Structure::lags`]) and, where the loop is simulated
-/// ([`Setup::in_loop`]), the states of the controller.
+/// The parameter vector holds the structure's parameters (free and fixed). Then follow, for every record, the initial level of every
+/// vessel, the initial state of every lag ([`Structure::lags`]) and, if the loop is simulated ([`Setup::in_loop`]), the states of the
+/// controller.
 #[derive(Debug, Clone)]
 pub struct Setup<'a> {
     /// The structure.
     pub structure: Structure,
-    /// The records that are fitted together.
+    /// The records, which are fitted together.
     pub records: &'a [Record],
-    /// Parameters that are not fitted, with their values.
+    /// Fixed parameters with their values.
     pub fixed: BTreeMap<String, f64>,
-    /// Equal parts of a sampling interval in the simulation.
+    /// Number of equal parts of a sampling interval in the simulation.
     pub substeps: usize,
-    /// Cancellation flag: when set, nothing is simulated, and fits end with [`Error::Stopped`].
+    /// Cancellation flag: when set, simulations are not started, and fits end with [`Error::Stopped`].
     pub stop: Option<&'a AtomicBool>,
-    /// Interruption flag: when set, fits end where they are, as if the time limit had passed.
+    /// Interruption flag: when set, fits end with their present iterate, as after the time limit.
     pub interrupt: Option<&'a AtomicBool>,
     /// Limit on the time, shared by all fits of a search.
     pub time_limit: Option<Arc<TimeLimit>>,
     names: Vec<String>,
     bounds: Vec<(f64, f64)>,
-    /// Positions of the parameters that are fitted.
+    /// Indices of the free parameters in the parameter vector.
     free: Vec<usize>,
-    /// How many entries come before the initial states.
+    /// Number of entries before the initial states.
     parameters: usize,
-    /// Samples of each output in all records, missing ones aside.
+    /// Number of samples of each output in all records, without missing ones.
     samples: Vec<usize>,
     /// See [`estimation::Residuals::floor`].
     floors: Vec<f64>,
-    /// Standard deviations of the outputs' noise, where they are known ([`estimation::Residuals::known_scales`]).
+    /// Standard deviations of the outputs' noise, if known ([`estimation::Residuals::known_scales`]).
     pub known_scales: Option<Vec<f64>>,
-    /// What is known of parameters beside the records.
+    /// Prior information on parameters.
     priors: Vec<Prior>,
-    /// The controller, where the loop is simulated.
+    /// The controller, if the loop is simulated.
     feedback: Option<Feedback>,
-    /// When each record begins on the clock of drifts, steps and periods.
+    /// The start time of each record on the clock of drifts, steps and periods.
     clock: Clock,
 }
 
-/// What an initial state costs in [`Setup::price`].
+/// BIC penalty of a free initial state, see [`Setup::price`].
 ///
-/// The logarithm of the samples stands for what a record tells of a parameter, which grows with its length. An initial state is
-/// forgotten after a few time constants, and a longer record tells no more of it. Two is the price of Akaike's criterion. Where
-/// it costs the logarithm, a lag, whose state before the record is unknown, is handicapped against a dead time.
+/// In BIC, a parameter's penalty is the logarithm of the number of samples, because the information on a parameter grows with the record.
+/// The influence of an initial state decays after a few time constants, so a longer record contains no more information on it; its penalty
+/// is that of Akaike's criterion, 2. With the logarithm, BIC would prefer a dead time to a lag, which has an unknown initial state.
 const STATE_PRICE: f64 = 2.0;
 
 impl<'a> Setup<'a> {
-    /// The same structure and records in the loop of a controller, simulated from the reference, and the vector `x` with
-    /// the controller's initial states: those with which it gives the measured command.
+    /// The same structure and records in closed loop: the loop with the controller is simulated from the reference. Returns the setup and
+    /// the vector `x` extended by the controller's initial states, those that reproduce the measured command.
     ///
-    /// From here on [`Setup::rows`], [`Setup::linearise`] and all fits take the loop for the model, and their rows are
-    /// filtered so that the residual is the disturbance at the plant's output (the head of `feedback.rs` says how and
-    /// why). [`Setup::simulate`] and [`Setup::residuals`] go on to run on the measured command, so that errors compare.
+    /// The returned setup uses the closed-loop model in [`Setup::rows`], [`Setup::linearise`] and all fits. Their rows are filtered such
+    /// that the residual is the disturbance at the plant's output (method and derivation: head of `feedback.rs`). [`Setup::simulate`] and
+    /// [`Setup::residuals`] still use the measured command, so that simulation errors are comparable.
     ///
     /// # Errors
-    /// Where a record has no reference or a constant one, or its command is not held.
+    /// If a record has no reference or a constant one, or its command is not held.
     pub fn in_loop(&self, controller: &Controller, x: &[f64]) -> Result<(Self, Vec<f64>), Error> {
         let (sum, count) = self
             .records
@@ -101,11 +101,11 @@ impl<'a> Setup<'a> {
         setup.with_priors(&priors)
     }
 
-    /// The same setup with the controller's initial states fitted like the others.
+    /// The same setup with the controller's initial states as free parameters.
     ///
-    /// They are known from the measured command, and by default they stay there: the knowledge of where the command
-    /// stood is worth much. Let go, they take the offset of a linear tank with them, whose standard error is then gone, and
-    /// a static coefficient of a tank is known half as well.
+    /// By default these states are fixed at the values computed from the measured command, which is valuable information. If they are free,
+    /// the offset of a linear tank is no longer identifiable and has no standard error, and the standard error of a static coefficient of a
+    /// tank doubles.
     ///
     /// # Errors
     /// As [`Setup::new`].
@@ -117,18 +117,18 @@ impl<'a> Setup<'a> {
         self.rebuilt(self.structure.clone(), feedback)
     }
 
-    /// The loop is simulated.
+    /// Whether the closed loop is simulated.
     pub(crate) fn is_in_loop(&self) -> bool {
         self.feedback.is_some()
     }
 
-    /// What the controller gives on the measured reading of each record; empty where the loop is not simulated.
+    /// The controller simulated on the measured reading of each record; empty if the loop is not simulated.
     #[must_use]
     pub fn replays(&self) -> &[Replay] {
         self.feedback.as_ref().map_or(&[], |f| &f.replays)
     }
 
-    /// The same records against another structure.
+    /// A setup of the same records with another structure.
     ///
     /// # Errors
     /// As [`Setup::new`].
@@ -136,13 +136,13 @@ impl<'a> Setup<'a> {
         self.rebuilt(structure, self.feedback.clone())
     }
 
-    /// The computation was cancelled.
+    /// Whether the computation was cancelled.
     #[must_use]
     pub fn stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
-    /// The time limit has passed, or the user has ended the search: fits take no further steps.
+    /// Whether the time limit has passed or the user has ended the search: fits then stop iterating.
     #[must_use]
     pub fn out_of_time(&self) -> bool {
         self.interrupt
@@ -150,7 +150,7 @@ impl<'a> Setup<'a> {
             || self.time_limit.as_ref().is_some_and(|limit| limit.passed())
     }
 
-    /// Whether a part of a search has to be left out for want of time, or because the computation was cancelled; it is noted then.
+    /// Whether a part of a search is skipped because time is up or the computation was cancelled; a skipped part is recorded.
     #[must_use]
     pub fn leaves_out(&self, part: &str) -> bool {
         let out = self.stopped() || self.out_of_time();
@@ -160,7 +160,7 @@ impl<'a> Setup<'a> {
         out
     }
 
-    /// Steps and limits of another setup.
+    /// Copies substeps, flags and time limit from another setup.
     fn limited_as<'c: 'a>(&mut self, other: &Setup<'c>) {
         self.substeps = other.substeps;
         self.stop = other.stop;
@@ -169,8 +169,8 @@ impl<'a> Setup<'a> {
         self.known_scales.clone_from(&other.known_scales);
     }
 
-    /// The same structure against other records, in the same scales, run on the measured command, without priors. Those that begin after
-    /// the records of this setup have ended continue its clock.
+    /// The same structure with other records, with the same scales, on the measured command and without priors. Records that begin after
+    /// the end of this setup's records continue its clock.
     ///
     /// # Errors
     /// As [`Setup::new`].
@@ -184,31 +184,31 @@ impl<'a> Setup<'a> {
         Ok(setup)
     }
 
-    /// Names of the vector's entries.
+    /// Names of the parameter vector's entries.
     #[must_use]
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// Bounds of the vector's entries.
+    /// Bounds of the parameter vector's entries.
     #[must_use]
     pub fn bounds(&self) -> &[(f64, f64)] {
         &self.bounds
     }
 
-    /// Positions of the entries that are fitted.
+    /// Indices of the free entries.
     #[must_use]
     pub fn free(&self) -> &[usize] {
         &self.free
     }
 
-    /// How many of the vector's entries are parameters, before the initial states.
+    /// Number of parameters, which come before the initial states.
     #[must_use]
     pub fn parameter_count(&self) -> usize {
         self.parameters
     }
 
-    /// The unit of every entry in words.
+    /// The unit of every entry as text.
     #[must_use]
     pub fn unit_labels(&self) -> Vec<String> {
         let record = &self.records[0];
@@ -240,12 +240,12 @@ impl<'a> Setup<'a> {
         units
     }
 
-    /// Entries of one record: its initial levels, what its lags begin with, the controller's states.
+    /// Number of entries of one record: its initial levels, the initial states of its lags, and the controller's states.
     pub(crate) fn states(&self) -> usize {
         (self.names.len() - self.parameters) / self.records.len()
     }
 
-    /// Puts the fixed parameters' values in their places.
+    /// Writes the values of the fixed parameters into a parameter vector.
     pub(crate) fn impose_fixed(&self, x: &mut [f64]) {
         for (name, value) in self.names.iter().zip(x) {
             if let Some(fixed) = self.fixed.get(name) {
@@ -254,14 +254,14 @@ impl<'a> Setup<'a> {
         }
     }
 
-    /// Holds every parameter; only initial levels stay free.
+    /// Fixes all parameters; only initial states remain free.
     pub fn freeze_parameters(&mut self) {
         let count = self.parameter_count();
         self.free.retain(|&i| i >= count);
     }
 
-    /// What the fitted numbers cost in the Bayesian information criterion, with a noise of so many coefficients and its variance:
-    /// the logarithm of the samples each, but two for an initial state.
+    /// BIC penalty of all estimated numbers: the free entries, the noise variances and `noise_order` noise coefficients. It is the
+    /// logarithm of the number of samples for each, but 2 for an initial state.
     #[must_use]
     pub fn price(&self, noise_order: usize) -> f64 {
         let states = self.free.iter().filter(|&&i| i >= self.parameters).count();
@@ -269,50 +269,50 @@ impl<'a> Setup<'a> {
         lasting as f64 * (self.samples() as f64).ln() + STATE_PRICE * states as f64
     }
 
-    /// Holds the initial states; only parameters stay free. For records that begin where a simulation has led to.
+    /// Fixes the initial states; only parameters remain free. For records whose initial state comes from a simulation.
     pub fn hold_initial_states(&mut self) {
         let count = self.parameter_count();
         self.free.retain(|&i| i < count);
     }
 
-    /// Samples of all outputs in all records, missing ones aside.
+    /// Number of samples of all outputs in all records, without missing ones.
     #[must_use]
     pub fn samples(&self) -> usize {
         self.samples.iter().sum()
     }
 
-    /// Samples of each output in all records, missing ones aside.
+    /// Number of samples of each output in all records, without missing ones.
     #[must_use]
     pub fn samples_per_output(&self) -> &[usize] {
         &self.samples
     }
 
-    /// Whether the controller of the loop reads this output.
+    /// Whether the controller uses this output.
     fn reads(&self, output: usize) -> bool {
         let controller = self.feedback.as_ref().map(|f| f.controller.output());
         controller == Some(output)
     }
 
-    /// How many outputs there are.
+    /// Number of outputs.
     #[must_use]
     pub fn outputs(&self) -> usize {
         self.samples.len()
     }
 
-    /// White noise at every output.
+    /// A white-noise model for every output.
     #[must_use]
     pub fn white_noise(&self) -> Noise {
         Noise::white(self.outputs())
     }
 
-    /// Positions of the initial states of record `r`.
+    /// Indices of the initial states of record `r`.
     fn states_of(&self, r: usize) -> std::ops::Range<usize> {
         let n = self.states();
         let from = self.parameter_count() + r * n;
         from..from + n
     }
 
-    /// Positions of the plant's initial states of record `r`, from 0, without those of the controller.
+    /// Indices of the plant's initial states of record `r`, counted from 0, without the controller's states.
     #[must_use]
     pub fn plant_states_of(&self, r: usize) -> std::ops::Range<usize> {
         let own = self.states_of(r);
@@ -320,13 +320,14 @@ impl<'a> Setup<'a> {
         own.start..own.end - controller
     }
 
-    /// The controller's initial states as they give the measured command of record `r`.
+    /// The controller's initial states that reproduce the measured command of record `r`.
     pub(crate) fn controller_states(&self, r: usize) -> &[f64] {
         self.feedback.as_ref().map_or(&[], |f| &f.replays[r].states)
     }
 }
 
-/// The inputs from sample `k` to the next one: the command, and that to a second pump or a measured disturbance; zero where there is none.
+/// The inputs from sample `k` to the next one: the command, and the second input (command to a second pump or measured disturbance), zero
+/// if there is none.
 pub fn commands(record: &Record, k: usize) -> [Command; 2] {
     let command = |u: &Channel| match u.hold {
         Hold::Zero => Command::held(u.values[k]),
@@ -335,7 +336,7 @@ pub fn commands(record: &Record, k: usize) -> [Command; 2] {
     [command(&record.inputs[0]), second(record, command)]
 }
 
-/// The second input at sample `k`, held: the command to a second pump or a measured disturbance; zero where there is none.
+/// The second input at sample `k`, held: the command to a second pump or a measured disturbance; zero if there is none.
 fn second_command(record: &Record, k: usize) -> Command {
     second(record, |u| Command::held(u.values[k]))
 }
@@ -344,7 +345,7 @@ fn second(record: &Record, command: impl Fn(&Channel) -> Command) -> Command {
     record.inputs.get(1).map_or(Command::held(0.0), command)
 }
 
-/// The inputs before a record began: its first ones.
+/// The inputs before the record began, taken as its first samples.
 #[must_use]
 pub fn at_rest(record: &Record) -> [f64; 2] {
     let second = record.inputs.get(1);
@@ -354,7 +355,7 @@ pub fn at_rest(record: &Record) -> [f64; 2] {
     ]
 }
 
-/// The pump in front of which something lags, the first one for what is not at a pump.
+/// Index of the pump at which a lag is; the first pump for a lag that is not at a pump.
 fn pump_of(lag: Placed) -> usize {
     if lag.effect.place == Place::Actuator {
         lag.vessel.min(1)
@@ -363,7 +364,7 @@ fn pump_of(lag: Placed) -> usize {
     }
 }
 
-/// The set point at sample `k`; not a number where the record has none.
+/// The set point at sample `k`; NaN if the record has none.
 fn reference(record: &Record, k: usize) -> f64 {
     record.references.first().map_or(f64::NAN, |r| r.values[k])
 }

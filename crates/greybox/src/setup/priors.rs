@@ -1,4 +1,4 @@
-//! What is known of parameters beside the records.
+//! Prior information on parameters.
 
 use std::collections::BTreeMap;
 
@@ -8,36 +8,36 @@ use serde::{Deserialize, Serialize};
 use super::Setup;
 use crate::Error;
 
-/// A side measurement of a parameter.
+/// A separate measurement of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PriorValue {
-    /// What was measured \[unit of the parameter\].
+    /// The measured value \[unit of the parameter\].
     pub value: f64,
-    /// Its standard error, above zero \[unit of the parameter\].
+    /// Standard error of the value, positive \[unit of the parameter\].
     pub std_error: f64,
 }
 
 impl Setup<'_> {
-    /// The same setup with what is known of parameters beside the records, by name: each counts as a reading of its own
-    /// ([`estimation::Prior`]). Those of parameters that are fixed play no part.
+    /// The same setup with prior information on parameters, by name: each prior counts as one additional reading ([`estimation::Prior`]).
+    /// Priors of fixed parameters have no effect.
     ///
-    /// They are part of every fit of these records, and stay with other structures; other records ([`Setup::with_records`]) go without them,
-    /// so that what is known counts once.
+    /// Priors are used in every fit of these records, also with other structures. A setup of other records ([`Setup::with_records`]) has no
+    /// priors, so that prior information is used only once.
     ///
     /// # Errors
-    /// Where the structure has no parameter of a name, a standard error is not above zero, or a value is far outside the bounds.
+    /// If the structure has no parameter of a name, a standard error is not positive, or a value is far outside the bounds.
     pub fn with_priors(mut self, priors: &BTreeMap<String, PriorValue>) -> Result<Self, Error> {
         let parameters = &self.names[..self.parameters];
         self.priors = priors_of(priors, parameters, &self.bounds)?;
         Ok(self)
     }
 
-    /// Moves the fitted entries of a start that are far from their priors near these.
+    /// Moves the free entries of a start vector that are far from their priors close to them.
     pub fn begin_near_priors(&self, x: &mut [f64]) {
         estimation::begin_near_priors(self, x);
     }
 
-    /// What is known of parameters beside the records, by name.
+    /// Prior information on parameters, by name.
     #[must_use]
     pub fn prior_values(&self) -> BTreeMap<String, PriorValue> {
         let priors = self.priors.iter();
@@ -55,7 +55,7 @@ impl Setup<'_> {
     }
 }
 
-/// Priors by the position of their parameter.
+/// Priors by the index of their parameter.
 ///
 /// # Errors
 /// As [`Setup::with_priors`].

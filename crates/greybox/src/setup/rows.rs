@@ -1,4 +1,4 @@
-//! The derivatives of a simulation, row by row.
+//! Derivatives of a simulation, sample by sample.
 
 use estimation::{Noise, Prior, Residuals, Rows, Sample, Triangle};
 use plants::{Dual, Simulator, SimulatorNumber};
@@ -53,23 +53,24 @@ impl Residuals for Setup<'_> {
 }
 
 impl Setup<'_> {
-    /// The folded rows `[d model/d x_free, measured - model]` of all outputs ([`estimation::linearise`]); `None` where the simulation is not
-    /// finite.
+    /// The R factor of the rows `[d model/d x_free, measured - model]` of all outputs ([`estimation::linearise`]); `None` if the simulation
+    /// is not finite.
     #[must_use]
     pub fn linearise(&self, x: &[f64], noise: &Noise) -> Option<Triangle> {
         estimation::linearise(self, x, noise)
     }
 
-    /// The rows `[d model/d x_free, measured - model]` of all samples ([`estimation::rows`]); `None` where the simulation is not finite.
+    /// The rows `[d model/d x_free, measured - model]` of all samples ([`estimation::rows`]); `None` if the simulation is not finite.
     #[must_use]
     pub fn rows(&self, x: &[f64]) -> Option<Rows> {
         estimation::rows(self, x)
     }
 
-    /// [`Residuals::each_row`]; no generic function, so that simulators with derivatives are compiled here and not again in every crate that fits.
+    /// [`Residuals::each_row`]. Not generic, so that simulators with derivatives are compiled in this crate and not again in every crate
+    /// that fits.
     #[inline(never)]
     fn show_rows(&self, x: &[f64], each: &mut dyn FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
-        // Parameters and one record's initial states; a few lane counts, so that short vectors stay cheap.
+        // A record needs derivatives by the parameters and by its own initial states. A few sizes of duals keep small problems fast.
         let parameters = self
             .free
             .iter()
@@ -96,7 +97,7 @@ impl Setup<'_> {
         self.each_row_in::<f64>(x, &[], each)
     }
 
-    /// Shows every row with derivatives by some of the entries, in simulators that run on this kind of number.
+    /// Passes every row, with derivatives by the entries `by`, to `each`; simulates with this number type.
     fn each_row_in<T: SimulatorNumber>(
         &self,
         x: &[f64],
@@ -108,12 +109,12 @@ impl Setup<'_> {
         }
         let columns = by.len() + 1;
         let outputs = self.outputs();
-        // The rows of all outputs at one instant.
+        // The rows of all outputs at one sample.
         let mut rows = vec![0.0; columns * outputs];
         let mut models = vec![f64::NAN; outputs];
         let count = self.parameter_count();
-        // What the commands of the loop do to the plant: its commands for the derivatives, for the residual what it was given
-        // less that.
+        // Response of the linearised plant to commands of the loop. Its input is, for the derivatives, minus the derivatives of the
+        // simulated command and, for the residual, the simulated command minus the measured one.
         let mut response: Option<(Response, Vec<f64>)> = self
             .feedback
             .as_ref()
@@ -125,8 +126,8 @@ impl Setup<'_> {
                 response.reset();
                 commands.fill(0.0);
             }
-            // Columns of this record: the free parameters and its own initial levels, in lanes of one simulator or,
-            // where they are too many, of several that run side by side.
+            // Columns of this record: the free parameters and its own initial states. They are the derivatives of one simulator or, if
+            // there are too many, of several simulators that run in parallel.
             let lanes: Vec<usize> = (0..by.len())
                 .filter(|&column| by[column] < count || own.contains(&by[column]))
                 .collect();

@@ -1,4 +1,4 @@
-//! What a setup shows at a vector: simulations on the measured command or in the loop, and what is left of the records.
+//! Simulations of a setup, on the measured command or in closed loop, and their residuals.
 
 use ct_signals::{Channel, Record};
 use plants::{MAX_VESSELS, Scales, Simulator, deciles};
@@ -6,19 +6,19 @@ use plants::{MAX_VESSELS, Scales, Simulator, deciles};
 use super::{Setup, at_rest, commands, reference, second_command};
 use crate::{Error, feedback::step};
 
-/// A loop that ran on its reference.
+/// Result of a closed-loop simulation driven by the reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoopRun {
-    /// The readings, a series for each record and output ([`estimation::Rows`] has their order).
+    /// The readings, a series for each record and output (in the order of [`estimation::Rows`]).
     pub output: Vec<Vec<f64>>,
     /// The controller's command, a series for each record.
     pub command: Vec<Vec<f64>>,
 }
 
-/// What a simulation shows.
+/// Result of a simulation on the measured command.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
-    /// The readings, a series for each record and output ([`estimation::Rows`] has their order).
+    /// The readings, a series for each record and output (in the order of [`estimation::Rows`]).
     pub output: Vec<Vec<f64>>,
     /// Smallest and largest level of each vessel over all records.
     pub level: [(f64, f64); MAX_VESSELS],
@@ -27,7 +27,7 @@ pub struct Simulated {
 }
 
 impl Setup<'_> {
-    /// Runs one record; `each` sees the simulator at every sample.
+    /// Simulates one record; `each` is called with the simulator at every sample.
     fn run(
         &self,
         record: &Record,
@@ -47,12 +47,12 @@ impl Setup<'_> {
     /// Simulates all records on their measured commands.
     ///
     /// # Errors
-    /// Where the vector has the wrong length, or nobody waits any more.
+    /// If the vector has the wrong length, or the computation was cancelled ([`Error::Stopped`]).
     pub fn simulate(&self, x: &[f64]) -> Result<Simulated, Error> {
         self.simulate_seeing(x, |_| ())
     }
 
-    /// The same; `see` is shown the levels at every sample.
+    /// As [`Setup::simulate`]; `see` is called with the levels at every sample.
     fn simulate_seeing(
         &self,
         x: &[f64],
@@ -95,10 +95,10 @@ impl Setup<'_> {
         Ok(simulated)
     }
 
-    /// The loop that runs on its reference; `None` where no controller is known.
+    /// Simulates the closed loop driven by the reference; `None` if the setup has no controller.
     ///
     /// # Errors
-    /// Where the vector has the wrong length.
+    /// If the vector has the wrong length.
     pub fn simulate_loop(&self, x: &[f64]) -> Result<Option<LoopRun>, Error> {
         let Some(feedback) = &self.feedback else {
             return Ok(None);
@@ -137,8 +137,8 @@ impl Setup<'_> {
         Ok(Some(run))
     }
 
-    /// What is taken for noise, a series for each record and output: measured minus model or, where the loop is simulated, the
-    /// disturbance at the plant's output that explains it. NaN where the sample is missing.
+    /// The signal that the noise model describes, a series for each record and output: measured minus model or, if the loop is simulated,
+    /// the estimated disturbance at the plant's output. NaN if the sample is missing.
     ///
     /// # Errors
     /// As [`Setup::simulate`].
@@ -155,7 +155,7 @@ impl Setup<'_> {
         })
     }
 
-    /// Measured minus model, both on the measured command, a series for each record and output; NaN where the sample is missing.
+    /// Measured minus model on the measured command, a series for each record and output; NaN if the sample is missing.
     ///
     /// # Errors
     /// As [`Setup::simulate`].
@@ -171,7 +171,7 @@ impl Setup<'_> {
             .collect())
     }
 
-    /// Root mean square of series at each output \[output unit\], missing samples aside.
+    /// Root mean square of the series of each output \[output unit\], without missing samples.
     #[must_use]
     pub fn rms_per_output(&self, series: &[Vec<f64>]) -> Vec<f64> {
         let of_output = |o: usize| {
@@ -184,19 +184,18 @@ impl Setup<'_> {
         (0..self.outputs()).map(of_output).collect()
     }
 
-    /// Root mean square of series, those of each output divided by its scale first; missing samples aside.
+    /// Root mean square of all series, each output divided by its scale; without missing samples.
     #[must_use]
     pub fn weighted_rms(&self, series: &[Vec<f64>], scales: &[f64]) -> f64 {
         weighted_rms(&self.rms_per_output(series), scales, &self.samples)
     }
 
-    /// The outputs of all records, in the order of series.
+    /// The measured outputs of all records, in the order of the series.
     pub fn measured(&self) -> impl Iterator<Item = &Channel> {
         self.records.iter().flat_map(|record| &record.outputs)
     }
 
-    /// Takes the smallest number of substeps for which halving the step moves no reading by more than `1e-6` of the
-    /// output's range.
+    /// Chooses the smallest number of substeps for which halving the step changes no reading by more than `1e-6` of the outputs' range.
     ///
     /// # Errors
     /// As [`Setup::simulate`].
@@ -206,8 +205,8 @@ impl Setup<'_> {
             (low.min(range.0), high.max(range.1))
         });
         let tolerance = 1e-6 * (high - low);
-        // The simulator itself cuts steps that are long against a time constant: until its cuts are the longer ones,
-        // halving changes nothing, which says nothing.
+        // The simulator cuts steps that are long against a time constant by itself. While these cuts are finer than the substeps, more
+        // substeps change nothing, which is no evidence of accuracy.
         let rounding = 1e-13 * low.abs().max(high.abs());
         let mut enough = None;
         self.substeps = 1;
@@ -237,10 +236,10 @@ impl Setup<'_> {
         Ok(())
     }
 
-    /// The scales that a simulation shows: levels of every vessel and the throughput.
+    /// The scales that a simulation gives: levels of every vessel and the throughput.
     ///
-    /// A level that is not measured is what the model makes it, a wrong model several times too high or too low: its
-    /// range reaches down to an empty vessel.
+    /// A level that is not measured is known from the model only, and a wrong model may have it several times too high or too low: its
+    /// range is therefore extended down to an empty vessel.
     ///
     /// # Errors
     /// As [`Setup::simulate`].
@@ -277,7 +276,7 @@ impl Setup<'_> {
         };
         scales.flow = (x[0] * mean(|record| Some(&record.inputs[0]))).abs();
         if scales.input_2.is_some() {
-            // The gain of a second pump is the second parameter, that of a disturbance the plant's last one.
+            // The gain of a second pump is the second parameter; the gain of a disturbance is the plant's last one.
             let gain = if plant.joined() {
                 1
             } else {
@@ -289,7 +288,7 @@ impl Setup<'_> {
     }
 }
 
-/// Root mean square over outputs with so many samples each, every one divided by its scale first.
+/// Root mean square over outputs with these numbers of samples, each output divided by its scale.
 #[must_use]
 pub fn weighted_rms(rms: &[f64], scales: &[f64], samples: &[usize]) -> f64 {
     let outputs = rms.iter().zip(scales).zip(samples);

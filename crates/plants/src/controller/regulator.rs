@@ -1,9 +1,9 @@
-//! A controller that runs: commands from references and readings.
+//! A running controller: it computes commands from set points and readings.
 
 use super::{Controller, Kind};
 use crate::{Error, Scalar};
 
-/// A controller that runs.
+/// A running controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Regulator<T> {
     pub(super) controller: Controller,
@@ -17,7 +17,7 @@ impl<T: Scalar> Regulator<T> {
         self.command_beside(reference, reading, 0.0, h)
     }
 
-    /// The same, where something else adds `beside` to the command before it is limited.
+    /// As [`Self::command`], with a signal `beside` that is added to the command before the limits.
     pub fn command_beside(&mut self, reference: f64, reading: T, beside: f64, h: f64) -> T {
         let error = -reading + reference;
         let limits = self.controller.limits;
@@ -65,7 +65,7 @@ impl<T: Scalar> Regulator<T> {
                 let wanted = at_rest + seen + error * r[0] + beside;
                 let given = limit(wanted);
                 self.limited = wanted.value() != given.value();
-                // What stands beside the controller does not pass through it.
+                // `beside` does not pass through the controller's recursion.
                 let own = given - at_rest - beside;
                 for i in 0..order {
                     let next = if i + 1 < order {
@@ -80,14 +80,14 @@ impl<T: Scalar> Regulator<T> {
         }
     }
 
-    /// Whether the last command was limited.
+    /// Whether the last command was at a limit.
     #[must_use]
     pub fn limited(&self) -> bool {
         self.limited
     }
 }
 
-/// A PI controller that runs.
+/// A running PI controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pi(Regulator<f64>);
 

@@ -1,4 +1,4 @@
-//! Limits, impossible settings, and controllers that are the same one.
+//! Limits, invalid settings, and equivalent forms of one controller.
 
 use super::*;
 
@@ -8,7 +8,7 @@ fn the_integral_stands_still_at_a_limit_and_comes_back_at_once() {
     for _ in 0..1000 {
         assert_eq!(pi.command(20.0, 0.0, 1.0), 5.0);
     }
-    // Had the integral wound up, the command would stay at the limit for a thousand samples.
+    // With windup, the command would stay at the limit for a thousand samples.
     assert!(pi.command(0.0, 1.0, 1.0) < 5.0);
 }
 
@@ -26,7 +26,7 @@ fn impossible_settings_are_refused() {
     assert!(Controller::continuous(&[1.0, 0.0, 0.0], &[1.0, 1.0], 1.0, none).is_err());
 }
 
-/// A PI written as R/S, sampled and in p, gives the same commands as long as nothing is limited.
+/// A PI controller written as R/S, in q and in p, gives the same commands while nothing is limited.
 #[test]
 fn a_pi_is_one_of_the_controllers_r_over_s() {
     let (gain, time, h) = (0.7, 30.0, 2.0);
@@ -47,7 +47,7 @@ fn a_pi_is_one_of_the_controllers_r_over_s() {
     }
 }
 
-/// A controller of second order in p against its own step response in closed form: `1/(p + a) + 1/(p + b)`.
+/// A second-order controller in p against its step response in closed form: `1/(p + a) + 1/(p + b)`.
 #[test]
 fn a_controller_in_p_is_sampled_exactly() {
     let (a, b, h) = (0.1, 0.4, 1.5);
@@ -77,7 +77,7 @@ fn the_linear_controller_is_the_one_that_runs() {
             let e = (0.5 * f64::from(k)).cos();
             let u: f64 = linear.c.iter().zip(&x).map(|(c, x)| c * x).sum::<f64>() + linear.d * e;
             let given = regulator.command(e, 0.0, 2.0);
-            // The operating point stands beside the recursion.
+            // The operating point is added outside the recursion.
             assert!((given - u).abs() < 1e-9, "{controller:?} {k}: {given} {u}");
             x = linear
                 .a

@@ -1,4 +1,4 @@
-//! `area_varies`: the vessel's surface changes with the level, as in a cone.
+//! `area_varies`: the vessel's surface changes with the level, as in a conical tank.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
@@ -32,12 +32,12 @@ fn parameters(_: &Site) -> Vec<ParameterInfo> {
 struct AreaVaries<T> {
     taper: T,
     operating_level: f64,
-    /// What a change of level is compared with: the operating level, as a rule.
+    /// Reference for the change of level: normally the operating level.
     scale: f64,
 }
 
 pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + use<T> {
-    // Levels counted from a zero in their middle have no operating level to compare with: then their range is the measure.
+    // If the level's zero is near the operating level, the operating level is no useful reference; the range of the level is used instead.
     let (low, high) = site.level();
     let operating_level = site.operating_level();
     let scale = if operating_level.abs() > 1e-3 * (high - low) { operating_level } else { (high - low).max(f64::MIN_POSITIVE) };
@@ -50,7 +50,7 @@ impl<T: Scalar> Law<T> for AreaVaries<T> {
     }
     fn area(&self, level: &T, area: &mut T) {
         let width = self.taper * (*level - self.operating_level) * (1.0 / self.scale) + 1.0;
-        // A vessel that has narrowed to a tenth does not narrow further: the surface never vanishes.
+        // The relative width is bounded below by 0.1, so that the surface is never zero.
         let width = width.max(T::constant(0.1));
         *area = *area * width * width;
     }

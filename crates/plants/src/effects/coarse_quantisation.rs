@@ -1,7 +1,7 @@
-//! `coarse_quantisation`: the reading moves in steps.
+//! `coarse_quantisation`: the reading is quantised.
 //!
-//! A converter rounds the sensor's signal with its noise. Such noise smooths the mean reading over the level: from a standard deviation of
-//! one step on, it is a straight line.
+//! An analogue-to-digital converter rounds the sensor signal with its noise. The noise acts as dither: it smooths the mean reading as a
+//! function of the level. For a standard deviation of one step or more, this function is a straight line.
 
 use std::f64::consts::{PI, SQRT_2};
 
@@ -27,8 +27,8 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let span = (high - low).max(f64::MIN_POSITIVE);
     let seen = site.output().reading_step;
     let hidden = site.output().hidden_step.map(|step| step.value);
-    // Readings in steps show the step themselves, and to more digits than any grid of starts has. Under noise that comes behind the
-    // steps what is not explained shows it.
+    // If the readings are quantised, they show the step exactly, with more digits than a grid of starts has. If noise is added after the
+    // quantiser, the residual shows the step.
     let step = if seen > 0.0 {
         seen
     } else {
@@ -58,11 +58,11 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
 
 /// Beyond so many standard deviations from a threshold, noise does not change the reading.
 const REACH: f64 = 7.0;
-/// Noise over step from which on the mean reading is the level, to 1e-8 of a step.
+/// Ratio of noise to step above which the mean reading equals the level, to 1e-8 of a step.
 const SMOOTH: f64 = 1.0;
-/// Most steps from zero to the level.
+/// Largest number of steps from zero to the level.
 const COUNTABLE: f64 = 1e12;
-/// Noise over step below which the reading is as without noise.
+/// Ratio of noise to step below which the reading is that without noise.
 const SHARP: f64 = 1e-6;
 
 struct CoarseQuantisation<T> {
@@ -78,18 +78,18 @@ impl<T: Scalar> Law<T> for CoarseQuantisation<T> {
     fn reading(&mut self, y: T, _t: f64) -> T {
         let (step, noise) = (self.step.value(), self.noise.value());
         let level = y.value() / step;
-        // Steps that are fine against the level's own digits, or a level that is not finite, cannot be counted.
+        // The number of steps is meaningless if a step is near the rounding error of the level, or if the level is not finite.
         let countable = level.abs() < COUNTABLE;
         if step <= 0.0 || noise >= SMOOTH * step || !countable {
             return y;
         }
         if noise <= SHARP * step {
             let count = level.round();
-            // The value is the step's. The slope by the level is that over a whole step, which is one: the slope at a point is
-            // zero and would stop every fit.
+            // The value is that of the quantised reading. The derivative by the level is the mean over a whole step, which is one: the
+            // derivative at a point is zero and would stop every fit.
             return T::with_slopes(step * count, [(y, 1.0), (self.step, count)]);
         }
-        // Each threshold, half-way between two readings, is passed with a probability; those out of reach below are passed surely.
+        // Each threshold, half-way between two readings, is exceeded with a probability; for thresholds far below the level it is one.
         let spread = noise / step;
         let mut threshold = (level - REACH * spread - 0.5).ceil();
         let (mut count, mut by_level, mut by_spread) = (threshold, 0.0, 0.0);

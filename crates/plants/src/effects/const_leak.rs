@@ -1,4 +1,4 @@
-//! `const_leak`: a constant flow leaves a vessel unseen.
+//! `const_leak`: an unmeasured constant flow leaves a vessel.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
@@ -25,7 +25,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         meaning: "flow that leaves unseen",
         absent: 0.0,
         lower: 0.0,
-        // More than this does not leak away unseen; out of a tank whose level nobody sees all of it may.
+        // A larger leak of a measured vessel would have been noticed; a vessel whose level is not measured may lose the whole flow.
         upper: if site.is_measured() { 0.3 } else { 1.0 } * flow,
         starts: vec![0.05 * flow],
     }]

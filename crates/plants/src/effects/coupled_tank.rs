@@ -1,5 +1,5 @@
-//! `coupled_tank`: another body of water pushes back: a side tank beside an only tank, or the lower of two tanks against
-//! the outflow of the upper one.
+//! `coupled_tank`: a second body of water reduces the outflow: a side tank connected to an only tank, or the lower of two tanks, which
+//! reduces the head of the upper tank's outflow.
 
 use super::{EffectInfo, Place};
 use crate::{Balance, Law, ParameterInfo, Plant, Scalar, Side, Site, Unit};
@@ -18,8 +18,9 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "K. J. Astrom, A.-B. Ostberg, A teaching laboratory for process control, IEEE Control Systems Magazine 6(5), 1986: coupled tanks.",
 };
 
-/// Nothing below the last vessel could push back on it, but beside an only one. Two linear tanks that push on each other are two
-/// linear tanks of other time constants, and no data can show it. Tanks that are joined by valves push back as they are.
+/// The last of several vessels has no vessel below that could reduce its outflow; an only vessel may have a side tank. Two coupled linear
+/// tanks are equivalent to two uncoupled linear tanks with other time constants, so no data can show the coupling. In tanks connected by
+/// valves the plant model has this coupling already.
 fn first_vessel(plant: Plant, vessel: usize) -> bool {
     vessel == 0 && plant != Plant::CascadedTanksLinear && !plant.joined()
 }
@@ -79,7 +80,7 @@ impl<T: Scalar> Law<T> for CoupledTank<T> {
     fn side(&self) -> Option<Side<T>> {
         match *self {
             Self::Side(side) => {
-                // A side tank of no surface takes nothing, and needs no state unless its derivative is wanted.
+                // A side tank with a surface of zero exchanges nothing, and needs a state only if the derivative by its surface is wanted.
                 let shows = side.share.value() != 0.0 || !side.share.same_derivatives(T::constant(0.0));
                 shows.then_some(side)
             }

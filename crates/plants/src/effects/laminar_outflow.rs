@@ -1,4 +1,4 @@
-//! `laminar_outflow`: a part of the outflow grows in proportion to the level.
+//! `laminar_outflow`: a part of the outflow is proportional to the level.
 
 use super::{EffectInfo, Place, torricelli_plant};
 use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
@@ -44,7 +44,8 @@ impl<T: Scalar> Law<T> for LaminarOutflow<T> {
         Some(Balance::Outflow)
     }
     fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
-        // A step may look below the bottom, from where nothing flows back; through a valve between two tanks it does.
+        // A stage of a step may have a level below the bottom, where the flow is zero; through a valve between two tanks the flow is
+        // negative for a negative head.
         let head = if self.both_ways { *level } else { level.max(T::constant(0.0)) };
         *outflow = *outflow + self.slope * head;
     }

@@ -1,4 +1,4 @@
-//! `leak_at_height`: a hole in the wall, through which water leaves once the level is above it.
+//! `leak_at_height`: a hole in the wall, through which water flows out when the level is above the hole.
 
 use super::{EffectInfo, Place, any_plant, spread};
 use crate::{Balance, Law, Outlet, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
@@ -20,8 +20,8 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.level();
     let span = (high - low).max(f64::MIN_POSITIVE);
-    // Half the throughput through a hole that is halfway up of a tank would have been seen. A linear balance describes stores of any
-    // kind: above a threshold another drain may let out as much as comes in.
+    // In a tank, a hole at half height through which half the throughput flows would have been noticed. A linear plant may be a store of
+    // any kind: above a threshold, a second outlet may take a flow as large as the inflow.
     let whole = site.scales.flow.abs() / (0.5 * span).sqrt();
     let (most, coefficients) = match site.plant.outlet() {
         Outlet::Torricelli => (0.5, vec![0.05 * whole]),
@@ -30,7 +30,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let mut starts = spread(low, high, 5);
     let mut lowest = low - 0.5 * span;
     if site.is_joined_to_next() {
-        // Of joined tanks any may leak at its bottom; that of a tank with an outlet of its own is the outlet's.
+        // A joined tank may leak at its bottom. In a tank with its own outlet such a leak is a part of the outlet's flow.
         starts.push(0.0);
         lowest = lowest.min(0.0);
     }

@@ -1,9 +1,8 @@
-//! The catalogue: one file per effect. To add an effect, write its file and name it in the list below,
-//! at its position in the chain.
+//! The catalogue: one file per effect. To add an effect, write its file and add its name to the list below, at its position in the chain.
 
 use crate::{Domain, Known, Law, ParameterInfo, Plant, Scalar, Site};
 
-/// Where in the chain an effect acts.
+/// The place of an effect in the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Place {
     /// Between the command and the inflow.
@@ -15,7 +14,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// In words.
+    /// The place as text.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -26,43 +25,44 @@ impl Place {
     }
 }
 
-/// What the catalogue says of an effect.
+/// The catalogue entry of an effect.
 #[derive(Debug)]
 pub struct EffectInfo {
     /// Identifier in model files and results.
     pub id: &'static str,
-    /// Where it acts.
+    /// Place in the chain.
     pub place: Place,
-    /// It follows the time alone, whatever the command and the level do. Such effects fit courses of any origin.
+    /// The effect depends on time only, not on the command or the level. Such effects can fit slow disturbances of any origin.
     pub by_clock: bool,
-    /// Its physics in a sentence, for tanks.
+    /// Its physics in one sentence, for tanks.
     pub physics: &'static str,
-    /// What it is outside hydraulics, as a clause; `None` for an effect that is offered in hydraulics only.
+    /// Its meaning outside hydraulics, as a clause; `None` for an effect of hydraulic plants only.
     ///
-    /// A drift and a step of the outflow coefficient are general: every linear plant has the coefficient, as its loss `1/tau`.
+    /// A drift and a step of the outflow coefficient are general: in every linear plant, the coefficient is the loss `1/tau`.
     pub general: Option<&'static str>,
     /// Its equation.
     pub equation: &'static str,
-    /// The plants, and their vessels (or pumps), it makes sense in; the sensor asks for an output.
+    /// The plants and their vessels (or pumps) for which the effect is meaningful; for an effect at the sensor, the index is that of an
+    /// output.
     pub applies: fn(Plant, usize) -> bool,
-    /// Its parameters at a place: the leading one, whose absent value switches the effect off, comes first.
+    /// Its parameters at a place. The first one is the size: its absent value switches the effect off.
     pub parameters: fn(&Site) -> Vec<ParameterInfo>,
-    /// Effects that data of this kind can hardly tell from it.
+    /// Effects that are hard to distinguish from it with data of this kind.
     pub confused_with: &'static [&'static str],
-    /// How a person confirms it at the plant.
+    /// How to confirm the effect at the plant.
     pub confirm: &'static str,
-    /// Where the equation is from.
+    /// Source of the equation.
     pub source: &'static str,
 }
 
 impl EffectInfo {
-    /// The effect of that identifier.
+    /// The effect with this identifier.
     #[must_use]
     pub fn find(id: &str) -> Option<&'static Self> {
         CATALOGUE.iter().copied().find(|effect| effect.id == id)
     }
 
-    /// What it is, in the words of a domain: the sentence of its physics, or the general clause.
+    /// Its description in a domain: the sentence of its physics, or the general clause.
     #[must_use]
     pub fn in_words(&self, domain: Domain) -> &'static str {
         match domain {
@@ -71,8 +71,8 @@ impl EffectInfo {
         }
     }
 
-    /// The bound of its size is one of physics, not of what is plausible: a limit or a rim beyond all that was visited does nothing, a
-    /// share is at most one, and a sensor that is further off would not be called one.
+    /// Whether the bound of its size is physical rather than a plausible range: a limit or a rim beyond the range of the data has no
+    /// effect, a share is at most one, and a sensor with a larger error is defective.
     #[must_use]
     pub fn bound_is_physical(&self) -> bool {
         let physical = [
@@ -91,7 +91,7 @@ impl EffectInfo {
         physical.contains(&self.id)
     }
 
-    /// The vessel that it acts in, or the pump, or the output, where nobody says which: of outputs the last one, into which the others lead.
+    /// The default index of the vessel, pump or output: for outputs the last one, into which the others lead.
     #[must_use]
     pub fn usual_site(&'static self, plant: Plant, known: &Known) -> usize {
         let mut sites = self.sites(plant, known);
@@ -102,7 +102,7 @@ impl EffectInfo {
         usual.unwrap_or(0)
     }
 
-    /// The vessels of a plant that it may act in, or its pumps, or its outputs; none where it makes no sense.
+    /// The vessels, pumps or outputs of a plant at which it may act; empty if it does not apply.
     pub fn sites(
         &'static self,
         plant: Plant,
@@ -121,10 +121,10 @@ macro_rules! catalogue {
     ($($module:ident),* $(,)?) => {
         $(mod $module;)*
 
-        /// Every effect, in chain order.
+        /// All effects, in chain order.
         pub static CATALOGUE: &[&EffectInfo] = &[$(&$module::INFO),*];
 
-        /// The law of an effect with its parameters, in the order of [`EffectInfo::parameters`].
+        /// The law of an effect with numerical parameters, in the order of [`EffectInfo::parameters`].
         pub(crate) fn bind<T: Scalar>(effect: &EffectInfo, site: &Site, parameters: &[T]) -> Option<Box<dyn Law<T>>> {
             $(if effect.id == $module::INFO.id {
                 return Some(Box::new($module::bind(site, parameters)));
@@ -173,30 +173,30 @@ pub(crate) fn chain_position(effect: &EffectInfo) -> usize {
         .unwrap_or(CATALOGUE.len())
 }
 
-/// Every plant.
+/// All plants.
 fn any_plant(_: Plant, _: usize) -> bool {
     true
 }
 
-/// Plants whose believed outflow follows a square root.
+/// Plants with a square-root outflow law.
 fn torricelli_plant(plant: Plant, _: usize) -> bool {
     plant.outlet() == crate::Outlet::Torricelli
 }
 
-/// Plants whose believed outflow is linear.
+/// Plants with a linear outflow law.
 fn linear_plant(plant: Plant, _: usize) -> bool {
     plant.outlet() == crate::Outlet::Linear
 }
 
-/// `from` to `to` in `n` equal parts, from the middle of the first to the middle of the last.
+/// The midpoints of `n` equal parts of the interval `from` to `to`.
 fn spread(from: f64, to: f64, n: usize) -> Vec<f64> {
     (0..n)
         .map(|i| from + (to - from) * (i as f64 + 0.5) / n as f64)
         .collect()
 }
 
-/// The smallest relative change of an outflow. A valve between two tanks may be shut altogether, and the level of neither then
-/// runs away: the estimate of a change of -1 scatters about it, so the bound lies a little beyond.
+/// Lower bound of the relative change of an outflow. A valve between two tanks may be closed completely without either level growing beyond
+/// bounds. The estimate of a change of -1 then scatters about -1, so the bound is slightly lower.
 fn fully_shut(site: &Site, otherwise: f64) -> f64 {
     if site.is_joined_to_next() {
         -1.1

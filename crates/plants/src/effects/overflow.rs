@@ -1,4 +1,4 @@
-//! `overflow`: the level cannot rise above the rim; what spills is lost, or reaches the next tank in part.
+//! `overflow`: the level cannot rise above the rim; the overflow is lost, or a part of it reaches the next tank.
 
 use super::{EffectInfo, Place, any_plant, spread};
 use crate::{Law, ParameterInfo, Rim, Scalar, Site, Unit};

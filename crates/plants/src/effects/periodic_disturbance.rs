@@ -1,4 +1,4 @@
-//! `periodic_disturbance`: somebody draws or adds water periodically.
+//! `periodic_disturbance`: a periodic unmeasured inflow or outflow.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
@@ -17,13 +17,13 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "R. Isermann, Fault-Diagnosis Systems, 2006: periodic signals of unknown frequency.",
 };
 
-/// Periods in the record that are tried beside the strongest line of the spectrum, the fewest and the most that are tried, and from one start to the next. Off by one period in the
-/// record, half of a sinusoid's signature is still there in its slope by the period; off by more, nothing is.
+/// Start values of the number of periods in the record, besides the strongest spectral line: smallest, largest, and spacing. If a start is
+/// off by one period per record, the sensitivity to the period still contains half of the sinusoid; if it is off by more, none.
 const PERIODS: (f64, f64, f64) = (2.5, 24.5, 1.0);
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (flow, duration) = (site.scales.flow.abs(), site.duration());
-    // Sine and cosine rather than size and phase: the model is then linear in both, and one start finds every phase.
+    // Sine and cosine amplitudes instead of amplitude and phase: the model is linear in both, and one start reaches every phase.
     let amplitude = |name, meaning, start| ParameterInfo {
         name,
         unit: Unit::FLOW,
@@ -50,7 +50,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
             meaning: "period",
             absent: f64::NAN,
             lower: (4.0 * site.scales.sample_interval).min(0.1 * duration),
-            // What has not come twice is no period: it would fit any slow course of time.
+            // The record must contain at least two periods: a longer period would fit any slow drift.
             upper: 0.5 * duration,
             starts: periods,
         },

@@ -1,4 +1,4 @@
-//! `pipe_height`: the outlet pipe leads down, and its height adds to the head that drives the outflow.
+//! `pipe_height`: a vertical outlet pipe below the tank adds its height to the head that drives the outflow.
 
 use super::{EffectInfo, Place, torricelli_plant};
 use crate::{Balance, Law, ParameterInfo, Plant, Scalar, Site, Unit};
@@ -17,7 +17,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "E. Torricelli, De motu gravium, 1643.",
 };
 
-/// In a vessel whose level is not measured the height only shifts the level, and no data can show it.
+/// Not identifiable in a vessel whose level is not measured: there the height only shifts the level.
 fn measured_vessel(plant: Plant, vessel: usize) -> bool {
     torricelli_plant(plant, vessel) && vessel + 1 == plant.vessels()
 }
@@ -31,13 +31,13 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         meaning: "height from the bottom of the tank to the end of the pipe",
         absent: 0.0,
         lower: 0.0,
-        // A pipe that is longer than the tank is deep would have been noticed.
+        // A pipe longer than the largest level would have been noticed.
         upper: most,
         starts: vec![0.1 * most],
     }]
 }
 
-/// A level of so little is none.
+/// Levels up to this one count as zero.
 const NOTHING: f64 = 1e-100;
 
 struct PipeHeight<T>(T);
@@ -51,9 +51,9 @@ impl<T: Scalar> Law<T> for PipeHeight<T> {
         Some(Balance::Outflow)
     }
     fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
-        // An empty tank lets nothing out, however long its pipe; and the square of a level has to be a number.
+        // An empty tank has no outflow, whatever the pipe's height. The threshold also keeps the square of a level from underflow.
         if level.value() > NOTHING {
-            // alpha sqrt(H) sqrt(1 + h/H): at h = 0 a factor of exactly one.
+            // alpha sqrt(H) sqrt(1 + h/H): the factor is exactly one at h = 0.
             *outflow = *outflow * (self.0 / *level + 1.0).sqrt();
         }
     }

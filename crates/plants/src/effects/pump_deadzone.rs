@@ -1,4 +1,4 @@
-//! `pump_deadzone`: below a threshold the command moves nothing.
+//! `pump_deadzone`: a command below a threshold has no effect.
 
 use super::{EffectInfo, Place, any_plant, spread};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};
@@ -45,7 +45,7 @@ pub(super) fn bind<T: Scalar>(_: &Site, parameters: &[T]) -> impl Law<T> + use<T
 
 impl<T: Scalar> Law<T> for PumpDeadzone<T> {
     fn command(&mut self, u: T, _t: f64) -> T {
-        // Odd, so that it is the identity at a threshold of zero whatever the sign of the command.
+        // An odd function, so that it is the identity at a threshold of zero for commands of either sign.
         if u.value() >= 0.0 {
             (u - self.0).max(T::constant(0.0))
         } else {

@@ -1,4 +1,4 @@
-//! `pump_gain_drift`: the pump's gain drifts over the record, evenly or as a pump that warms up.
+//! `pump_gain_drift`: the pump's gain drifts over the record, linearly or exponentially as a pump that warms up.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};
@@ -17,7 +17,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "I. J. Karassik et al., Pump Handbook, 4th ed., ch. 2: slip and temperature.",
 };
 
-/// A warm-up of so many records is a straight line, to a hundredth of the change.
+/// A warm-up with a time constant of so many record lengths is a straight line, to 1 % of the change.
 const STRAIGHT: f64 = 10.0;
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
@@ -45,7 +45,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
 }
 
 struct PumpGainDrift<T> {
-    /// The change that would be reached in the end.
+    /// The change after an infinite time.
     final_change: T,
     time_constant: T,
 }

@@ -1,4 +1,4 @@
-//! `pump_lag`: the inflow follows the command with a time constant.
+//! `pump_lag`: the inflow follows the command with a first-order lag.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};

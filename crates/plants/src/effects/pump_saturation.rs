@@ -1,4 +1,4 @@
-//! `pump_saturation`: above a limit the command moves nothing more.
+//! `pump_saturation`: the inflow does not increase for commands above a limit.
 
 use super::{EffectInfo, Place, any_plant, spread};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};
@@ -19,7 +19,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.input();
-    // Over all of the range, on what was visited most, and near the top.
+    // Starts over the whole range, over the most frequent commands, and near the maximum.
     let mut starts = spread(low, high, 4);
     starts.extend([0.3, 0.7, 0.9, 0.97].map(|share| site.input_quantile(share)));
     vec![ParameterInfo {

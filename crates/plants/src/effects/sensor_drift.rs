@@ -19,7 +19,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.measured_level();
-    // More than this no sensor drifts unseen.
+    // A larger drift of a sensor would have been noticed.
     let most = (0.3 * low.abs().max(high.abs())).max(high - low);
     vec![ParameterInfo {
         name: "change",

@@ -1,4 +1,4 @@
-//! `sensor_hysteresis`: after a high level the reading sticks too high, and drops back as the level falls.
+//! `sensor_hysteresis`: after a high level the reading stays too high, and returns to the level when the level falls below `drop`.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};
@@ -47,7 +47,7 @@ struct SensorHysteresis<T> {
     step: T,
     drop: T,
     rise: T,
-    /// Width of the drop: it takes a finite range of level, so that its place can be fitted.
+    /// Width of the return: a finite range of level, so that the reading has a derivative by `drop`.
     width: f64,
     stuck: T,
 }
@@ -67,7 +67,7 @@ impl<T: Scalar> Law<T> for SensorHysteresis<T> {
     fn reading(&mut self, y: T, _t: f64) -> T {
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         let above = y - self.drop;
-        // The branch that a rising level climbs, and the one that a falling level drops along.
+        // The branch for a rising level, and the branch along which the reading returns for a falling level.
         let rising = (above / self.rise).max(zero).min(one);
         let falling = (above * (1.0 / self.width)).max(zero).min(one);
         self.stuck = self.stuck.max(rising).min(falling.max(rising));

@@ -1,4 +1,4 @@
-//! `sensor_lag`: the reading follows the level with a time constant.
+//! `sensor_lag`: the reading follows the level with a first-order lag.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};

@@ -1,4 +1,4 @@
-//! `sensor_nonlinearity`: the reading bends away from the level; it is right at both ends of the range.
+//! `sensor_nonlinearity`: the reading is a curved function of the level, exact at both ends of the range.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};
@@ -23,7 +23,7 @@ fn parameters(_: &Site) -> Vec<ParameterInfo> {
         unit: Unit::ONE,
         meaning: "curvature: above zero the reading bends upwards",
         absent: 0.0,
-        // An eighth of the range at its middle: what bends more is no sensor of levels.
+        // An error of 1/8 of the range at its middle; no usable level sensor has a larger one.
         lower: -0.5,
         upper: 0.5,
         starts: vec![0.02],

@@ -1,4 +1,4 @@
-//! `sensor_offset`: the reading is shifted.
+//! `sensor_offset`: the reading has a constant error.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};
@@ -19,7 +19,8 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let (low, high) = site.measured_level();
-    // A live zero (4 to 20 mA, 2 to 10 V) reads a fifth of the range for an empty tank; more would have been seen.
+    // A sensor with a live zero (4 to 20 mA, 2 to 10 V) reads a fifth of the range for an empty tank; a larger offset would have been
+    // noticed.
     let most = 0.25 * low.abs().max(high.abs());
     vec![ParameterInfo {
         name: "offset",

@@ -1,4 +1,4 @@
-//! `sensor_saturation`: above a limit the reading does not rise.
+//! `sensor_saturation`: the reading has an upper limit.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};

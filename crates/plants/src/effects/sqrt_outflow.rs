@@ -1,4 +1,4 @@
-//! `sqrt_outflow`: the outflow of a vessel that is believed linear follows Torricelli's square root.
+//! `sqrt_outflow`: the outflow of a vessel with a nominally linear outflow law follows Torricelli's square root.
 
 use super::{EffectInfo, Place, linear_plant};
 use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit, vessels::square_root};
@@ -44,8 +44,8 @@ impl<T: Scalar> Law<T> for SqrtOutflow<T> {
     }
     fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
         let root = self.operating_level.sqrt();
-        // More than the square root bends the outflow down again, from some level on. No outlet does that: what is added
-        // stays what it was there, and what it is at empty below.
+        // With more curvature than a square root, the outflow would decrease above some level, which no outlet does. Above that level the
+        // added flow keeps its value there; below empty it keeps its value at empty.
         let excess = self.curvature - 1.0;
         let mut level = level.max(T::constant(0.0));
         if excess.value() > 0.0 {

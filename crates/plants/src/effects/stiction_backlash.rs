@@ -1,4 +1,4 @@
-//! `stiction_backlash`: what the command moves has play, or sticks and slips.
+//! `stiction_backlash`: the actuator has backlash or stiction.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};
@@ -17,13 +17,13 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "Q. P. He, J. Wang, M. Pottmann, S. J. Qin, A curve fitting method for detecting valve stiction in oscillating control loops, Ind. Eng. Chem. Res. 46, 2007.",
 };
 
-/// Widths that are tried, as shares of the range of the command, in two parts: the least, how many, and the factor from one to the
-/// next. Where it sticks the error is in plain sight only within a tenth of the true width, so the grid has to be this fine; where the
-/// width is near the range of the command it moves at the extremes alone, and the grid has to be finer. The largest is nearly twice the
-/// range: so wide a band is left only if the valve begins near an end of it.
+/// Start values of the width, as shares of the range of the command, in two geometric grids: smallest value, number, and ratio. With
+/// stiction, the cost has a visible minimum only within a tenth of the true width, so the grid is this fine. For widths near the range of
+/// the command, the actuator moves only at extreme commands, and the grid is finer. The largest start is nearly twice the range: a valve
+/// with so wide a band moves only if it begins near an end of the band.
 const WIDTHS: [(f64, i32, f64); 2] = [(0.03, 14, 1.2), (0.38, 18, 1.1)];
-/// The largest width, as a share of the range of the command. Beyond, a valve that sticks moves only where it begins at an end of
-/// its band, and the width cannot be told from where it begins.
+/// Upper bound of the width, as a share of the range of the command. Beyond it, a sticking valve moves only if it begins at an end of its
+/// band, and the width and the initial position cannot be identified separately.
 const WIDEST: f64 = 2.2;
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
@@ -61,10 +61,10 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     ]
 }
 
-/// How far a width is varied for its slope, as a share of it, and by how much `begin` is.
+/// Perturbation for the derivatives by finite differences: of the width, relative; of `begin`, absolute.
 const VARIED: f64 = 0.05;
 
-/// One element that sticks.
+/// One element with stiction or backlash.
 #[derive(Clone, Copy)]
 struct Element<T> {
     width: f64,
@@ -74,7 +74,7 @@ struct Element<T> {
 }
 
 impl<T: Scalar> Element<T> {
-    /// Half the band in which it stays.
+    /// Half the width of the band in which the element does not move.
     fn half_band(&self) -> f64 {
         0.5 * self.width * (1.0 + self.jump)
     }
@@ -91,12 +91,12 @@ impl<T: Scalar> Element<T> {
     }
 }
 
-/// An element varied to either side in one of its parameters.
+/// Two elements, perturbed upwards and downwards in one parameter.
 #[derive(Clone, Copy)]
 struct Varied<T> {
     below: Element<T>,
     above: Element<T>,
-    /// One over the difference of the parameter between the two.
+    /// Inverse of the parameter's difference between the two elements.
     inverse: f64,
 }
 
@@ -106,9 +106,10 @@ impl<T: Scalar> Varied<T> {
     }
 }
 
-/// The slope of a position by the width is zero almost everywhere for an element that slips: the position changes where a slip is
-/// won or lost. The slope is therefore that of a chord: an element a little narrower and one a little wider follow the same
-/// command beside it. So it is with where it begins. Which of the two it is, backlash or stiction, is a choice, made by the starts; it
+/// For an element with stiction, the derivative of the position by the width is zero almost everywhere: the position changes only where a
+/// slip occurs or no longer occurs. A finite difference is used instead: a slightly narrower and a slightly wider element follow the same
+/// command. The derivative by `begin` is computed in the same way. The choice between backlash and stiction is made by the starts; it has
+/// no derivative, and a fit does not change it.
 /// has no slope, and a fit does not move it.
 struct StictionBacklash<T> {
     width: T,
@@ -123,10 +124,10 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
     let [width, jump, begin] = [0, 1, 2].map(|i: usize| parameters[i].value());
     let (low, high) = site.input();
     let element = Element { width, jump, begin, position: T::constant(0.0) };
-    // At no width at all the chord is short and lies on the one side that there is.
+    // At a width of zero the difference is one-sided, with a small perturbation.
     let reach = (VARIED * width).max(1e-6 * (high - low).abs());
     let (narrower, wider) = ((width - reach).max(0.0), width + reach);
-    // At an end of the band the chord lies on the one side that there is.
+    // At an end of the band the difference is one-sided.
     let (lower, upper) = ((begin - VARIED).max(-1.0), (begin + VARIED).min(1.0));
     StictionBacklash {
         width: parameters[0],

@@ -1,4 +1,4 @@
-//! `transport_delay`: the inflow follows the command after a dead time, as water takes to run through a pipe.
+//! `transport_delay`: the inflow follows the command after a dead time, for example the time of flow through a pipe.
 
 use super::{EffectInfo, Place, any_plant};
 use crate::{Law, ParameterInfo, Scalar, Site, Unit};

@@ -1,4 +1,4 @@
-//! `valve_drift`: the outlet clogs or wears over the record.
+//! `valve_drift`: the outflow coefficient drifts over the record, because the outlet clogs or wears.
 
 use super::{EffectInfo, Place, any_plant, fully_shut};
 use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};

@@ -1,4 +1,4 @@
-//! `valve_step`: the outlet changes at one instant.
+//! `valve_step`: the outflow coefficient changes at one instant.
 
 use super::{EffectInfo, Place, any_plant, fully_shut, spread};
 use crate::{Balance, Law, ParameterInfo, Scalar, Site, Unit};
@@ -21,7 +21,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     let duration = site.duration();
     let mut changes = vec![0.01];
     if site.is_joined_to_next() {
-        // A tank behind a shut valve fills and empties alone: no small change leads there.
+        // A tank behind a closed valve fills and empties alone; a fit that starts from a small change does not reach this solution.
         changes.push(-0.9);
     }
     vec![
@@ -66,7 +66,7 @@ impl<T: Scalar> Law<T> for ValveStep<T> {
         }
     }
     fn switch(&self) -> Option<T> {
-        // A change of nothing needs no cut, unless its derivative is wanted.
+        // A change of zero needs no cut of the step, unless its derivative is wanted.
         let none = T::constant(0.0);
         let shows = self.change.value() != 0.0 || !self.change.same_derivatives(none);
         shows.then_some(self.time)

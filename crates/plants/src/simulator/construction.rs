@@ -1,4 +1,4 @@
-//! A simulator from the structure of a plant, its parameters and initial states.
+//! Construction of a simulator from a structure, its parameters and initial states.
 
 use super::{Disturbance, Joined, Layout, SecondPump, Simulator, SimulatorNumber};
 use crate::actuator::Actuator;
@@ -7,12 +7,11 @@ use crate::vessels::{Valves, Vessels};
 use crate::{Error, Outlet, Place, Scalar, Structure, effects, term};
 
 impl<T: SimulatorNumber> Simulator<T> {
-    /// `theta` in the order of [`Structure::parameters`], `initial` the level of each vessel when the record begins
-    /// and, where the lags had not settled by then, an excess for each of [`Structure::lags`]; `at_rest` the command
-    /// before the record began.
+    /// `theta`: in the order of [`Structure::parameters`]. `initial`: the level of each vessel when the record begins and, if the lags do
+    /// not start in steady state, an excess for each of [`Structure::lags`]. `at_rest`: the constant command before the record began.
     ///
     /// # Errors
-    /// Where the number of parameters or initial values is not the structure's.
+    /// If the number of parameters or initial values is wrong for the structure.
     pub fn new(
         structure: &Structure,
         theta: &[T],
@@ -22,8 +21,8 @@ impl<T: SimulatorNumber> Simulator<T> {
         Self::with_inputs(structure, theta, initial, [at_rest, 0.0])
     }
 
-    /// The same for a plant with two pumps: what either was told before the record began. A measured disturbance
-    /// ([`crate::Known::disturbance`]) has no memory, and its value before is not used.
+    /// As [`Simulator::new`] for a plant with two pumps: `at_rest` holds both commands before the record began. A measured disturbance
+    /// ([`crate::Known::disturbance`]) has no memory, so its value before the record is not used.
     ///
     /// # Errors
     /// As [`Simulator::new`].
@@ -36,8 +35,8 @@ impl<T: SimulatorNumber> Simulator<T> {
         Self::starting_at(0.0, structure, theta, initial, at_rest)
     }
 
-    /// The same for a record that begins at `start` \[s\] on the clock that drifts, steps and periods follow: a later part of an
-    /// experiment.
+    /// As [`Simulator::with_inputs`] for a record that is a later part of an experiment: it begins at `start` \[s\] on the clock of drifts,
+    /// steps and periods.
     ///
     /// # Errors
     /// As [`Simulator::new`].
@@ -53,7 +52,7 @@ impl<T: SimulatorNumber> Simulator<T> {
 }
 
 impl<T: Scalar> Simulator<T> {
-    /// [`Simulator::starting_at`].
+    /// Implementation of [`Simulator::starting_at`].
     pub(super) fn construct(
         start: f64,
         structure: &Structure,
@@ -134,7 +133,7 @@ impl<T: Scalar> Simulator<T> {
         let outputs = &structure.scales.outputs;
         let mut vessels = Vec::new();
         let mut sensors: Vec<Vec<_>> = outputs.iter().map(|_| Vec::new()).collect();
-        // The laws of joined vessels once more without derivatives.
+        // A copy of the laws of joined vessels without derivatives.
         let plain: Vec<f64> = theta.iter().map(|value| value.value()).collect();
         let mut values = Vec::new();
         let mut at = own;
@@ -177,7 +176,7 @@ impl<T: Scalar> Simulator<T> {
         let read = outputs.iter().map(|output| output.vessel.min(n - 1));
         let mut sensors: Vec<(usize, Sensor<T>)> =
             read.zip(sensors.into_iter().map(Sensor::new)).collect();
-        // An effect is on once, so no more than one lags.
+        // A structure has an effect at most once, so at most one sensor has a lag.
         let lagging = sensors.iter().position(|(_, sensor)| sensor.has_lag());
         let sample = structure.scales.sample_interval;
         for (lag, &before) in lags.iter().zip(before) {

@@ -1,17 +1,17 @@
-//! The numbers that a simulator is compiled for.
+//! The number types for which the simulator is compiled.
 //!
-//! A generic function is compiled again in every crate that calls it, and the code of a simulator is large: its entry points belong to the
-//! number instead, so that the code for each number is compiled in this crate alone.
+//! A generic function is compiled again in every crate that calls it, and the code of a simulator is large. Its entry points are therefore
+//! methods of the number type, so that the code for each type is compiled in this crate only.
 
 use super::{Command, Simulator};
 use crate::{Dual, Error, Scalar, Structure};
 
-/// What [`Simulator`] does, for one kind of number.
+/// The methods of [`Simulator`] for one number type.
 pub trait Compiled: Scalar {
     /// [`Simulator::starting_at`].
     ///
     /// # Errors
-    /// As there.
+    /// As [`Simulator::starting_at`].
     fn starting_at(
         start: f64,
         structure: &Structure,
@@ -27,7 +27,7 @@ pub trait Compiled: Scalar {
     fn step(simulator: &mut Simulator<Self>, from: Self, to: Option<f64>, second: Command, h: f64);
 }
 
-/// The numbers that a [`Simulator`] runs on: `f64`, and duals with 4, 8, 12 or 15 derivatives.
+/// The number types of a [`Simulator`]: `f64`, and duals with 4, 8, 12 or 15 derivatives.
 pub trait SimulatorNumber: Compiled {}
 
 impl<T: Compiled> SimulatorNumber for T {}
@@ -62,5 +62,5 @@ macro_rules! compile_for {
     )*};
 }
 
-// With one derivative more than 15 a compiler copies a dual by a call instead of in registers: half as fast.
+// With more than 15 derivatives the compiler copies a dual by a function call instead of in registers, which is half as fast.
 compile_for!(f64, Dual<4>, Dual<8>, Dual<12>, Dual<15>);

@@ -1,4 +1,4 @@
-//! The vessels' balance equations: rates, and how fast each vessel is.
+//! The vessels' balance equations: the rates of the levels, and the decay rate of each vessel.
 
 use crate::{Outlet, Scalar, Side, inflow::Inflow};
 
@@ -8,8 +8,8 @@ use super::{
     torricelli::{A_LITTLE, slope_of_root, square_root},
 };
 
-/// A time within a step that begins and lasts with derivatives.
-// Inlined, its division is taken out of the loop over the vessels, and done where there is no clock too, on whatever stands there.
+/// The time `t` within a step whose beginning and length have derivatives.
+// If it were inlined, the compiler would move the division out of the loop over the vessels and execute it also for steps without a clock.
 #[cold]
 #[inline(never)]
 fn time_by<T: Scalar>(&(start, length): &(T, T), t: f64) -> T {
@@ -18,7 +18,7 @@ fn time_by<T: Scalar>(&(start, length): &(T, T), t: f64) -> T {
     } else {
         (t - start.value()) / length.value()
     };
-    // The value is `t` to the last bit, as it is where there are no derivatives.
+    // The value is exactly `t`, as in a step without derivatives.
     let moved = start + length * share;
     moved - moved.value() + t
 }
@@ -33,7 +33,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
     }
 
-    /// What vessel `i` alone lets out at a level or, through a valve, at a head.
+    /// Outflow of vessel `i` without effects at a level or, for an outlet through a valve, at a head.
     #[inline(always)]
     pub(super) fn own_outflow(&self, i: usize, level: &T) -> T {
         let vessel = &self.vessels[i];
@@ -46,8 +46,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
     }
 
-    /// The head that drives the outflow of vessel `i` where nothing acts on it: its level or, through a valve, by how much that is
-    /// above the next one.
+    /// The head of vessel `i` without effects: its level or, for an outlet through a valve, its level minus that of the next vessel.
     #[inline(always)]
     pub(super) fn own_head(&self, i: usize, level: &T, levels: &Levels<T, N>) -> T {
         if Self::JOINED && i + 1 < N {
@@ -69,7 +68,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         head
     }
 
-    /// What flows out of vessel `i` to the next one at a level, the other levels being `levels`.
+    /// Outflow of vessel `i` to the next one at a level, the other levels being `levels`.
     #[inline(always)]
     pub(super) fn outflow(&self, i: usize, level: &T, levels: &Levels<T, N>, t: &T) -> T {
         let vessel = &self.vessels[i];
@@ -84,13 +83,13 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         outflow
     }
 
-    /// What flows out of vessel `i` to the next one, and its net inflow.
+    /// Outflow of vessel `i` to the next one, and its net inflow.
     #[inline(always)]
     pub(super) fn balance(&self, i: usize, inflow: T, levels: &Levels<T, N>, t: f64) -> (T, T) {
         let level = &levels[i];
         let laws = &self.vessels[i].laws;
         if !laws.flows {
-            // At most its surface changes.
+            // No effect changes a flow; an effect may still change the surface.
             let outflow = self.own_outflow(i, &self.own_head(i, level, levels));
             return (outflow, inflow - outflow);
         }
@@ -109,7 +108,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         (outflow, net)
     }
 
-    /// What flows to a side tank for each unit of level that it stands below its vessel.
+    /// Flow to a side tank per unit of level difference between the vessel and the side tank.
     #[inline]
     fn exchange(&self, side: &Side<T>) -> T {
         self.vessels[0].area * side.share * side.rate
@@ -126,8 +125,8 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         area
     }
 
-    /// The rate of vessel `i` at a level. The nominal area goes in as its inverse, and an area that is nominal as a
-    /// factor of one, so that both ways give the same bits.
+    /// Rate of vessel `i` at a level. The nominal area enters as its inverse, and an effect on the area as a factor that is one if there is
+    /// no effect, so that both forms give identical bits.
     #[inline(always)]
     pub(super) fn rate(&self, i: usize, level: &T, net: T) -> T {
         let vessel = &self.vessels[i];
@@ -150,7 +149,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         rates
     }
 
-    /// The same in place; a rate that is zero for now is written too.
+    /// As [`Vessels::rates`], in place; a rate that is zero in the present mode is written too.
     #[inline(always)]
     pub(super) fn rates_into(&self, rates: &mut Levels<T, N>, levels: &Levels<T, N>, q: T, t: f64) {
         let mut inflow = q;
@@ -161,7 +160,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             let (outflow, net) = self.balance(i, inflow, levels, t);
             inflow = outflow;
             if vessel.spilling {
-                // The level stands at the rim, and the net inflow spills; where it turns negative the mode ends.
+                // The level is at the rim, and the net inflow overflows; when the net inflow becomes negative, this mode ends.
                 inflow = inflow + net * vessel.rim.fraction;
                 rates[i] = T::constant(0.0);
             } else {
@@ -174,7 +173,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
     }
 
-    /// Rates of linear vessels without effects, written as in [`Vessels::rates`].
+    /// Rates of linear vessels without effects, with the operations of [`Vessels::rates`].
     pub(super) fn linear_rates(&self, levels: &Levels<T, N>, q: T, t: f64) -> Levels<T, N> {
         if self.feed.is_some() {
             return self.fed_linear_rates(levels, q, t);
@@ -190,7 +189,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         rates
     }
 
-    /// The net inflow of vessel `i` at levels, in the present modes.
+    /// The net inflow of vessel `i` at given levels, in the present modes.
     pub(super) fn net(&self, i: usize, levels: &Levels<T, N>, q: T, t: f64) -> T {
         let mut inflow = q;
         for (k, vessel) in self.vessels.iter().enumerate().take(i) {
@@ -206,8 +205,9 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         self.balance(i, inflow, levels, t).1
     }
 
-    /// By how much a level of vessel `i`, the others being as they are, slows its own rise where it is higher \[1/s\]: what the effects add to it by a difference, so that it
-    /// vanishes with them.
+    /// Decay rate of vessel `i` at a level, the negative derivative of the level's rate by the level, with the other levels held \[1/s\].
+    /// The contribution of the effects is a finite difference of their contribution to the outflow alone, so that it is zero for effects at
+    /// their absent values.
     pub(super) fn slope(&self, i: usize, level: T, t: f64) -> T {
         let vessel = &self.vessels[i];
         if Self::JOINED {
@@ -234,12 +234,12 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         slope * vessel.inverse * (vessel.area / self.area(i, &level))
     }
 
-    /// How fast each vessel forgets its level \[1/s\].
+    /// The decay rate of each vessel's level \[1/s\].
     pub(super) fn forgetting(&self, t: f64) -> [T; N] {
         let mut rates = [T::constant(0.0); N];
         for (i, rate) in rates.iter_mut().enumerate().take(self.vessels.len()) {
             *rate = match self.linear {
-                // Where the vessels' own forgetting is exact it alone is meant.
+                // For linear vessels, only the nominal decay is integrated exactly.
                 Some(_) => self.vessels[i].inverse,
                 None => self.slope(i, self.levels[i], t).max(T::constant(0.0)),
             };
@@ -250,16 +250,16 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         rates
     }
 
-    /// How many time constants of its fastest vessel a step of length `h` lasts, up to a factor of two: what
-    /// Runge-Kutta must not be asked. It looks at values alone, so that derivatives follow one path.
+    /// Length `h` of the step in time constants of the fastest vessel, within a factor of two, to decide whether a Runge-Kutta step is
+    /// stable. Computed from values only, so that values and derivatives are integrated with the same steps.
     #[inline]
     pub(super) fn stiffness(&self, h: f64, q: &Inflow<T>, t: f64) -> f64 {
         let mut most = 0.0_f64;
         for (i, vessel) in self.vessels.iter().enumerate() {
             let level = self.levels[i];
             match vessel.outlet {
-                // The outflow bends downwards from zero, so its slope is less than outflow/level: half of it for a root.
-                // An empty vessel is taken as one with a little in it: its slope is the same, and it may be about to fill.
+                // The outflow is a concave function of the level, zero at zero, so its slope is below outflow/level (for a square root:
+                // half of it). An empty vessel is replaced by a nearly empty one: the slope is the same, and the vessel may begin to fill.
                 Outlet::Torricelli => {
                     let height = level.value().max(A_LITTLE);
                     let VesselLaws {
@@ -276,17 +276,17 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
                         let level = T::constant(height);
                         let now = T::constant(t);
                         let outflow = self.outflow(i, &level, &self.levels, &now).value();
-                        // What pushes back leaves a smaller head, of the same slope.
+                        // Backflow reduces the head, but not the slope by the head.
                         let head = self.head(i, &level, &self.levels).value().max(A_LITTLE);
                         (outflow, head * self.area(i, &level).value())
                     };
-                    // Without the division in the common case.
+                    // This form needs no division in the common case.
                     if h * outflow > 2.0 * STEP_LIMIT * content {
                         most = most.max(0.5 * h * outflow / content);
                     }
                 }
                 Outlet::Linear if !vessel.laws.any => {}
-                // The vessel's own forgetting is exact; here it is what the effects add to it.
+                // The nominal decay of a linear vessel is integrated exactly; only the decay that the effects add counts.
                 Outlet::Linear => {
                     let own = 1.0 / vessel.area.value().abs();
                     let slope = self.slope(i, self.levels[i], t).value().abs();

@@ -1,16 +1,17 @@
-//! An implicit step of joined tanks: Euler's rule for all levels at once, of order one. It cannot overshoot, whatever its length.
+//! An implicit step of joined tanks: the implicit Euler method for all levels together, of order one, stable for any step length.
 //!
-//! Newton's method runs on values; one step more, in duals, gives the solution its derivatives.
+//! Newton's method iterates on values; one more iteration, in duals, gives the derivatives of the solution.
 
 use crate::{Scalar, inflow::Inflow};
 
 use super::{Levels, Stretch, Vessels, Watch};
 
-/// Iterations of Newton's method on values, and the share of the largest level to which they are taken: the last step squares it.
+/// Largest number of Newton iterations on values, and their tolerance as a share of the largest level: the final iteration squares the
+/// error.
 const NEWTON: (usize, f64) = (30, 1e-8);
 
 impl<T: Scalar, const N: usize> Vessels<T, N> {
-    /// The step; `values`: the same vessels without derivatives.
+    /// The implicit step; `values`: a copy of the vessels without derivatives.
     pub(super) fn exchange_implicitly(
         &mut self,
         values: &mut Vessels<f64, N>,
@@ -32,7 +33,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         self.keep_within();
     }
 
-    /// A step of Newton's method for `x = levels + h f(x)`, from values `x`.
+    /// One Newton iteration for `x = levels + h f(x)`, starting at values `x`.
     fn newton(&self, coupling: &Coupling<N>, x: &[f64; N], h: T, q: T, t: f64) -> Levels<T, N> {
         let x = x.map(T::constant);
         let rates = self.rates(&x, q, t);
@@ -43,7 +44,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
 }
 
 impl<const N: usize> Vessels<f64, N> {
-    /// The levels after an implicit step to time `t`, and what the step was solved by.
+    /// The levels after an implicit step to time `t`, and the factorised Jacobian of the last iteration.
     fn settled(&self, h: f64, q: f64, t: f64) -> ([f64; N], Coupling<N>) {
         let reach = self.levels.iter().map(|level| level.abs());
         let small = NEWTON.1 * reach.fold(1e-3, f64::max);
@@ -67,8 +68,8 @@ impl<const N: usize> Vessels<f64, N> {
         (there, coupling)
     }
 
-    /// How much of the way from levels to others may be gone until a head is zero: beyond it a root's slope is another one, and
-    /// Newton's method would go to and fro for ever.
+    /// The share of the way between two sets of levels at which the first head is zero. Beyond that point the slope of the square root is a
+    /// different one, and a full Newton step could oscillate for ever.
     fn as_far_as_a_root(&self, from: &[f64; N], to: &[f64; N]) -> f64 {
         let width = self.valves.map_or(0.0, |valves| valves.width);
         let mut share = 1.0_f64;
@@ -82,7 +83,7 @@ impl<const N: usize> Vessels<f64, N> {
         share
     }
 
-    /// How the levels hang together over an implicit step, at levels `x`.
+    /// The Jacobian of the implicit equation at levels `x`, factorised.
     fn coupling(&self, x: &[f64; N], h: f64, t: f64) -> Coupling<N> {
         let mut coupling = Coupling {
             lower: [0.0; N],
@@ -117,7 +118,7 @@ impl<const N: usize> Vessels<f64, N> {
     }
 }
 
-/// A tridiagonal system, each row a tank, as Thomas's algorithm leaves it.
+/// A tridiagonal matrix, one row for each tank, factorised by the Thomas algorithm.
 struct Coupling<const N: usize> {
     lower: [f64; N],
     upper: [f64; N],

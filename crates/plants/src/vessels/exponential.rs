@@ -1,39 +1,40 @@
-//! One step beside an exact flow: that of linear vessels, which effects disturb, or each vessel's own forgetting.
+//! A step that integrates a deviation from an exact solution: that of linear vessels without effects, or each vessel's exponential decay.
 //!
-//! What is added to the exact flow is integrated by Runge-Kutta of order four where the step is short against the
-//! vessels' time constants, and by the exponential Runge-Kutta step of [`Damped`] where it is long: the stages of S. M.
-//! Cox and P. C. Matthews (2002), equations (26) to (29), for a chain, in which each vessel also drives the next one.
+//! The deviation is integrated by a Runge-Kutta step of order four if the step is short against the vessels' time constants, and by the
+//! exponential Runge-Kutta step of [`Damped`] if it is long: the stages of S. M. Cox and P. C. Matthews (2002), equations (26) to (29), for
+//! a chain in which each vessel also drives the next one.
 
 use crate::{Scalar, damped::Damped, inflow::Inflow, linear::Propagators};
 
 use super::{Levels, Vessels, fed::brought};
 
-/// Linear vessels have an exact flow; what effects add to it is integrated beside it, so that it vanishes with them.
+/// Linear vessels have an exact solution; the deviation that effects cause is integrated separately, so that it is exactly zero for effects
+/// at their absent values.
 pub(super) struct LinearFlow<T> {
     pub whole: Propagators<T>,
     pub half: Propagators<T>,
-    /// The second vessel alone, where a measured disturbance flows into it: what that brings adds to the rest.
+    /// The second vessel alone, if a measured disturbance flows into it: by superposition, its contribution is added.
     pub fed: Option<Propagators<T>>,
-    /// Effects act, so that the exact flow is not all.
+    /// Effects are active, so that the exact solution of the nominal vessels is not complete.
     pub disturbed: bool,
 }
 
-/// The exact flow over one step.
+/// The exact solution over one step.
 pub(super) struct Flow<T, const N: usize> {
     half: Levels<T, N>,
     whole: Levels<T, N>,
-    /// Where there are two vessels.
+    /// For two vessels: the coupling from the first to the second.
     handed: Option<Handed<T>>,
 }
 
-/// What the second linear vessel gets from the first one.
+/// Contributions of the first linear vessel to the second one.
 #[derive(Clone, Copy)]
 struct Handed<T> {
-    /// In half a step, by a deviation of the first one's level at its beginning.
+    /// In half a step, per unit of initial deviation of the first vessel's level.
     deviation: T,
-    /// In half a step, by a constant drive of the first one.
+    /// In half a step, per unit of a constant drive of the first vessel.
     drive: T,
-    /// In a whole step, by a drive of `a + b s + c s^2`.
+    /// In a whole step, for the coefficients of a drive `a + b s + c s^2` of the first vessel.
     whole: [T; 3],
 }
 
@@ -59,7 +60,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             half[1] = half[1] + brought(lower, h * 0.5, &fed.part(begin, middle));
         }
         let handed = (self.vessels.len() == 2 && h.value() > 0.0).then(|| {
-            // A drive of the level is an inflow over the area.
+            // A drive of the level (a rate) is an inflow divided by the area.
             let area = self.vessels[0].area;
             let (deviation, [drive, ..]) = flow.half.second_from(h * 0.5);
             let (_, whole) = flow.whole.second_from(h);
@@ -77,7 +78,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         self.linear_trial(&flow, h, q, t)
     }
 
-    /// One step of linear vessels: their exact flow, and beside it Runge-Kutta on what the effects add.
+    /// One step of linear vessels: the exact solution, and a Runge-Kutta step for the deviation that the effects cause.
     fn linear_trial(&self, flow: &Flow<T, N>, h: T, q: &Inflow<T>, t: f64) -> Levels<T, N> {
         let (whole, half) = (flow.whole, flow.half);
         let dt = h.value();
@@ -109,7 +110,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         self.weighted(&whole, h, [&k1, &k2, &k3, &k4])
     }
 
-    /// What is added to a flow, or to standing still, each vessel's own forgetting taken exactly.
+    /// One step of the deviation from an exact solution, or from constant levels, with each vessel's decay integrated exactly.
     pub(super) fn damped_trial(
         &self,
         rates: [T; N],
@@ -125,7 +126,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             Some(flow) => [&self.levels, &flow.half, &flow.whole],
             None => [&self.levels; 3],
         };
-        // What drives the deviation from the flow, but for its forgetting and what a linear vessel hands on.
+        // The drive of the deviation: all of its rate except each vessel's decay and the coupling of linear vessels.
         let driving = |at: &Levels<T, N>, deviation: &Levels<T, N>, q: T, t: f64| {
             let mut levels = *at;
             for i in 0..n {
@@ -145,7 +146,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             }
             drive
         };
-        // What the first vessel's deviation, and its drive, bring to the second one in half a step and in a whole one.
+        // Contributions of the first vessel's deviation and drive to the second vessel, in half a step and in a whole step.
         let handed = flow.and_then(|flow| flow.handed);
         let middle = t + 0.5 * h.value();
         let from_zero = |k: &Levels<T, N>| {

@@ -1,8 +1,8 @@
-//! A measured disturbance that flows into the lower of two vessels in series. What flows into the upper one, or into an only vessel, is
-//! part of its [inflow](crate::inflow).
+//! A measured disturbance that flows into the lower of two vessels in series. A disturbance that flows into the upper vessel, or into an
+//! only vessel, is a part of that vessel's [inflow](crate::inflow).
 //!
-//! The balance of the lower vessel has it everywhere ([`Vessels::balance`]). In linear vessels without effects its contribution adds to
-//! that of the pump, exactly: it is what one lag makes of it.
+//! The balance of the lower vessel contains the disturbance ([`Vessels::balance`]). For linear vessels without effects, superposition is
+//! exact: the response of one lag to the disturbance is added to the response to the pump.
 
 use crate::{
     Scalar,
@@ -13,7 +13,7 @@ use crate::{
 use super::{Levels, Vessels, exponential::LinearFlow};
 
 impl<T: Scalar, const N: usize> Vessels<T, N> {
-    /// Makes the last vessel one that [`Vessels::disturb`] feeds.
+    /// Marks the last vessel as one into which the disturbance of [`Vessels::disturb`] flows.
     pub(crate) fn feed_last(&mut self) {
         self.bare = false;
         let Some(last) = self.vessels.last_mut() else {
@@ -26,12 +26,12 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
     }
 
-    /// What flows into the last vessel from now on.
+    /// Sets the disturbance that flows into the last vessel from now on.
     pub(crate) fn disturb(&mut self, feed: Feed<T>) {
         self.feed = Some(feed);
     }
 
-    /// The disturbance at a time. Not inlined: the balance of vessels without one stays short.
+    /// The disturbance at a time. Not inlined, so that the balance of vessels without a disturbance stays short.
     #[inline(never)]
     pub(super) fn disturbance(&self, t: f64) -> T {
         self.fed(t)
@@ -62,7 +62,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
     }
 }
 
-/// What a lag has of an inflow after a step of length `h`, from zero on.
+/// The output of a lag after a step of length `h` under an inflow, from an initial value of zero.
 pub(super) fn brought<T: Scalar>(lag: &mut Propagators<T>, h: T, inflow: &Inflow<T>) -> T {
     let [level] = lag.advance(&[T::constant(0.0)], h, inflow);
     level

@@ -1,11 +1,11 @@
-//! A step that cannot overshoot, whatever its length: implicit Euler in each vessel's own level.
+//! A step that is stable for any length: the implicit Euler method in each vessel's own level.
 
 use crate::{Outlet, Scalar, inflow::Inflow};
 
 use super::{Stretch, Vessels, Watch, rims::crossing};
 
 impl<T: Scalar, const N: usize> Vessels<T, N> {
-    /// One step that cannot overshoot, whatever its length: implicit in each vessel's own level, of order one.
+    /// One step that is stable for any length: implicit in each vessel's own level, of order one.
     pub(super) fn relax(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let mut next = self.levels;
         let mut inflow = q.end;
@@ -31,7 +31,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
                     inflow + beyond
                 };
             }
-            // A leak takes no more than there is.
+            // A leak cannot take more than the vessel contains.
             inflow = inflow.max(T::constant(low));
         }
         if let Some(side) = &self.side {
@@ -40,14 +40,14 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             next[last] = (next[last] + drawn * next[last - 1]) / (drawn + 1.0);
         }
         if let Some(watch) = watch {
-            // The transient is over at once; what is left looks straight.
+            // The transient has decayed within the step; the level is taken as linear over it.
             let (before, after) = (self.levels[self.watched], next[self.watched]);
             watch(&Stretch::straight(h, before, after));
         }
         self.levels = next;
     }
 
-    /// What one vessel does in an implicit step.
+    /// The implicit step of one vessel.
     fn implicit(&self, i: usize, inflow: T, h: T, t: f64) -> Implicit<T> {
         let level = self.levels[i];
         let mut levels = self.levels;
@@ -64,11 +64,11 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             return Implicit {
                 rise: rate * h * damped,
                 kept,
-                // Nothing is lost: what is not kept has left, by the outlet or over the rim.
+                // Mass balance: the flow that is not stored in the vessel leaves by the outlet or over the rim.
                 passed_on: outflow + net - kept,
             };
         }
-        // A step of Newton's in duals gives the solution its derivatives.
+        // One Newton iteration in duals gives the derivatives of the solution.
         levels[i] = levels[i] + (level - levels[i] + rate * h) * damped;
         let (outflow, net) = self.balance(i, inflow, &levels, t);
         Implicit {
@@ -78,8 +78,8 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
     }
 
-    /// The level that solves the implicit equation of a vessel with a loss that bends: where that begins within the step, a
-    /// straight line from the present level would pass the solution by far. `None` where a straight line has to do.
+    /// The level that solves the implicit equation of a vessel with a nonlinear loss: if the loss begins within the step, a step linearised
+    /// at the present level would overshoot by far. `None` if the linearised step is sufficient.
     fn solution(&self, i: usize, inflow: T, h: f64, t: f64) -> Option<f64> {
         if self.vessels[i].laws.by_level.is_empty() {
             return None;
@@ -95,7 +95,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         if self.forgetting_changes(i, h * first, t) == 0.0 {
             return None;
         }
-        // Of the explicit step so much is taken, as the rate at its end is of the present one.
+        // The solution is the share of the explicit step that equals the ratio of the rate at its end to the present rate.
         let mut excess = |share: f64| share - rate(level + share * h * first) / first;
         let most = excess(1.0);
         (first != 0.0 && most > 0.0)
@@ -103,12 +103,12 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
     }
 }
 
-/// An implicit step of one vessel.
+/// The result of an implicit step of one vessel.
 struct Implicit<T> {
-    /// By how much its level rises.
+    /// Rise of the vessel's level.
     rise: T,
-    /// The net inflow that does it \[flow\].
+    /// Net inflow that is stored in the vessel \[flow\].
     kept: T,
-    /// What flows to the next vessel \[flow\].
+    /// Flow to the next vessel \[flow\].
     passed_on: T,
 }

@@ -1,8 +1,9 @@
-//! The vessels, in series or joined by valves: their parts, their laws and their present levels.
+//! The vessels, in series or connected by valves: their parameters, laws and present levels.
 //!
-//! [`balance`] has the equations, [`losses`] how fast they become by what leaves beside the outlets, [`parts`] cuts a step,
-//! [`rims`] finds what happens in a part, [`runge_kutta`], [`exponential`] and [`implicit`] take it. [`joined`] has the valves between
-//! tanks, and how steps are cut there, [`exchange`] the implicit one, [`fed`] a measured disturbance into the lower of two vessels.
+//! [`balance`] contains the equations, [`losses`] the decay rates due to losses besides the outlets. [`parts`] cuts a step into parts,
+//! [`rims`] finds the events in a part, and [`runge_kutta`], [`exponential`] and [`implicit`] integrate it. [`joined`] contains the valves
+//! between tanks and the choice of the steps for them, [`exchange`] their implicit step, [`fed`] a measured disturbance into the lower of
+//! two vessels.
 
 mod balance;
 mod exchange;
@@ -29,15 +30,15 @@ pub(crate) use torricelli::square_root;
 
 pub(crate) type Levels<T, const N: usize> = [T; N];
 
-/// Who wants to see the smooth stretches of a level, if anybody.
+/// Optional callback for the smooth segments of a level.
 pub(crate) type Watch<'a, T> = Option<&'a mut dyn FnMut(&Stretch<T>)>;
 
-/// One vessel as the balance sees it.
+/// The parameters of one vessel in its balance.
 struct Vessel<T> {
     area: T,
-    /// One over the area.
+    /// Inverse of the area.
     inverse: T,
-    /// The same, where it has no derivatives.
+    /// Inverse of the area, if it has no derivatives.
     plain_inverse: Option<f64>,
     outlet: Outlet,
     /// `alpha` for Torricelli, `offset` for a linear outlet.
@@ -47,59 +48,58 @@ struct Vessel<T> {
     laws: VesselLaws,
 }
 
-/// Positions of the laws that act in a vessel, by what they change.
+/// Indices of the laws that act in a vessel, by the term that they change.
 #[derive(Default)]
 struct VesselLaws {
     head: Vec<usize>,
     outflow: Vec<usize>,
     net: Vec<usize>,
-    /// Those of `net` that differ from level to level.
+    /// The laws of `net` that depend on the level.
     by_level: Vec<usize>,
     area: Vec<usize>,
-    /// Any of them, or a side tank.
+    /// The vessel has a law or a side tank.
     any: bool,
-    /// Any of them that changes a flow, a side tank, or a disturbance: the surface alone is not enough.
+    /// The vessel has a law that changes a flow, a side tank, or a disturbance: not only a law that changes the surface.
     flows: bool,
-    /// A measured disturbance flows in ([`Vessels::feed`]).
+    /// A measured disturbance flows into the vessel ([`Vessels::feed`]).
     fed: bool,
 }
 
-/// The vessels: at most [`SERIES`] in series, or three joined by valves. `N` is known at compile time, so that neither pays for the
-/// other.
+/// The vessels: at most [`SERIES`] in series, or three connected by valves. `N` is a compile-time constant, so that each kind is compiled
+/// without the code of the other.
 pub(crate) struct Vessels<T: Scalar, const N: usize> {
     vessels: Vec<Vessel<T>>,
     laws: Vec<Box<dyn Law<T>>>,
     pub(crate) levels: Levels<T, N>,
-    /// For linear vessels.
+    /// The exact solution, for linear vessels.
     linear: Option<LinearFlow<T>>,
-    /// A side tank of an only vessel; its level follows the vessel's in `levels`.
+    /// A side tank of an only vessel; its level comes after the vessel's in `levels`.
     side: Option<Side<T>>,
-    /// Levels that move: the vessels' and the side tank's.
+    /// Number of state variables: the levels of the vessels and of the side tank.
     states: usize,
-    /// Laws that switch over at an instant that is still to come.
+    /// Laws with a jump at a future time.
     switches: Vec<usize>,
-    /// Beginning and length of the present step, where they have derivatives.
+    /// Beginning and length of the present step, if they have derivatives.
     clock: Option<(T, T)>,
-    /// How fast every vessel forgets, where a part is long against that \[1/s\]: then it is taken exponentially.
+    /// Decay rate of every vessel, if the present part is long against the time constants and is therefore an exponential step \[1/s\].
     damping: Option<Levels<T, N>>,
-    /// Some vessel has a rim.
+    /// At least one vessel has a rim.
     rims: bool,
-    /// All are Torricelli's, of areas without derivatives, and nothing acts in them.
+    /// All vessels have Torricelli outflow, areas without derivatives, and no effects.
     bare: bool,
-    /// Of vessels that are joined: their valves.
+    /// The valves of joined vessels.
     valves: Option<Valves>,
-    /// What flows into the last vessel beside what the one before lets out: of vessels that are joined from the second pump, of two in
-    /// series a measured disturbance.
+    /// Additional inflow into the last vessel: of the second pump for joined vessels, a measured disturbance for two vessels in series.
     feed: Option<Feed<T>>,
-    /// The same vessels without derivatives, where they are joined: how a step is cut is found on them.
+    /// For joined vessels: a copy without derivatives, on which step lengths are chosen.
     values: Option<Box<Vessels<f64, N>>>,
-    /// The vessel whose level a lagging sensor reads.
+    /// The vessel whose level is read by a sensor with a lag.
     watched: usize,
-    /// One over the shortest time constant of linear vessels; zero for others \[1/s\].
+    /// Inverse of the shortest time constant of linear vessels; zero for other vessels \[1/s\].
     fastest: f64,
 }
 
-/// A stretch of time over which the level moved smoothly.
+/// A time interval over which the level is smooth.
 pub(crate) struct Stretch<T> {
     pub h: T,
     pub before: T,
@@ -109,7 +109,7 @@ pub(crate) struct Stretch<T> {
 }
 
 impl<T: Scalar> Stretch<T> {
-    /// From a level to another in a straight line, as after an implicit step, of which only the end is known.
+    /// A linear segment between two levels, for an implicit step, which gives only the level at its end.
     fn straight(h: T, before: T, after: T) -> Self {
         let rate = (after - before) / h;
         Self {
@@ -123,11 +123,11 @@ impl<T: Scalar> Stretch<T> {
 }
 
 impl<T: Scalar, const N: usize> Vessels<T, N> {
-    /// The vessels are joined by valves.
+    /// Whether the vessels are connected by valves.
     const JOINED: bool = N > SERIES;
 
-    /// `parts`: area, outlet and its coefficient for each vessel; `laws`: the vessel each acts in, and the law; then the vessel that is
-    /// watched, and the valves of vessels that are joined.
+    /// `parts`: area, outlet and its coefficient for each vessel; `laws`: each law with its vessel; then the vessel that is watched, and
+    /// the valves of joined vessels.
     pub(crate) fn new(
         parts: Vec<(T, Outlet, T)>,
         laws: Vec<(usize, Box<dyn Law<T>>)>,
@@ -231,13 +231,13 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         };
         all.keep_within();
         if states > all.vessels.len() {
-            // At rest a side tank stands as high as its vessel.
+            // In steady state, the level of a side tank equals that of its vessel.
             all.levels[states - 1] = all.levels[0];
         }
         all
     }
 
-    /// Levels lie between empty (where the outlet is Torricelli's) and the rim.
+    /// Limits each level to the range between empty (for a Torricelli outlet) and the rim.
     fn keep_within(&mut self) {
         for (vessel, level) in self.vessels.iter().zip(&mut self.levels) {
             if level.value() > vessel.rim.level.value() {

@@ -1,30 +1,31 @@
-//! How a step is cut where it is long against a vessel's time constant, so that each part can be trusted.
+//! Cuts a step that is long against a vessel's time constant into parts that are accurate and stable.
 //!
-//! Up to one time constant a step is taken whole. A longer one is cut into parts that double: what a jump of the inflow
-//! sets off is over when they are long, and a vessel that has settled takes the rest in one exponential part. Where a
-//! level moves too far for its forgetting to be one number the parts are short, or at last implicit and of order one.
+//! A step of up to one time constant is not cut. A longer step is cut into parts of doubling length: the transient after a jump of the
+//! inflow has decayed before the parts are long, and a vessel near its steady state takes the rest in one exponential part. If a level
+//! changes so much that its decay rate is not constant, the parts are short or, as a last resort, implicit and of order one.
 
 use crate::{Scalar, inflow::Inflow};
 
 use super::{Vessels, Watch};
 
-/// Runge-Kutta is trusted while a step is shorter than this many time constants of every vessel.
+/// Runge-Kutta steps are used up to this many time constants of the fastest vessel.
 pub(super) const STEP_LIMIT: f64 = 1.0;
-/// The same where a rim is near: then linear vessels too go by Runge-Kutta alone.
+/// The same limit near a rim, where linear vessels are integrated by Runge-Kutta steps too.
 const STEP_LIMIT_AT_RIM: f64 = 0.125;
-/// The most parts that a step of linear vessels is cut into for that.
+/// Largest number of such parts of a step of linear vessels.
 const MOST_PARTS: usize = 256;
-/// A step that is still too long for its vessels is cut into at most so many parts; beyond that it is taken implicitly.
+/// Largest number of parts of a step that is too long for its vessels; a part that is still too long is implicit.
 const UNITS: usize = 32;
-/// A long part may be as long as what has passed of its step, where no level will move by more than this share of
-/// itself: the fast part of the motion has died away by then.
+/// A long part may be as long as the part of the step that is done, if no level will change by more than this share of itself: the fast
+/// transient has then decayed.
 const SETTLING: f64 = 0.2;
-/// One part is enough where no fast vessel will move by more than this share of its level. What is over before the next
-/// reading leaves a trace only in the vessel that it flows into: the last one may move more.
+/// The rest of the step is one part if no fast vessel will change by more than this share of its level: the first limit is for all vessels
+/// except the last, the second for the last one. A transient that decays before the next reading influences only the vessel that it flows
+/// into, so the last vessel may change more.
 const SETTLED: [f64; 2] = [1e-4, 1e-2];
 
 impl<T: Scalar, const N: usize> Vessels<T, N> {
-    /// Moves on by `h` from time `start`; `watch` sees every smooth stretch of the watched level in turn.
+    /// Advances by `h` from time `start`; `watch` is called for every smooth segment of the watched level, in order.
     pub(crate) fn step(&mut self, h: T, q: &Inflow<T>, start: T, watch: &mut Watch<T>) {
         if self.switches.is_empty() {
             self.stretch(h, q, start, watch);
@@ -49,7 +50,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         self.stretch(h, &q, start, watch);
     }
 
-    /// The first law to switch over before the end of a step, and when.
+    /// The first law that jumps before the end of a step, and the time of the jump.
     fn next_switch(&self, start: &T, h: &T) -> Option<(usize, T)> {
         let end = start.value() + h.value();
         self.switches
@@ -59,7 +60,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             .min_by(|a, b| a.1.value().total_cmp(&b.1.value()))
     }
 
-    /// A step within which no law switches over.
+    /// A step within which no law jumps.
     fn stretch(&mut self, h: T, q: &Inflow<T>, start: T, watch: &mut Watch<T>) {
         let zero = T::constant(0.0);
         let plain = h.same_derivatives(zero) && start.same_derivatives(zero);
@@ -87,9 +88,9 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
     }
 
-    /// A step of linear vessels that is longer than a time constant, in parts that double: what a jump of the input sets
-    /// off is over when they are long. Their lengths do not depend on effects, so that one at its absent value sees
-    /// the parts of the base model.
+    /// A step of linear vessels longer than a time constant, in parts of doubling length: the transient after a jump of the input has
+    /// decayed before the parts are long. The lengths do not depend on effects, so that a model with an effect at its absent value takes
+    /// the steps of the model without it.
     fn fast_linear_step(&mut self, wanted: f64, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         let parts = (wanted.min(MOST_PARTS as f64).ceil() as usize).next_power_of_two();
         let share = 1.0 / parts as f64;
@@ -105,7 +106,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
                 self.part(part, q, begin, watch);
                 self.damping = None;
             } else if !quiet {
-                // Something happens at a rim: here Runge-Kutta alone, in short steps.
+                // An event at a rim occurs in this part: short Runge-Kutta steps are used.
                 let wanted = self.fastest * part.value() / STEP_LIMIT_AT_RIM;
                 self.equal_parts(wanted, part, q, begin, watch);
             }
@@ -114,14 +115,14 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
     }
 
-    /// A part of linear vessels with rims, in one piece: `false`, and nothing is done, where something happens at a rim.
+    /// Takes a part of linear vessels with rims in one step; returns `false` and changes nothing if an event at a rim occurs in it.
     fn quiet_part(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) -> bool {
         if self.stiffness(h.value(), q, t) > STEP_LIMIT {
             return false;
         }
         self.settle_modes(q.start, t, None);
         self.damping = Some(self.forgetting(t));
-        // What stands at its rim drives the next vessel by a parabola: then the exponential step is exact.
+        // A vessel at its rim drives the next vessel by a parabola, for which the exponential step is exact.
         let next = if self.vessels.iter().any(|vessel| vessel.spilling) {
             self.trial(h, q, t)
         } else {
@@ -155,7 +156,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
                 (length, q.part(edge(from), edge(to)), begin)
             };
             let (length, inflow, begin) = span(done, UNITS);
-            // The longest that is short enough, in powers of two.
+            // The longest part that is short enough, in powers of two.
             let stiffness = self.stiffness(h.value(), &inflow, begin);
             let mut units = 1 << left.ilog2();
             while units > 1 && stiffness * units as f64 > STEP_LIMIT * UNITS as f64 {
@@ -164,7 +165,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             let short = stiffness * units as f64 <= STEP_LIMIT * UNITS as f64;
             let rates = self.forgetting(begin);
             let calm = if self.linear.is_some() {
-                // What makes such a part too long is the effects' doing, which its vessels' forgetting does not cover.
+                // The stiffness is due to the effects, which the exact decay of the vessels does not include.
                 0
             } else {
                 self.calm(&rates, length.value(), &inflow, begin, done)
@@ -187,14 +188,14 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
     }
 
-    /// How many of [`UNITS`] the next part may last although a vessel is faster than that, `done` of them over; zero
-    /// where a level moves too far for its forgetting to be one number.
+    /// Number of [`UNITS`] that the next part may last although a vessel is faster, after `done` of them; zero if a level changes so much
+    /// that its decay rate is not constant.
     fn calm(&self, rates: &[T; N], h: f64, q: &Inflow<T>, t: f64, done: usize) -> usize {
         let left = UNITS - done;
         let mut longest = left;
         let mut inflows = [Some((q.start, t)), Some((q.end, t))];
         match &self.feed {
-            // It too is asked at both ends.
+            // A disturbance that is not held is evaluated at both ends too.
             Some(feed) if !feed.is_held() => inflows[1] = Some((q.end, t + h)),
             _ if q.start.value() == q.end.value() => inflows[1] = None,
             _ => {}
@@ -205,11 +206,11 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
                 let fast = rates[i].value() * h > STEP_LIMIT;
                 let time = if fast { 1.0 / rates[i].value() } else { h };
                 let (level, moves) = (self.levels[i].value(), moves[i].value());
-                // What is empty and gets nothing stays so.
+                // An empty vessel without inflow stays empty.
                 let share = if level <= 0.0 && moves <= 0.0 {
                     0.0
                 } else {
-                    // A root's slope changes by half the share by which its argument does.
+                    // The relative change of a square root's slope is half the relative change of its argument.
                     let bends = 2.0 * time * self.forgetting_changes(i, moves * time, t);
                     (moves * time / level).abs().max(bends)
                 };
@@ -225,7 +226,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         longest
     }
 
-    /// A step that is short enough.
+    /// A step that is short enough for its vessels.
     pub(super) fn unit(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         if self.rims {
             self.step_with_rims(h, q, t, watch);

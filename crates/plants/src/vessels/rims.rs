@@ -1,18 +1,18 @@
-//! Steps of vessels with rims: which of them spill, and the instant at which a level meets its rim or leaves it, located
-//! so that the step keeps its order and its derivatives.
+//! Steps of vessels with rims: which vessels overflow, and the time at which a level reaches or leaves its rim. The time is located such
+//! that the step keeps its order and its derivatives.
 
 use crate::{Scalar, inflow::Inflow};
 
 use super::{Levels, Vessel, Vessels, Watch};
 
-/// Contacts with a rim that are looked for within a step.
+/// Largest number of events at rims within a step.
 const MOST_EVENTS: usize = 12;
 
-/// What ends a smooth stretch.
+/// An event that ends a smooth segment.
 pub(super) enum Event<T> {
-    /// A vessel meets its rim after this part of the step.
+    /// A vessel's level reaches its rim after this part of the step.
     Rim(usize, T),
-    /// A vessel stops spilling after this part of the step.
+    /// A vessel stops overflowing after this part of the step.
     Release(usize, T),
 }
 
@@ -21,7 +21,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         let (mut h, mut q, mut t) = (h, *q, t);
         let mut released = None;
         let whole = self.clock;
-        // Each vessel can meet its rim and leave it a few times within a step; more is chatter.
+        // Each vessel can reach and leave its rim a few times within a step; more events are chattering.
         for _ in 0..MOST_EVENTS {
             self.settle_modes(q.start, t, released);
             let (next, begin) = self.trial_and_rates(h, &q, t);
@@ -32,8 +32,8 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             };
             let (Event::Rim(_, part) | Event::Release(_, part)) = event;
             let first = &q.part(T::constant(0.0), part);
-            // The instant of the event has derivatives, and with it every time of the step that leads there and the one
-            // from which the rest is counted.
+            // The time of the event has derivatives. So do all times within the step that ends at the event, and the time at which the rest
+            // of the step begins.
             let begin = self.time(t);
             self.clock = Some((begin, h * part));
             let there = self.trial(h * part, first, t);
@@ -56,7 +56,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         self.clock = whole;
     }
 
-    /// Which vessels spill: those that stand at their rim with a positive net inflow, but for one that has just stopped.
+    /// Sets which vessels overflow: those at their rim with a positive net inflow, except one that has just stopped overflowing.
     pub(super) fn settle_modes(&mut self, q: T, t: f64, released: Option<usize>) {
         for vessel in &mut self.vessels {
             vessel.spilling = false;
@@ -82,8 +82,8 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
     }
 
-    /// The first thing to happen within the step that would lead to `next`, if anything does; `begin`: the rates at its
-    /// beginning, where they are known.
+    /// The first event within the step that would lead to `next`, if there is one; `begin`: the rates at the beginning of the step, if they
+    /// are known.
     pub(super) fn first_event(
         &self,
         next: &Levels<T, N>,
@@ -107,7 +107,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             if rim == f64::INFINITY {
                 continue;
             }
-            // Positive once the event has happened.
+            // A function that is positive after the event.
             let past = |levels: &Levels<T, N>, q: T, t: f64| {
                 if vessel.spilling {
                     -self.net(i, levels, q, t).value()
@@ -118,14 +118,14 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             let low = past(&self.levels, q.start, t);
             let (mut end, mut high) = (1.0, past(next, q.end, t + h.value()));
             if low >= 0.0 {
-                // Just released, or on the rim with a net inflow of nothing.
+                // The vessel has just stopped overflowing, or is at the rim with a net inflow of zero.
                 continue;
             }
             if high <= 0.0 {
                 if vessel.spilling {
                     continue;
                 }
-                // Above the rim in between? The top of the cubic through levels and rates says where to look.
+                // The level may exceed the rim in between: the maximum of the cubic through the levels and rates at both ends is checked.
                 let begin = begin.map(|rates| rates[i]);
                 let top = self.top(i, next, begin, h, q, t);
                 let Some(top) = top.filter(|&(_, level)| level > rim) else {
@@ -146,8 +146,8 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
             }
         }
         let (s, i) = first?;
-        // One Newton step in duals gives the instant its derivatives: those of the steps as they are taken, not of the
-        // flow that they approximate, hence the slope by a difference.
+        // One Newton iteration in duals gives the derivatives of the event time: those of the numerical steps, not of the exact solution;
+        // therefore the slope is a finite difference.
         let spilling = self.vessels[i].spilling;
         let past = |s: f64| {
             let (levels, q, t) = at(s);
@@ -169,7 +169,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         })
     }
 
-    /// Where within the step, and how high, the level of a vessel is highest; `None` where that is at an end.
+    /// Position and value of the maximum of a vessel's level within the step; `None` if the maximum is at an end.
     fn top(
         &self,
         i: usize,
@@ -190,7 +190,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
         let before = self.levels[i].value();
         let rise = next[i].value() - before;
-        // Rates along the cubic: begin + b s + c s^2, from above zero to below: one root within.
+        // Rate along the cubic: begin + b s + c s^2, positive at the beginning and negative at the end, so there is one root in between.
         let b = 6.0 * rise - 4.0 * begin - 2.0 * end;
         let c = 3.0 * (begin + end - 2.0 * rise);
         let root = (b * b - 4.0 * begin * c).max(0.0).sqrt();
@@ -200,8 +200,8 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
     }
 }
 
-/// Where a function that is negative at `low` and positive at `high` changes its sign, by regula falsi that does not
-/// stall (Illinois). Nine digits are enough: at a rim a Newton step follows, and a release is flat.
+/// The sign change of a function that is negative at `low` and positive at `high`, by the Illinois variant of regula falsi. Nine digits are
+/// sufficient: for a contact with the rim a Newton iteration follows, and at the end of overflow the rate is nearly zero.
 pub(super) fn crossing(
     mut low: (f64, f64),
     mut high: (f64, f64),
@@ -210,7 +210,7 @@ pub(super) fn crossing(
     let mut last = f64::NAN;
     let mut side = 0;
     for _ in 0..60 {
-        // Not `clamp`, which panics where a bound is not a number.
+        // Not `clamp`, which panics if a bound is NaN.
         let s = ((low.0 * high.1 - high.0 * low.1) / (high.1 - low.1))
             .max(low.0)
             .min(high.0);

@@ -13,7 +13,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         self.trial_and_rates(h, q, t).0
     }
 
-    /// The same, and the rates at its beginning, where they were needed for it.
+    /// As [`Vessels::trial`], and the rates at the beginning of the step, if they were computed.
     #[inline]
     pub(super) fn trial_and_rates(
         &self,
@@ -37,8 +37,8 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
     }
 
-    /// The same for Torricelli's vessels without effects, in the same order of operations and so with the same bits, for
-    /// a fit spends most of its time here.
+    /// A Runge-Kutta step of vessels with Torricelli outflow and no effects. The operations are in the same order as in
+    /// [`Vessels::trial_by`], so the result is identical to the bit; a fit spends most of its time here.
     #[inline]
     fn bare_trial<const M: usize>(
         &self,
@@ -46,7 +46,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         h: f64,
         q: &Inflow<T>,
     ) -> Levels<T, N> {
-        // Loops over places rather than arrays by value, which would be copied about.
+        // Loops over indices, because arrays by value would be copied.
         let zero = T::constant(0.0);
         let mut next = self.levels;
         let mut at = self.levels;
@@ -79,7 +79,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         next
     }
 
-    /// The same, for a length `h` with or without derivatives.
+    /// A Runge-Kutta step of length `h` with or without derivatives.
     #[inline]
     fn trial_by<H: Copy + Mul<f64, Output = H>>(
         &self,

@@ -1,20 +1,20 @@
-//! Torricelli's root with a finite slope at empty.
+//! Torricelli's square root with a finite slope at zero.
 
 use crate::Scalar;
 
-/// Below this level Torricelli's root, whose slope is infinite at zero, gives way to a parabola \[level unit\].
+/// Below this level a parabola replaces Torricelli's square root, whose slope is infinite at zero \[level unit\].
 pub(super) const NEARLY_EMPTY: f64 = 1e-4;
-/// What stands for an empty vessel where its slope is asked by outflow over content \[level unit\].
+/// Level that replaces an empty vessel's level when a slope is estimated by outflow/content \[level unit\].
 pub(super) const A_LITTLE: f64 = 1e-3 * NEARLY_EMPTY;
 
-/// `sqrt(level)`, zero for an empty vessel, with a finite slope at empty.
+/// `sqrt(level)`, zero for an empty vessel, with a finite slope at zero.
 #[inline(always)]
 pub(crate) fn square_root<T: Scalar>(level: T) -> T {
     let h = level.value();
     if h >= NEARLY_EMPTY {
         level.sqrt()
     } else if h > 0.0 {
-        // Value and slope meet those of the root at the join.
+        // Value and slope are continuous where the parabola meets the root.
         let x = level * (1.0 / NEARLY_EMPTY);
         (x * 1.5 - x * x * 0.5) * NEARLY_EMPTY.sqrt()
     } else {

@@ -31,7 +31,7 @@ pub trait Compiled: Scalar {
     ) -> Result<(), NoSolution>;
 }
 
-/// The number types of a [`Simulation`]: `f64`, and duals with 2, 4, 8, 12 or 15 derivatives.
+/// The number types of a [`Simulation`](super::Simulation): `f64`, and duals with 2, 4, 8, 12 or 15 derivatives.
 pub trait SimulationNumber: Compiled {}
 
 impl<T: Compiled> SimulationNumber for T {}

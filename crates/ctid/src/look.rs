@@ -155,7 +155,7 @@ mod tests {
             width: 20,
         };
         let text = look.paragraph("  - ", "the level stays constant at the rim");
-        assert_eq!(text, "  - the level stands\n    still at the rim\n");
+        assert_eq!(text, "  - the level stays\n    constant at the\n    rim\n");
     }
 
     #[test]

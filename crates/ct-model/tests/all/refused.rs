@@ -183,7 +183,7 @@ fn expressions() {
         "  Real q = sin(x, x);",
         12,
         "sin takes one argument",
-        "2 stand here",
+        "2 are given here",
     );
     refuses(
         "  Real q = max(x);",

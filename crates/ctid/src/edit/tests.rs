@@ -76,7 +76,7 @@ fn the_place_is_written_where_there_is_a_choice() {
     );
     let done = without_effect("tank.toml", &edited.text, "overflow").unwrap();
     assert!(
-        done.done.contains("[effect.overflow] stays"),
+        done.done.contains("[effect.overflow] is kept"),
         "{}",
         done.done
     );

@@ -123,6 +123,6 @@ mod tests {
     fn a_body_that_never_comes_is_not_waited_for() {
         let room = Semaphore::new(100);
         let silent = read(Body::new(Silent), 10, &room).unwrap_err();
-        assert!(silent.contains("stopped"), "{silent}");
+        assert!(silent.contains("stalled"), "{silent}");
     }
 }

@@ -128,7 +128,10 @@ fn the_unknown_is_written_kept_and_taken_out() {
     assert_eq!(lasting(place.result(compare)), lasting(before));
     place.succeeds("add my_wave --model tank.toml");
     assert_eq!(lasting(place.result(compare)), lasting(after));
-    place.refuses("add my_wave --model tank.toml", &["my_wave is on already"]);
+    place.refuses(
+        "add my_wave --model tank.toml",
+        &["my_wave is in the model already"],
+    );
 }
 
 #[test]

@@ -16,7 +16,10 @@ fn effects_that_cannot_be_added_or_removed() {
         ),
         (
             "add overflow --model on.toml",
-            ["on.toml: overflow is on already", "`ctid remove overflow`"],
+            [
+                "on.toml: overflow is in the model already",
+                "`ctid remove overflow`",
+            ],
         ),
         (
             "add sqrt_outflow --model tour.toml",

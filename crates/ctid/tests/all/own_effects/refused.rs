@@ -36,7 +36,10 @@ fn what_cannot_be_added_is_refused_in_a_line() {
         &["the result does not contain lag(y)"],
     );
     place.succeeds("add lag(y) --model m.toml");
-    place.refuses("add lag(y) --model m.toml", &["lag(y) is on already"]);
+    place.refuses(
+        "add lag(y) --model m.toml",
+        &["lag(y) is in the model already"],
+    );
     place.write("other.mo", BLOCK.replace("Block", "Other"));
     place.write("other.toml", MODEL.replace("block.mo", "other.mo"));
     place.refuses(

@@ -123,7 +123,7 @@ fn the_unexplained_is_kept_by_name() {
     println!("simulation error {fell:?} cm");
     assert!(fell[1] < 0.5 * fell[0], "{fell:?}");
     assert!(browser.text("#trail").contains("+ wave"));
-    assert!(browser.text("#findings").contains("Kept as wave"));
+    assert!(browser.text("#findings").contains("Added as wave"));
     browser.picture("kept");
     browser.click("#effects button[aria-label='Remove wave']");
     wait_for_models(&mut browser, 1);

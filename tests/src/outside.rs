@@ -6,14 +6,14 @@ pub type Outside = fn(f64) -> (f64, f64);
 /// Disturbances that no effect of the catalogue describes: a level shift of the sensor, permanent or temporary, a slow change of it, and an
 /// unmeasured flow; and their names in a sentence.
 pub const OUTSIDE: [(&str, Outside); 6] = [
-    ("wanders", |t| (0.0, 0.5 * (0.00209 * t).sin())),
-    ("sudden, from 1002", |t| {
+    ("drifts", |t| (0.0, 0.5 * (0.00209 * t).sin())),
+    ("abrupt change, from 1002", |t| {
         (0.0, if t > 1000.0 { 3.0 } else { 0.0 })
     }),
-    ("sudden, from 1002", |t| {
+    ("abrupt change, from 1002", |t| {
         (0.0, if t > 1000.0 { 0.3 } else { 0.0 })
     }),
-    ("sudden", |t| {
+    ("abrupt change", |t| {
         (
             if (900.0..1100.0).contains(&t) {
                 0.5
@@ -23,7 +23,7 @@ pub const OUTSIDE: [(&str, Outside); 6] = [
             0.0,
         )
     }),
-    ("sudden, from 1000", |t| {
+    ("abrupt change, from 1000", |t| {
         (
             0.0,
             if (1000.0..1100.0).contains(&t) {
@@ -33,7 +33,7 @@ pub const OUTSIDE: [(&str, Outside); 6] = [
             },
         )
     }),
-    ("sudden, from 600", |t| {
+    ("abrupt change, from 600", |t| {
         (
             0.0,
             if (600.0..700.0).contains(&t) {

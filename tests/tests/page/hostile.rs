@@ -158,7 +158,7 @@ fn unfortunate_files_are_refused_with_the_mend() {
     let line = [b"t".as_slice(), &vec![b','; 2 << 20], b"a\n1\n"].concat();
     let answer = send("line.csv", &line);
     assert_eq!(answer.status, 422);
-    assert!(answer.error().contains("one line"), "{answer:?}");
+    assert!(answer.error().contains("a single line"), "{answer:?}");
     for (bytes, needle) in [
         (b"PK\x03\x04 a spreadsheet".as_slice(), "spreadsheet"),
         (&[0xff, 0xfe, 0, 1], "UTF-16"),

@@ -49,7 +49,7 @@ fn a_leak_of_three_tanks_is_found_and_added() {
         );
     }
     browser.press("Tab", 9, "");
-    browser.until("document.getElementById('model-error').innerText.includes('which tank')");
+    browser.until("document.getElementById('model-error').innerText.includes('tank whose level')");
     assert!(!browser.text("#text").contains("three-tank"));
     // The two letters are two changes; the answer to the first one does not take the second one back.
     browser.choose("known-measured", "T3", "value === 'T3'");

@@ -44,7 +44,7 @@ fn both_levels_are_named_fitted_and_shown() {
         let chosen = format!("value === '{header}'");
         browser.choose(&format!("column-{role}"), letters, &chosen);
     }
-    browser.until("document.getElementById('model-error').innerText.includes('which tanks') && document.getElementById('known-measured-2')");
+    browser.until("document.getElementById('model-error').innerText.includes('tanks whose levels') && document.getElementById('known-measured-2')");
     for (id, letter, level) in [
         ("known-measured", "l", "lower"),
         ("known-measured-2", "u", "upper"),

@@ -37,8 +37,8 @@
 //!     levels
 //! };
 //! let y = response(30.0).iter().zip(&noise).map(|(y, v)| y + v).collect();
-//! let (u, y) = (Channel::new("u", "V", u.clone()), Channel::new("y", "cm", y));
-//! let record = Record::sampled("simulated", 1.0, vec![u], vec![y]);
+//! let inputs = vec![Channel::new("u", "V", u.clone())];
+//! let record = Record::sampled("simulated", 1.0, inputs, vec![Channel::new("y", "cm", y)]);
 //! record.validate()?;
 //!
 //! let residual = |time_constant| -> Vec<f64> {

@@ -189,7 +189,7 @@ fn expressions() {
         "  Real q = max(x);",
         12,
         "max takes two arguments",
-        "1 stand here",
+        "1 are given here",
     );
     refuses(
         "  Real q = 1 + if x > 0 then 1 else 2;",

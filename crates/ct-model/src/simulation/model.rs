@@ -75,8 +75,11 @@ impl Model {
         let mut simulation = Simulation::new(self, parameters, &self.starts(parameters), 0.0);
         let mut read = vec![0.0; self.spec.outputs.len()];
         let mut outputs = vec![Vec::with_capacity(samples); read.len()];
+        let mut row = vec![0.0; inputs.len()];
         for k in 0..samples {
-            let row: Vec<f64> = inputs.iter().map(|input| input[k]).collect();
+            for (value, input) in row.iter_mut().zip(inputs) {
+                *value = input[k];
+            }
             simulation.read(&row, &mut read);
             for (output, reading) in outputs.iter_mut().zip(&read) {
                 output.push(*reading);

@@ -155,10 +155,10 @@ impl Context<'_> {
 
     /// The first output with a longer noise memory than a search accepts.
     pub fn slow_output(&self, noise: &Noise) -> Option<usize> {
-        if self.longest_record() < self.thresholds.memory_times * self.thresholds.ordinary_memory {
+        if self.longest_record() < self.thresholds.memory_times * self.thresholds.memory_limit {
             return None;
         }
-        let longest = self.longest_memory().max(self.thresholds.ordinary_memory);
+        let longest = self.longest_memory().max(self.thresholds.memory_limit);
         let limited = noise.with_memory_at_most(longest);
         let mut pairs = noise.iter().zip(limited.iter());
         pairs.position(|(noise, limited)| noise != limited)

@@ -22,7 +22,7 @@ pub(crate) struct Finding<'a> {
     pub own: &'a Fit,
     pub verdict: Verdict,
     pub groups: Vec<Vec<usize>>,
-    pub left: Option<crate::Left>,
+    pub not_noise: Option<crate::NotNoise>,
     pub unknown: Option<crate::Unknown>,
     pub share: Option<f64>,
     /// Time of the search \[s\].
@@ -42,7 +42,7 @@ pub(crate) fn assemble(
         own,
         verdict,
         groups,
-        left,
+        not_noise,
         unknown,
         share,
         seconds,
@@ -67,7 +67,7 @@ pub(crate) fn assemble(
         ..context.clone()
     };
     let mut ladder = ladder(&weighted, base, last, &white)?;
-    if left.is_none()
+    if not_noise.is_none()
         && let Some(end) = ladder.last_mut()
         && let Ok(shown) = context.refitted(end, &own.noise, FINE)
     {
@@ -130,7 +130,7 @@ pub(crate) fn assemble(
         ranked,
         steps,
         share: share.filter(|_| !order.is_empty()),
-        left,
+        not_noise,
         unknown,
         noise: noise.collect(),
         singles,

@@ -68,7 +68,7 @@ pub fn diagnose(
         by_error_sets.push(grown.best);
     }
     let by_error_singles = (by_error.singles.clone(), by_error.base.clone());
-    let (mut grown, mut noise) = in_metric(&context, by_error, noise, options)?;
+    let (mut grown, mut noise) = with_noise_model(&context, by_error, noise, options)?;
     tell("confirming");
     context.limit.begin(Phase::Confirm);
     let mut confirmed = context.confirm(grown.best.clone(), &grown.base, &noise)?;
@@ -92,17 +92,17 @@ pub fn diagnose(
         }
     }
     let mut own = context.in_own_noise(&confirmed)?;
-    let mut left = context.left(&confirmed, &own)?;
+    let mut not_noise = context.not_noise(&confirmed, &own)?;
     let mut slowness = 1.0;
     let many = |set: &Node| set.added.len() >= base.added.len() + options.thresholds.many_effects;
-    if left.is_some() || many(&confirmed) {
+    if not_noise.is_some() || many(&confirmed) {
         context.limit.begin(Phase::Floating);
         let mut sets = by_error_sets;
         sets.extend(grown.fitted.iter().cloned());
         sets.extend([grown.best.clone(), confirmed.clone()]);
         let timeless = context.floating(&base, &sets, options.max_effects);
         context.limit.begin(Phase::Part);
-        if left.is_some() {
+        if not_noise.is_some() {
             // The noise model describes unmodelled physics as noise, and if that physics is slow, simulations of prewhitened fits drift.
             // The sets are therefore compared by their simulation error.
             sets.extend(timeless);
@@ -113,7 +113,7 @@ pub fn diagnose(
                 noise = white.clone();
                 slowness = context.slowness(&own.noise);
                 (grown.singles, grown.base) = by_error_singles;
-                left = context.left(&confirmed, &own)?;
+                not_noise = context.not_noise(&confirmed, &own)?;
             }
         } else if let Some(better) = context.better_in_own_noise(timeless, &own) {
             // So many effects may imitate other effects, and the noise model may describe the rest of the error.
@@ -122,7 +122,7 @@ pub fn diagnose(
                 grown.base = bare;
             }
             (own, confirmed) = (better.fit.clone(), better);
-            left = context.left(&confirmed, &own)?;
+            not_noise = context.not_noise(&confirmed, &own)?;
         }
     }
     grown.cut_short |= context.limit.leaves_out("tests of the effects one by one");
@@ -131,7 +131,7 @@ pub fn diagnose(
     let found = confirmed.added.len() > grown.base.added.len();
     // After a search that was cut short, the noise model describes what was not tried; the effects are then at most a part of the answer.
     let open = grown.cut_short && own.noise.order() > 0;
-    let whole = left.is_none() && !open;
+    let whole = not_noise.is_none() && !open;
     let many = many(&confirmed);
     // The noise level: the standard deviation of the whole residual if it is noise, otherwise that of its innovations.
     let floors: Vec<f64> = if whole {
@@ -140,7 +140,7 @@ pub fn diagnose(
         own.noise.iter().map(ArModel::sigma).collect()
     };
     let share = found.then(|| explained(&base.fit, &confirmed.fit, &floors));
-    let verdict_of = |groups: &[Vec<usize>]| match (found, &left, share) {
+    let verdict_of = |groups: &[Vec<usize>]| match (found, &not_noise, share) {
         (true, None, _) if open || many => Verdict::Partial,
         (false, None, _) => Verdict::Adequate,
         (false, Some(_), _) => Verdict::Unexplained,
@@ -188,7 +188,7 @@ pub fn diagnose(
             unknown,
             verdict,
             groups,
-            left,
+            not_noise,
             share,
             seconds,
             left_out,
@@ -197,7 +197,7 @@ pub fn diagnose(
 }
 
 /// The search with prewhitened fits, if the noise model is not white.
-fn in_metric(
+fn with_noise_model(
     context: &Context,
     by_error: Grown,
     noise: Noise,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::left::Left;
+use crate::residual_tests::NotNoise;
 use crate::unknown::Unknown;
 
 /// The finding.
@@ -118,7 +118,7 @@ pub struct Diagnosis {
     /// The share of the squared error above the noise that the effects explain; `None` without effects.
     pub share: Option<f64>,
     /// Structure in the residual of the last model that is not noise.
-    pub left: Option<Left>,
+    pub not_noise: Option<NotNoise>,
     /// The unexplained error of the last model; `None` if its residual is noise.
     pub unknown: Option<Unknown>,
     /// The noise of each output, of the last model's residual.

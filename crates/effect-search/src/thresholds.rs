@@ -23,8 +23,8 @@ pub struct Thresholds {
     /// longer correlation time leaves fewer than about ten independent samples. Chosen.
     pub longest_memory: f64,
     /// Correlation time up to which noise is never called slow, however short the record \[samples\]. Chosen.
-    pub ordinary_memory: f64,
-    /// Records shorter than this many times [`Self::ordinary_memory`] are not tested for slow noise (1 or more): they are too short to
+    pub memory_limit: f64,
+    /// Records shorter than this many times [`Self::memory_limit`] are not tested for slow noise (1 or more): they are too short to
     /// distinguish slow physics from noise. Chosen.
     pub memory_times: f64,
     /// Two noise models whose coefficients differ by no more than this are the same, and the fits are not repeated with the second one (0
@@ -176,7 +176,7 @@ impl Thresholds {
         noise_order: 6,
         effects_before_noise: 2,
         longest_memory: 1.0 / 15.0,
-        ordinary_memory: 12.0,
+        memory_limit: 12.0,
         memory_times: 10.0,
         same_noise: 0.05,
         scored_starts: 24,

@@ -35,7 +35,7 @@ pub struct Fit {
     /// Number of fitted parameters, including those of the noise.
     pub parameters: usize,
     /// BIC penalty of the parameters, in [`Fit::bic`].
-    pub price: f64,
+    pub penalty: f64,
     /// Samples of all outputs.
     pub samples: usize,
     /// Samples of each output.
@@ -106,7 +106,7 @@ impl Fit {
     /// Bayesian information criterion: smaller is better.
     #[must_use]
     pub fn bic(&self) -> f64 {
-        self.deviance + self.price
+        self.deviance + self.penalty
     }
 
     /// Variance of the innovations, with the degrees of freedom of the residual.
@@ -329,7 +329,7 @@ pub fn fit_from(
         deviance: n * (1.0 + (std::f64::consts::TAU * (cost / n).max(f64::MIN_POSITIVE)).ln())
             + end.log_det,
         parameters: free.len() + model.samples().len() + noise.order(),
-        price: model.price(noise.order()),
+        penalty: model.bic_penalty(noise.order()),
         samples,
         samples_per_output: model.samples().to_vec(),
         priors: free_priors(model).count(),

@@ -43,7 +43,7 @@ pub trait Residuals: Sync {
 
     /// BIC penalty of the fitted parameters, with this number of noise coefficients: the logarithm of the number of samples for each
     /// parameter, including the scales of the outputs' noise.
-    fn price(&self, noise_order: usize) -> f64 {
+    fn bic_penalty(&self, noise_order: usize) -> f64 {
         let samples: usize = self.samples().iter().sum();
         let fitted = self.free().len() + self.samples().len() + noise_order;
         fitted as f64 * (samples as f64).ln()

@@ -13,7 +13,7 @@ use crate::{
     },
     diagnostics::{
         assemble::{assemble, floors},
-        remains::{Left, remains},
+        residual_tests::{NotNoise, not_noise},
         step,
     },
     fit::{
@@ -65,7 +65,7 @@ pub(crate) struct Believed<'a> {
     pub shown: Node<'a>,
     /// The fit with the noise model of its residual.
     own: Fit,
-    left: Option<Left>,
+    left: Option<NotNoise>,
     pub lacking: bool,
     floor: Floors,
     pub control_loop: Option<ControlLoop>,
@@ -89,7 +89,7 @@ pub(crate) fn believed<'a>(
     let tempted = singles(&in_noise, &own.noise)
         .iter()
         .any(|single| single.gain_over(&in_noise) > BIC_MARGIN && beyond_chance(single, &in_noise));
-    let left = remains(&base, &own)?;
+    let left = not_noise(&base, &own)?;
     let lacking = tempted || left.is_some();
     let floor = floors(problem, &own.noise, "the residual of the believed model");
     // With a noise model that drifts, the simulation of the prewhitened fit may drift.

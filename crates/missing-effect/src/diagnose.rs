@@ -9,8 +9,8 @@ use plants::Placed;
 use crate::{
     Acceptance, ControlLoop, Diagnosis, Error, Options, PerOutput, Problem, Progress, Verdict,
     accept::{
-        doubt::doubt,
-        judge::{Course, Grade, Judge, PART, WHOLE},
+        acceptance::{AcceptanceTest, Course, Grade, PART, WHOLE},
+        ambiguity::remove_ambiguous,
         partial::largest_part,
         rounding::rounded,
         sticking::sticks,
@@ -23,14 +23,14 @@ use crate::{
     diagnostics::{
         assemble::{assemble, floors},
         held_out::share_on_held_out,
-        remains::remains,
+        residual_tests::not_noise,
         unknown::{self, unknown},
     },
     fit::criterion::BIC_MARGIN,
     search::{
         find::{find, shortened},
         rankings::{ranked, rankings},
-        scores::{price_of_colour, scores},
+        scores::{loss_by_coloured_noise, scores},
     },
     sentences,
 };
@@ -88,9 +88,12 @@ fn diagnose_whole(
         _ => (&white, &base, &found.grown),
     };
     let widen = ControlLoop::widens(control_loop.as_ref());
-    let (doubted, single) = rayon::join(|| doubt(&base, &found, widen), || grown.singles(metric));
-    let doubted = doubted?;
-    let mut confirmed = doubted.confirmed;
+    let (unambiguous, single) = rayon::join(
+        || remove_ambiguous(&base, &found, widen),
+        || grown.singles(metric),
+    );
+    let unambiguous = unambiguous?;
+    let mut confirmed = unambiguous.confirmed;
     let needed = confirmed.added.len();
     let stopped = needed > options.max_effects;
     if stopped {
@@ -99,34 +102,36 @@ fn diagnose_whole(
     }
 
     tell("telling apart", 1, 3);
-    let jumped = doubted.jumped.map(|jump| jump.left(&problem.records[0]));
+    let shifted = unambiguous
+        .shifted
+        .map(|shift| shift.left(&problem.records[0]));
     let searched = found.sets();
-    let judge = Judge {
+    let test = AcceptanceTest {
         base: &base,
         noise: &found.noise,
         wandering: found.wandering,
         in_loop: widen,
         by_simulation: found.by_simulation,
         stopped,
-        jumped,
+        shifted,
         singles: &single,
         searched: &searched,
     };
-    let (judged, (scores, price)) = rayon::join(
-        || judge.judge(confirmed),
+    let (accepted, (scores, loss)) = rayon::join(
+        || test.accept(confirmed),
         || {
             rayon::join(
                 || scores(believed, &single, metric, &innovations(&found.noise)),
-                || price_of_colour(&found.base, &single, &found.noise),
+                || loss_by_coloured_noise(&found.base, &single, &found.noise),
             )
         },
     );
-    let judged = judged?;
-    let (mut course, mut groups) = (judged.course, judged.groups);
-    let mut remark = sentences::of_courses(&judged.dropped);
+    let accepted = accepted?;
+    let (mut course, mut groups) = (accepted.course, accepted.groups);
+    let mut remark = sentences::of_courses(&accepted.dropped);
     let mut acceptance = Acceptance {
         effects: ids(&course.last().added),
-        share: (!course.last().added.is_empty()).then_some(judged.share),
+        share: (!course.last().added.is_empty()).then_some(accepted.share),
         share_test: None,
         required: WHOLE,
         required_partial: PART,
@@ -140,7 +145,7 @@ fn diagnose_whole(
     // memory describes.
     let sticking = widen && sticks(&problem.records);
     let unexplained = course.left.is_some() || found.limited || sticking;
-    if judged.grade != Grade::Whole || (course.last().added.is_empty() && unexplained) {
+    if accepted.grade != Grade::Whole || (course.last().added.is_empty() && unexplained) {
         let by_error = found.grown.promising_singles();
         let tested = largest_part(&base, &found, &by_error, &innovations(&found.noise), widen)?;
         if let Some(tested) = &tested {
@@ -153,22 +158,22 @@ fn diagnose_whole(
             tested.reasons.is_empty() && tested.node.added.len() <= options.max_effects
         }) {
             Some(tested) => {
-                let judge = Judge {
+                let test = AcceptanceTest {
                     wandering: true,
                     by_simulation: true,
                     singles: &by_error,
-                    ..judge
+                    ..test
                 };
-                course = judge.course(&tested.node)?;
-                groups = judge.groups(course.last())?;
+                course = test.course(&tested.node)?;
+                groups = test.groups(course.last())?;
                 remark = None;
                 partial = true;
             }
-            None if judged.grade != Grade::Whole => {
+            None if accepted.grade != Grade::Whole => {
                 remark = Some(sentences::of_a_part(course.last()));
                 course = Course {
-                    left: remains(&base, &doubted.own_base)?,
-                    own: doubted.own_base,
+                    left: not_noise(&base, &unambiguous.own_base)?,
+                    own: unambiguous.own_base,
                     nodes: vec![course.nodes.swap_remove(0)],
                 };
                 groups.clear();
@@ -194,7 +199,7 @@ fn diagnose_whole(
             &rounded.outputs,
             &problem.records[0].outputs,
         ));
-        let longer = judge.longer(course.nodes.clone(), rounded.node)?;
+        let longer = test.longer(course.nodes.clone(), rounded.node)?;
         // If rounding leaves structure in the residual, the error stays unexplained.
         if longer.left.is_none() || !course.last().added.is_empty() {
             course = longer;
@@ -256,7 +261,7 @@ fn diagnose_whole(
     let minimum = sentences::of_a_minimum(&diagnosis);
     let terms = sentences::of_terms(problem);
     let stop = stopped.then(|| sentences::of_a_stop(options.max_effects, needed));
-    let colour = price.and_then(sentences::of_the_colour);
+    let colour = loss.and_then(sentences::of_coloured_noise);
     let disagree = sentences::of_rankings(&diagnosis.rankings);
     let more = [
         rounding, remark, held_out, minimum, stop, terms, colour, disagree,

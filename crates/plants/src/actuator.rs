@@ -122,7 +122,7 @@ impl<T: Scalar> Actuator<T> {
     }
 
     /// Sets an initial state of the lag other than steady state: `h` before the record began, its output exceeded its input by `before`.
-    pub(crate) fn unsettle(&mut self, before: T, h: f64) {
+    pub(crate) fn set_initial_state(&mut self, before: T, h: f64) {
         if let Some(lag) = &self.lag {
             self.excess = decayed(before, lag.time_constant, h);
         }

@@ -10,7 +10,7 @@ pub struct Picked {
     /// The best alternative.
     pub value: f64,
     /// Number of alternatives.
-    pub of: f64,
+    pub alternatives: f64,
 }
 
 /// The ranges of the data: they set plausible parameter ranges, start values and operating levels.

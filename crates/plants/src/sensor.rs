@@ -14,7 +14,7 @@ pub(crate) struct Sensor<T: Scalar> {
 }
 
 impl<T: Scalar> Sensor<T> {
-    /// The sensor's lag starts in steady state, unless [`Sensor::unsettle`] sets another initial state.
+    /// The sensor's lag starts in steady state, unless [`Sensor::set_initial_state`] sets another initial state.
     pub(crate) fn new(laws: Vec<Box<dyn Law<T>>>) -> Self {
         let lag = laws.iter().find_map(|law| law.sensor_lag());
         let lag = lag.map(KeptMoments::new);
@@ -26,7 +26,7 @@ impl<T: Scalar> Sensor<T> {
     }
 
     /// Sets an initial state of the lag other than steady state: `h` before the record began, its output exceeded the level by `before`.
-    pub(crate) fn unsettle(&mut self, before: T, h: f64) {
+    pub(crate) fn set_initial_state(&mut self, before: T, h: f64) {
         if let Some(lag) = &self.lag {
             self.excess = decayed(before, lag.time_constant, h);
         }

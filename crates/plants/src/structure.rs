@@ -222,7 +222,7 @@ impl Structure {
     /// combinations of its starts and, if a start is the strongest spectral line or the best quantisation step, all lines or steps from
     /// which it was picked.
     #[must_use]
-    pub fn ways(&self, placed: Placed) -> f64 {
+    pub fn alternatives(&self, placed: Placed) -> f64 {
         let parameters = self.effect_parameters(placed);
         let combinations: f64 = parameters.iter().map(|p| p.starts.len() as f64).product();
         let starts_at = |unit, value| {
@@ -231,11 +231,11 @@ impl Structure {
         };
         let lines = Picked {
             value: self.scales.period,
-            of: 0.5 * self.scales.duration / self.scales.sample_interval,
+            alternatives: 0.5 * self.scales.duration / self.scales.sample_interval,
         };
         let picked = |unit, from: Option<Picked>| {
             from.filter(|from| starts_at(unit, from.value))
-                .map_or(0.0, |from| from.of)
+                .map_or(0.0, |from| from.alternatives)
         };
         combinations
             + picked(crate::Unit::TIME, Some(lines))

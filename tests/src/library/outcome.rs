@@ -308,7 +308,7 @@ pub fn outcome(
         "{:?} {:?}, left {:?}, noise order {:?}, BIC over the truth's: found {:.0}, base {:.0}; {:.1} s{}{}",
         found.verdict,
         found.groups,
-        found.left,
+        found.not_noise,
         found
             .noise
             .iter()

@@ -1,6 +1,6 @@
 //! Diagnosis of a user's own model.
 
-use effect_search::{Diagnosis, Left, Options, Step, Thresholds, Verdict};
+use effect_search::{Diagnosis, NotNoise, Options, Step, Thresholds, Verdict};
 
 use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
@@ -101,7 +101,7 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
             100.0 * share
         ));
     }
-    match (&diagnosis.left, diagnosis.verdict) {
+    match (&diagnosis.not_noise, diagnosis.verdict) {
         (Some(left), Verdict::Unexplained) => all.push(format!(
             "The residual of the model is not noise: {}. No candidate explains it.",
             said_of(left)
@@ -143,14 +143,14 @@ pub(crate) fn sizes(diagnosis: &Diagnosis, effect: &str) -> Vec<String> {
     .collect()
 }
 
-fn said_of(left: &Left) -> String {
+fn said_of(left: &NotNoise) -> String {
     match left {
-        Left::Input { input, output } => format!("the residual of {output} depends on {input}"),
-        Left::Period { output, period } => format!(
+        NotNoise::Input { input, output } => format!("the residual of {output} depends on {input}"),
+        NotNoise::Period { output, period } => format!(
             "the residual of {output} has a period of {}",
             ct_signals::duration(*period)
         ),
-        Left::Instant {
+        NotNoise::Instant {
             output,
             record,
             from,
@@ -160,16 +160,16 @@ fn said_of(left: &Left) -> String {
             ct_signals::duration(*from),
             ct_signals::duration(*to)
         ),
-        Left::Level { output } => {
+        NotNoise::Level { output } => {
             format!("the residual of {output} depends on the model's output")
         }
-        Left::Spectrum { output, record } => format!(
+        NotNoise::Spectrum { output, record } => format!(
             "the spectrum of the residual of {output} changes during {record}: one noise model does not explain it"
         ),
-        Left::Function { effect, variable } => {
+        NotNoise::Function { effect, variable } => {
             format!("a function of {variable} lowers the error by more than noise would: {effect}")
         }
-        Left::Slow { output } => format!(
+        NotNoise::Slow { output } => format!(
             "the residual of {output} drifts too slowly to be noise in records of this length"
         ),
     }

@@ -129,7 +129,7 @@ pub fn diagnosed(
     shown.groups.clone_from(&found.groups);
     shown.in_doubt = vec![false; found.effects.len()];
     shown.places = vec![Vec::new(); found.effects.len()];
-    shown.residual_unexplained = found.left.is_some();
+    shown.residual_unexplained = found.not_noise.is_some();
     shown.ranked.clone_from(&found.ranked);
     let floors: Vec<f64> = found.noise.iter().map(|noise| noise.level).collect();
     let singles = found.singles.iter().map(|single| {

@@ -6,7 +6,7 @@ use ct_model::effects::{OwnCandidate, OwnParameter};
 use ct_model::{Model, ModelSpec, Simulation};
 use ct_signals::{Channel, Record, noise};
 use effect_search::{
-    Believed, Diagnosis, Error, Kept, Left, Options, Problem, Verdict, believed, diagnose,
+    Believed, Diagnosis, Error, Kept, NotNoise, Options, Problem, Verdict, believed, diagnose,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -167,7 +167,7 @@ fn what_is_hidden_is_named() {
             "{hidden}: {:?} {:?}, {:?}, {:?}",
             diagnosis.verdict,
             diagnosis.groups,
-            diagnosis.left,
+            diagnosis.not_noise,
             &diagnosis.singles[..3]
         );
         let (first, last) = (
@@ -204,7 +204,7 @@ fn nothing_is_named_where_nothing_is_missing() {
             Verdict::Adequate,
             "{:?} {:?} {:?}",
             diagnosis.groups,
-            diagnosis.left,
+            diagnosis.not_noise,
             diagnosis.noise
         );
         assert_eq!(diagnosis.ranked[0], "none");
@@ -251,7 +251,7 @@ fn what_no_candidate_holds_is_not_called_noise() {
         diagnosis.verdict,
         diagnosis.groups
     );
-    assert!(diagnosis.left.is_some());
+    assert!(diagnosis.not_noise.is_some());
 }
 
 /// The gain at one block rises and falls with the temperature of the other: effects of the catalogue imitate a part of it, and a noise
@@ -261,8 +261,8 @@ fn a_function_that_no_candidate_has_is_found_in_what_the_noise_model_takes_for_n
     for correlation in [0.0, 0.8] {
         let truth = PAIR.replace("g*u", "g*u*(1 + 0.2*sin(0.12*T2))");
         let diagnosis = found(&problem(PAIR, record(&truth, correlation, 0.5, 3)));
-        let told = (diagnosis.verdict, &diagnosis.groups, &diagnosis.left);
-        let Some(Left::Function { variable, .. }) = &diagnosis.left else {
+        let told = (diagnosis.verdict, &diagnosis.groups, &diagnosis.not_noise);
+        let Some(NotNoise::Function { variable, .. }) = &diagnosis.not_noise else {
             panic!("{told:?}");
         };
         assert_eq!(variable, "T2");
@@ -306,7 +306,7 @@ fn effects_of_the_model_file_are_fitted_with_it_and_keep_their_record() {
         Verdict::Adequate,
         "{:?} {:?} {:?}",
         diagnosis.groups,
-        diagnosis.left,
+        diagnosis.not_noise,
         diagnosis.noise
     );
     assert!(diagnosis.effects.is_empty());

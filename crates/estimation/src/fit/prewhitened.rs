@@ -19,11 +19,11 @@ pub fn coloured(
     let mut fit = prewhitened(model, fit, order, None, stopping)?;
     // The fit maximises the likelihood, by which models are compared; the standard errors use the noise model of an unbiased residual.
     if fit.noise.order() > 0 {
-        let (deviance, parameters, price) = (fit.deviance, fit.parameters, fit.price);
+        let (deviance, parameters, penalty) = (fit.deviance, fit.parameters, fit.penalty);
         let noise = noise_of(model, &fit, order)?;
         fit = fit_from(model, vec![fit.x.into()], &noise, stopping)?;
         // The likelihood is compared with the penalty for its number of coefficients.
-        (fit.deviance, fit.parameters, fit.price) = (deviance, parameters, price);
+        (fit.deviance, fit.parameters, fit.penalty) = (deviance, parameters, penalty);
         if let Some(rows) = rows(model, &fit.x) {
             let own: Vec<usize> = (0..fit.interior.len()).collect();
             let mut order = fit.interior.clone();

@@ -59,12 +59,12 @@ pub struct Setup<'a> {
     clock: Clock,
 }
 
-/// BIC penalty of a free initial state, see [`Setup::price`].
+/// BIC penalty of a free initial state, see [`Setup::bic_penalty`].
 ///
 /// In BIC, a parameter's penalty is the logarithm of the number of samples, because the information on a parameter grows with the record.
 /// The influence of an initial state decays after a few time constants, so a longer record contains no more information on it; its penalty
 /// is that of Akaike's criterion, 2. With the logarithm, BIC would prefer a dead time to a lag, which has an unknown initial state.
-const STATE_PRICE: f64 = 2.0;
+const STATE_PENALTY: f64 = 2.0;
 
 impl<'a> Setup<'a> {
     /// The same structure and records in closed loop: the loop with the controller is simulated from the reference. Returns the setup and
@@ -263,10 +263,10 @@ impl<'a> Setup<'a> {
     /// BIC penalty of all estimated numbers: the free entries, the noise variances and `noise_order` noise coefficients. It is the
     /// logarithm of the number of samples for each, but 2 for an initial state.
     #[must_use]
-    pub fn price(&self, noise_order: usize) -> f64 {
+    pub fn bic_penalty(&self, noise_order: usize) -> f64 {
         let states = self.free.iter().filter(|&&i| i >= self.parameters).count();
         let lasting = self.free.len() - states + self.outputs() + noise_order;
-        lasting as f64 * (self.samples() as f64).ln() + STATE_PRICE * states as f64
+        lasting as f64 * (self.samples() as f64).ln() + STATE_PENALTY * states as f64
     }
 
     /// Fixes the initial states; only parameters remain free. For records whose initial state comes from a simulation.

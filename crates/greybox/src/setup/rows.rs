@@ -31,8 +31,8 @@ impl Residuals for Setup<'_> {
         self.show_residuals(x, &mut each)
     }
 
-    fn price(&self, noise_order: usize) -> f64 {
-        Setup::price(self, noise_order)
+    fn bic_penalty(&self, noise_order: usize) -> f64 {
+        Setup::bic_penalty(self, noise_order)
     }
 
     fn floor(&self, output: usize) -> f64 {

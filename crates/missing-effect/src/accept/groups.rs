@@ -8,7 +8,7 @@ use crate::{
     Error, GROUP_MARGIN, PlaceScore,
     diagnostics::step::place_name,
     fit::node::{Node, ROUGH, best_first, fitted, refine},
-    search::exchange::{NEAR, exchanges},
+    search::swap::{NEAR, swaps},
 };
 
 /// Largest ratio of the mean squared residual of an alternative to that of an effect that is a function of time.
@@ -58,7 +58,7 @@ pub(crate) fn groups<'a>(
                 };
                 !(narrow || node.added.iter().any(at_the_edge))
             };
-            let mut nodes = exchanges(last, position, metric, singles)?;
+            let mut nodes = swaps(last, position, metric, singles)?;
             let missed = |set: &&&Node| {
                 let found = |other: Placed| {
                     let mut same = nodes.iter().filter(|node| node.added.contains(&other));

@@ -2,8 +2,8 @@
 //!
 //! Measured records often hold several causes, and noise that is nearly integrated. That no set of effects leaves noise does not mean
 //! that nothing was found: a set is a partial answer where
-//! - it explains [`PART`](crate::accept::judge::PART) of the excess error, the mean squared simulation error above the noise floor; one
-//!   with an effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::accept::judge::WHOLE) of it, alone and
+//! - it explains [`PART`](crate::accept::acceptance::PART) of the excess error, the mean squared simulation error above the noise floor; one
+//!   with an effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::accept::acceptance::WHOLE) of it, alone and
 //!   beyond what a random walk explains;
 //! - of several effects: they are called for where each model has a noise model of its own, of limited memory;
 //! - it predicts the next sample as well as the model without it does, each beside a noise model of its own;
@@ -20,8 +20,8 @@ use rayon::prelude::*;
 use crate::{
     Error,
     accept::{
-        judge::{PART, WHOLE, explained},
-        jump::jump,
+        acceptance::{PART, WHOLE, explained},
+        level_shift::level_shift,
         random_walk::{Walk, beyond_random_walk},
         sticking::sticks,
     },
@@ -83,7 +83,7 @@ pub(crate) fn largest_part<'a>(
 ) -> Result<Option<Tested<'a>>, Error> {
     let white = base.setup.white_noise();
     let own_base = in_own_noise(base)?;
-    let jump = jump(base, &white)?.map_or(f64::INFINITY, |jump| jump.bic);
+    let jump = level_shift(base, &white)?.map_or(f64::INFINITY, |shift| shift.bic);
     let sticks = in_loop && sticks(base.setup.records);
     let mut best: Option<Tested<'a>> = None;
     let mut smaller: Vec<(Vec<Placed>, f64)> = Vec::new();

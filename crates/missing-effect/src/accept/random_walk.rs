@@ -194,7 +194,7 @@ pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node, walk: Walk) -> R
     let free = |node: &Node| node.setup.free().len();
     let fall = without.deviance(walk) - with.deviance(walk);
     let freedom = free(gained).saturating_sub(free(lacking)).max(1);
-    let penalty = gained.setup.price(0) - lacking.setup.price(0);
+    let penalty = gained.setup.bic_penalty(0) - lacking.setup.bic_penalty(0);
     let chance = ChiSquared::new(freedom as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
     Ok(fall > penalty + BIC_MARGIN && chance_of(gained, lacking, STRICTER * chance))
 }

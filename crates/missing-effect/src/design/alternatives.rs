@@ -96,7 +96,7 @@ impl Search<'_, '_> {
             second_sensor::in_experiment(&simulated[truth], node, other, known, self.metric)
         };
         // Repeated records have not decided anything before: the criteria differ only by the penalty of a parameter.
-        let [a, b] = self.nodes.each_ref().map(|node| node.fit.price);
+        let [a, b] = self.nodes.each_ref().map(|node| node.fit.penalty);
         let fewer = b - a;
         let fresh = |if_true: [f64; 2]| -> Power { power(if_true, [fewer, -fewer]) };
         Some(SecondSensor {

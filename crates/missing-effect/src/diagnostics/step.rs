@@ -9,7 +9,7 @@ use crate::{
     diagnostics::{
         held_out::hold_out,
         locate::{Located, Series, locate},
-        remains::input_p,
+        residual_tests::input_p,
     },
     fit::{node::Node, noise_model::NOISE_ORDER},
 };
@@ -101,7 +101,7 @@ fn tests(node: &Node, residuals: &[Vec<f64>], output: usize) -> Result<ResidualT
 pub(crate) fn report(
     node: &Node,
     bic: f64,
-    judge: &Noise,
+    noise_floor: &Noise,
     test: &[Record],
     widen: bool,
 ) -> Result<Step, Error> {
@@ -128,7 +128,7 @@ pub(crate) fn report(
             .collect();
         let failures = locate(&Located {
             series: &series,
-            noise: judge.output(output),
+            noise: noise_floor.output(output),
             output_unit: &first.outputs[output].unit,
             input_unit: &first.inputs[0].unit,
             clock: &Clock::of(setup.records),
@@ -152,7 +152,7 @@ pub(crate) fn report(
         errors = widened(node, errors)?;
     }
     let named = |values: &[f64]| PerOutput::of(&first.outputs, values);
-    let floors: Vec<f64> = judge.iter().map(ArModel::stationary_std).collect();
+    let floors: Vec<f64> = noise_floor.iter().map(ArModel::stationary_std).collect();
     let of_test = held_out.as_ref().map(|held_out| {
         let of = |(count, rmse, _): &(usize, f64, HeldOutError)| (*count, *rmse);
         let (counts, rmse): (Vec<usize>, Vec<f64>) = held_out.outputs.iter().map(of).unzip();

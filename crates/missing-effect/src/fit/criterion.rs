@@ -32,7 +32,7 @@ pub(crate) fn chance_of(gained: &Node, lacking: &Node, chance: f64) -> bool {
         .added
         .iter()
         .filter(|placed| !lacking.added.contains(placed))
-        .map(|placed| candidates * gained.setup.structure.ways(*placed))
+        .map(|placed| candidates * gained.setup.structure.alternatives(*placed))
         .product();
     chance * looks < FALSE_CLAIM
 }

@@ -78,13 +78,13 @@ pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, 
     };
     let finer = grid / FINER as f64;
     let best = best_of(near - grid, finer, 2 * FINER + 1);
-    // The grid is no coarser than a fit needs: the selected start is identified by its value (`Structure::ways`).
+    // The grid is no coarser than a fit needs: the selected start is identified by its value (`Structure::alternatives`).
     let structure = &node.setup.structure;
     let visited = structure.scales.level[structure.scales.outputs[output].vessel];
     let coarsest = 0.5 * (visited.1 - visited.0);
     Ok(best.map(|(_, turns)| Picked {
         value: (1.0 / turns).min(coarsest),
-        of: looks as f64,
+        alternatives: looks as f64,
     }))
 }
 
@@ -165,13 +165,16 @@ mod tests {
         let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
         let found = hidden_step(&node, 0).unwrap().unwrap();
         // From two steps to as many as the noise permits, over the range of the readings.
-        assert!(found.of > 100.0);
+        assert!(found.alternatives > 100.0);
         let placed = Placed {
             effect: EffectInfo::find(EFFECT).unwrap(),
             vessel: 0,
         };
         let setup = Parent::new(&node).with(placed).unwrap();
         // The step itself, from starts with and without noise before the quantisation.
-        assert_eq!(setup.structure.ways(placed), 2.0 + found.of);
+        assert_eq!(
+            setup.structure.alternatives(placed),
+            2.0 + found.alternatives
+        );
     }
 }

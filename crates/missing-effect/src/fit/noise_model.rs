@@ -60,7 +60,7 @@ pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
     let deviance: f64 = outputs
         .map(|(cost, &n)| n as f64 * (cost / n as f64).max(f64::MIN_POSITIVE).ln())
         .sum();
-    Ok(deviance + log_det + node.setup.price(noise.order()))
+    Ok(deviance + log_det + node.setup.bic_penalty(noise.order()))
 }
 
 /// The noise's spectrum at frequency zero over its mean: factor by which slow parameters are less certain than with white noise of the same

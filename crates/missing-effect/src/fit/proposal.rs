@@ -29,7 +29,7 @@ const BY_CLOCK: usize = 1;
 ///
 /// The step has little damping: for an effect that is nearly collinear with other parameters, both take
 /// long steps, and damping would leave the error of the start in the prediction.
-fn promise(setup: &Setup, x: &[f64], triangle: &Triangle) -> f64 {
+fn predicted(setup: &Setup, x: &[f64], triangle: &Triangle) -> f64 {
     let free: Vec<usize> = (0..setup.free().len()).collect();
     let scale: Vec<f64> = free.iter().map(|&j| triangle.column_norm(j)).collect();
     let mut step = triangle.solve(&free, &scale, PROMISE_DAMPING);
@@ -51,7 +51,7 @@ pub(crate) struct Proposal<'a> {
     pub setup: Setup<'a>,
     pub added: Vec<Placed>,
     pub starts: Vec<Start>,
-    pub promise: f64,
+    pub predicted: f64,
 }
 
 /// A model that is extended, and the dominant period of its residual, computed on demand.
@@ -100,14 +100,14 @@ pub(crate) fn propose<'a>(
         return None;
     }
     let setup = parent.with(placed)?;
-    let (promise, starts) = promising(parent.node, &setup, placed, noise)?;
+    let (predicted, starts) = promising(parent.node, &setup, placed, noise)?;
     let mut added = parent.node.added.clone();
     added.push(placed);
     Some(Proposal {
         setup,
         added,
         starts,
-        promise,
+        predicted,
     })
 }
 
@@ -130,16 +130,16 @@ pub(crate) fn promising(
         .filter_map(|mut x| {
             setup.begin_near_priors(&mut x);
             let triangle = setup.linearise(&x, noise)?;
-            let promise = promise(setup, &x, &triangle);
+            let predicted = predicted(setup, &x, &triangle);
             let triangle = Some(triangle);
-            Some((promise, Start { x, triangle }))
+            Some((predicted, Start { x, triangle }))
         })
         .collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let promise = ranked.first()?.0;
+    let predicted = ranked.first()?.0;
     let starts = ranked.into_iter().take(FOLLOWED);
     let starts = starts.map(|(_, start)| start).collect();
-    Some((promise, starts))
+    Some((predicted, starts))
 }
 
 /// A limited number of items of a list, evenly spaced.
@@ -197,7 +197,7 @@ pub(crate) fn proposals<'a>(parent: &Node<'a>, noise: &Noise) -> Vec<Proposal<'a
         .into_par_iter()
         .filter_map(|placed| propose(&from, placed, noise))
         .collect();
-    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    proposals.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
     proposals
 }
 
@@ -223,7 +223,7 @@ pub(crate) fn candidates(parent: &Node) -> Vec<Placed> {
 }
 
 /// Whether some further effect has a predicted reduction that is `worth` it.
-pub(crate) fn any_promise(
+pub(crate) fn any_worthwhile(
     parent: &Node,
     noise: &Noise,
     worth: impl Fn(&Setup, f64) -> bool + Sync,
@@ -231,7 +231,7 @@ pub(crate) fn any_promise(
     let from = Parent::new(parent);
     candidates(parent).into_par_iter().any(|placed| {
         propose(&from, placed, noise)
-            .is_some_and(|proposal| worth(&proposal.setup, proposal.promise))
+            .is_some_and(|proposal| worth(&proposal.setup, proposal.predicted))
     })
 }
 
@@ -253,7 +253,7 @@ pub(crate) fn place<'a>(
             setup,
             added,
             starts: Vec::new(),
-            promise: f64::INFINITY,
+            predicted: f64::INFINITY,
         })
     });
     let mut proposal = proposal?;

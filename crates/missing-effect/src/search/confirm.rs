@@ -9,7 +9,7 @@ use crate::{
         criterion::{BIC_MARGIN, beyond_chance},
         node::{FINE, Node, best_first, without},
     },
-    search::exchange::{NEAR, exchanges},
+    search::swap::{NEAR, swaps},
 };
 
 /// Number of the best swap steps that are refitted; ...
@@ -43,7 +43,7 @@ pub(crate) fn improve<'a>(mut node: Node<'a>, noise: &Noise) -> Result<Node<'a>,
     while node.added.len() > 1 {
         let mut others: Vec<Node<'a>> = (0..node.added.len())
             .into_par_iter()
-            .map(|position| exchanges(&node, position, noise, None))
+            .map(|position| swaps(&node, position, noise, None))
             .collect::<Result<Vec<_>, _>>()?
             .concat();
         others.retain(|other| other.gain_over(&node) > -NEAR && other.plausible());

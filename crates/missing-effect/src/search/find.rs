@@ -13,9 +13,9 @@ use crate::{
     },
     search::{
         confirm::{confirm, improve, least_useful},
-        exhausted::{Rest, rest},
         floating::follow,
         growth::{Breadth, Grown, grow},
+        residual_kind::{ResidualKind, residual_kind},
     },
 };
 
@@ -95,7 +95,7 @@ pub(crate) fn find<'a>(
             ..breadth
         },
         pays_in_colour,
-        rest,
+        residual_kind,
         &|done, total| tell("searching sets of effects", done, total),
     )?;
     if grown.goes_on(SIDE_BY_SIDE) {
@@ -140,9 +140,9 @@ pub(crate) fn find<'a>(
             // The search with this noise model (that of the set's own residual) has converged, including its pairs.
             |node| {
                 if grown.exhausted_by(node) {
-                    Ok(Rest::Noise)
+                    Ok(ResidualKind::Noise)
                 } else {
-                    rest(node)
+                    residual_kind(node)
                 }
             },
             &|done, total| tell("searching in the noise's metric", done, total),

@@ -13,7 +13,7 @@ use crate::{
         node::{Node, ROUGH, best_first, in_time},
         proposal::{Parent, Proposal, candidates, proposals, propose, realise_all},
     },
-    search::{exhausted::Rest, pairs::joint_pairs},
+    search::{pairs::joint_pairs, residual_kind::ResidualKind},
 };
 
 /// Sets are equivalent if their explained parts differ by less than this share.
@@ -142,7 +142,7 @@ pub(crate) fn grow<'a>(
     noise: &Noise,
     breadth: Breadth,
     worth: impl Fn(&Node, &[Node]) -> bool,
-    rest: impl Fn(&Node) -> Result<Rest, Error>,
+    residual_kind: impl Fn(&Node) -> Result<ResidualKind, Error>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Grown<'a>, Error> {
     let mut grown = Grown {
@@ -170,9 +170,9 @@ pub(crate) fn grow<'a>(
             .unwrap_or(base);
         let mut may_end = None;
         if !best_before.added.is_empty() && idle == 0 {
-            let rest = rest(best_before)?;
-            may_end = (rest != Rest::Structure).then(|| best_before.added.clone());
-            if may_end.is_some() && (size > PAIR || rest == Rest::Noise) {
+            let rest = residual_kind(best_before)?;
+            may_end = (rest != ResidualKind::Structure).then(|| best_before.added.clone());
+            if may_end.is_some() && (size > PAIR || rest == ResidualKind::Noise) {
                 grown.exhausted = may_end;
                 break;
             }
@@ -264,6 +264,6 @@ pub(crate) fn extensions<'a>(
         .into_par_iter()
         .filter_map(|(parent, placed)| propose(parent, placed, noise))
         .collect();
-    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    proposals.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
     Ok(proposals)
 }

@@ -239,7 +239,7 @@ fn joined<'a>(
     first: &Linearised<'a>,
     second: &Linearised<'a>,
     added: Vec<Placed>,
-    promise: f64,
+    predicted: f64,
 ) -> Option<Proposal<'a>> {
     let mut structure = first.setup.structure.with(second.placed).ok()?;
     // A start that was selected from the residual for one effect is a start for the other one too.
@@ -274,6 +274,6 @@ fn joined<'a>(
         setup,
         added,
         starts,
-        promise,
+        predicted,
     })
 }

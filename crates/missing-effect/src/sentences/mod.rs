@@ -10,8 +10,8 @@ mod verdict;
 pub(crate) use self::{
     gaps::of_gaps,
     remarks::{
-        of_a_minimum, of_a_part, of_a_stop, of_courses, of_held_out, of_rankings, of_rounding,
-        of_terms, of_the_colour,
+        of_a_minimum, of_a_part, of_a_stop, of_coloured_noise, of_courses, of_held_out,
+        of_rankings, of_rounding, of_terms,
     },
     verdict::{of_comparison, of_diagnosis},
 };

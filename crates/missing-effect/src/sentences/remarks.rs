@@ -120,9 +120,9 @@ pub(crate) fn of_terms(problem: &Problem) -> Option<String> {
 }
 
 /// Remark: the loss of detectability by the coloured noise, if it is large.
-pub(crate) fn of_the_colour(price: f64) -> Option<String> {
-    (price >= 1.2).then(|| format!(
+pub(crate) fn of_coloured_noise(ratio: f64) -> Option<String> {
+    (ratio >= 1.2).then(|| format!(
         "The noise is coloured: an effect has to be about {} times larger to be detected than in white noise of the same variance. Effects smaller than the sizes under \"visible from\" may be present.",
-        significant(price, 2)
+        significant(ratio, 2)
     ))
 }

@@ -5,12 +5,12 @@ use ct_signals::duration;
 use super::rms;
 use crate::{
     Diagnosis, PerOutput, Step,
-    diagnostics::remains::{Left, Remains},
+    diagnostics::residual_tests::{NotNoise, Pattern},
     numbers::significant,
 };
 
 /// Structure in the residual of a step, as the end of a sentence.
-pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> String {
+pub(super) fn left_over(left: NotNoise, step: &Step, diagnosis: &Diagnosis) -> String {
     // A comparison has not searched the catalogue.
     let effect = if diagnosis.scores.is_empty() {
         "an effect that the model lacks"
@@ -46,12 +46,12 @@ pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> Strin
         name.map_or(String::new(), |record| format!(" (in {})", record.name))
     );
     match left.what {
-        Remains::Input => format!("{residual} depends on the input"),
-        Remains::Period(period) => format!(
+        Pattern::Input => format!("{residual} depends on the input"),
+        Pattern::Period(period) => format!(
             "{residual} oscillates with a period of about {}, which noise does not explain: it may be a disturbance or {effect}",
             about(period)
         ),
-        Remains::Instant(at, length) => format!(
+        Pattern::Instant(at, length) => format!(
             "{residual} has an abrupt change, {}, which noise does not explain: it may be a disturbance, a fault of the sensor or {effect}",
             if length > 0.0 {
                 diagnosis.clock.span(at, at + length)
@@ -59,11 +59,11 @@ pub(super) fn left_over(left: Left, step: &Step, diagnosis: &Diagnosis) -> Strin
                 format!("at {}", diagnosis.clock.at(at))
             }
         ),
-        Remains::Level => format!(
+        Pattern::Level => format!(
             "{residual} depends on the {}, which noise does not explain: the balance lacks {effect}",
             diagnosis.domain().level_words("level")
         ),
-        Remains::Slow(wander, process) => format!(
+        Pattern::Slow(wander, process) => format!(
             "{residual} drifts: its correlation time of {} reaches the slowest time constant, {}; it may be a disturbance or {effect}",
             if wander < record {
                 about(wander)

@@ -10,12 +10,12 @@ use super::{
 };
 use crate::{
     Diagnosis, PerOutput, Step, Verdict,
-    diagnostics::remains::{Left, Remains},
+    diagnostics::residual_tests::{NotNoise, Pattern},
     numbers::significant,
 };
 
 /// Verdict of a comparison alone.
-pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<String> {
+pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<NotNoise>) -> Vec<String> {
     let Some(step) = diagnosis.steps.first() else {
         return Vec::new();
     };
@@ -56,7 +56,7 @@ fn visible(diagnosis: &Diagnosis) -> String {
 }
 
 /// All sentences, the verdict first.
-pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<String> {
+pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<NotNoise>) -> Vec<String> {
     let unit = &diagnosis.output_unit;
     let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) else {
         return Vec::new();
@@ -86,7 +86,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<Left>) -> Vec<Str
         }
         Verdict::Unexplained => match left {
             // A correct model under a slow disturbance has such a residual too.
-            Some(left) if matches!(left.what, Remains::Slow(..)) => {
+            Some(left) if matches!(left.what, Pattern::Slow(..)) => {
                 said.push(format!(
                     "No effect of the catalogue is significant, but the residual is not noise: {}.",
                     left_over(left, first, diagnosis)

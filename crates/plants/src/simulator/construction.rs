@@ -182,10 +182,12 @@ impl<T: Scalar> Simulator<T> {
         for (lag, &before) in lags.iter().zip(before) {
             match lag.effect.place {
                 Place::Actuator => match &mut second {
-                    Some(second) if lag.vessel > 0 => second.actuator.unsettle(before, sample),
-                    _ => actuator.unsettle(before, sample),
+                    Some(second) if lag.vessel > 0 => {
+                        second.actuator.set_initial_state(before, sample)
+                    }
+                    _ => actuator.set_initial_state(before, sample),
                 },
-                _ => sensors[lag.vessel].1.unsettle(before, sample),
+                _ => sensors[lag.vessel].1.set_initial_state(before, sample),
             }
         }
         let watched = sensors[lagging.unwrap_or(0)].0;

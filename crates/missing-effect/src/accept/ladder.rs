@@ -20,15 +20,15 @@ const STARTS_AROUND: usize = 6;
 const ROUNDS: (u64, u64) = (2, 4);
 
 /// The believed model, then one effect after the other, each time the one that lowers the error most.
-pub(crate) fn trail<'a>(
+pub(crate) fn ladder<'a>(
     base: &Node<'a>,
     last: &Node<'a>,
     noise: &Noise,
 ) -> Result<Vec<Node<'a>>, Error> {
-    let mut trail = vec![refine(base, noise, &[])?];
-    trail[0].fit = trail[0].fit.clone().continuing(&base.fit);
+    let mut ladder = vec![refine(base, noise, &[])?];
+    ladder[0].fit = ladder[0].fit.clone().continuing(&base.fit);
     for k in 0..last.added.len() {
-        let parent = &trail[k];
+        let parent = &ladder[k];
         let remaining = last.added.iter().filter(|on| !parent.added.contains(on));
         let nodes: Vec<Node> = remaining
             .copied()
@@ -53,10 +53,10 @@ pub(crate) fn trail<'a>(
                 around(&mut node, STARTS_AROUND, noise, 100 * k as u64 + round)?;
             }
         }
-        trail.push(node);
+        ladder.push(node);
     }
     // If the time is over, intermediate models may have a higher cost than the final set.
-    if let Some(end) = trail.last_mut()
+    if let Some(end) = ladder.last_mut()
         && end.added.len() == last.added.len()
         && end.added.iter().all(|placed| last.added.contains(placed))
     {
@@ -66,5 +66,5 @@ pub(crate) fn trail<'a>(
             end.setup = known.setup;
         }
     }
-    Ok(trail)
+    Ok(ladder)
 }

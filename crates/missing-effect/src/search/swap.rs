@@ -15,7 +15,7 @@ use crate::{
 /// A rough fit within this distance of the criterion may come within a group's margin.
 pub(crate) const NEAR: f64 = 25.0;
 /// Number of alternatives that are refitted for each effect: this many by predicted reduction, and this many after a few iterations.
-const EXCHANGED: usize = 12;
+const SWAPPED: usize = 12;
 /// In larger sets half as many alternatives are refitted, and fewer for a few iterations, because a fit takes several times as long.
 const LARGE: usize = 2;
 const QUICKLY: usize = 16;
@@ -25,7 +25,7 @@ const OUT_OF_REACH: f64 = 0.5;
 /// Swap steps: the set with one of its effects replaced by each other candidate, refitted, best first.
 ///
 /// `singles`: what [`singles`](crate::fit::proposal::singles) gives in the same metric. It holds the exchanges of an only effect.
-pub(crate) fn exchanges<'a>(
+pub(crate) fn swaps<'a>(
     node: &Node<'a>,
     position: usize,
     noise: &Noise,
@@ -43,7 +43,7 @@ pub(crate) fn exchanges<'a>(
             .filter(|single| single.added.last() != Some(&own))
             .cloned()
             .collect(),
-        _ => begin_exchanges(&lacking, node, own, noise),
+        _ => begin_swaps(&lacking, node, own, noise),
     };
     let nodes = begun
         .into_par_iter()
@@ -92,7 +92,7 @@ fn carried(node: &Node, own: Placed, stand_in: &Node) -> Option<Vec<f64>> {
 }
 
 /// First fits of the candidates that may replace an effect; `lacking` is the node without it.
-fn begin_exchanges<'a>(
+fn begin_swaps<'a>(
     lacking: &Node<'a>,
     node: &Node<'a>,
     own: Placed,
@@ -107,19 +107,19 @@ fn begin_exchanges<'a>(
             proposal.starts.truncate(1);
             // In the model without the effect, the other parameters have changed to compensate for it, and a fit from there may miss the
             // minimum. With an equivalent alternative, the parameters have nearly the values that they have with the effect.
-            if let Some((promise, starts)) = promising(node, &proposal.setup, placed, noise) {
+            if let Some((predicted, starts)) = promising(node, &proposal.setup, placed, noise) {
                 proposal.starts.extend(starts.into_iter().take(1));
-                proposal.promise = proposal.promise.min(promise);
+                proposal.predicted = proposal.predicted.min(predicted);
             }
             Some(proposal)
         })
         .collect();
-    proposals.sort_by(|a, b| a.promise.total_cmp(&b.promise));
+    proposals.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
     let refitted = if lacking.added.len() < LARGE {
-        EXCHANGED
+        SWAPPED
     } else {
         proposals.truncate(QUICKLY);
-        EXCHANGED / 2
+        SWAPPED / 2
     };
     // The predicted reduction is linear: with nonlinear parameters such as a time constant or a threshold, only a few iterations show the
     // actual reduction. If parameters are nearly collinear, a few iterations are too few, and the predicted reduction is used.

@@ -16,7 +16,7 @@ use crate::thresholds::Thresholds;
 /// A property of a residual that noise does not have.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum Left {
+pub enum NotNoise {
     /// It depends on an input.
     Input {
         /// The input.
@@ -80,7 +80,7 @@ fn is_predictable(signal: &[f64], thresholds: &Thresholds) -> bool {
 impl Context<'_> {
     /// The first property of a set's residual that noise does not have, `None` if the residual is noise; `own` is the set's fit with the noise
     /// model of its own residual.
-    pub fn left(&self, node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
+    pub fn not_noise(&self, node: &Node, own: &Fit) -> Result<Option<NotNoise>, Error> {
         let setup = self.setup(&node.model)?;
         let Some(residuals) = estimation::residuals(&setup, &own.x) else {
             return Ok(None);
@@ -117,13 +117,13 @@ impl Context<'_> {
             }
         }
         if let Some((input, i)) = place.filter(|_| least * count < self.thresholds.not_noise) {
-            return Ok(Some(Left::Input {
+            return Ok(Some(NotNoise::Input {
                 input,
                 output: name(i),
             }));
         }
         if let Some((period, i)) = self.harmonics(node, (&setup, own), &residuals) {
-            return Ok(Some(Left::Period {
+            return Ok(Some(NotNoise::Period {
                 output: name(i),
                 period: period * self.problem.time_unit,
             }));
@@ -137,14 +137,14 @@ impl Context<'_> {
             if samples(residual) == residual.len()
                 && let Some(cycles) = period(residual, level)?
             {
-                return Ok(Some(Left::Period {
+                return Ok(Some(NotNoise::Period {
                     output: name(i),
                     period: record.duration() / cycles as f64,
                 }));
             }
             let white = standardised(own.noise.of_series(i), residual);
             if let Some((from, to)) = instant(&white, level) {
-                return Ok(Some(Left::Instant {
+                return Ok(Some(NotNoise::Instant {
                     output: name(i),
                     record: record.name.clone(),
                     from: record.time[from],
@@ -152,10 +152,10 @@ impl Context<'_> {
                 }));
             }
             if level_p(&models[i], &white) < level {
-                return Ok(Some(Left::Level { output: name(i) }));
+                return Ok(Some(NotNoise::Level { output: name(i) }));
             }
             if stationary_p(own.noise.of_series(i), residual, &self.thresholds) < level {
-                return Ok(Some(Left::Spectrum {
+                return Ok(Some(NotNoise::Spectrum {
                     output: name(i),
                     record: record.name.clone(),
                 }));
@@ -165,12 +165,12 @@ impl Context<'_> {
             return Ok(Some(function));
         }
         let slow = self.slow_output(&own.noise);
-        Ok(slow.map(|o| Left::Slow { output: name(o) }))
+        Ok(slow.map(|o| NotNoise::Slow { output: name(o) }))
     }
 
     /// The smooth function that lowers the deviance of a set significantly, with the noise model of the set's own residual: a score test of each
     /// smooth function at each port.
-    fn function(&self, node: &Node, own: &Fit) -> Option<Left> {
+    fn function(&self, node: &Node, own: &Fit) -> Option<NotNoise> {
         let (with_shapes, of) = self.with_shapes();
         let node = Node {
             fit: own.clone(),
@@ -191,7 +191,7 @@ impl Context<'_> {
             })
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let (p, candidate) = least?;
-        (p * (of.len() as f64) < self.thresholds.function_chance).then(|| Left::Function {
+        (p * (of.len() as f64) < self.thresholds.function_chance).then(|| NotNoise::Function {
             effect: candidate.id.clone(),
             variable: self.variable_of(candidate).0,
         })

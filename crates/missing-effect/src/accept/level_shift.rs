@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::{
     Error,
-    diagnostics::remains::{Left, Remains},
+    diagnostics::residual_tests::{NotNoise, Pattern},
     fit::{
         node::{FINE, Node},
         noise_model::residual_colour,
@@ -27,7 +27,7 @@ const INSTANT: f64 = 1.0;
 
 /// A fitted model with a level shift of the reading.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Jump {
+pub(crate) struct LevelShift {
     /// Criterion of the model with the level shift.
     pub bic: f64,
     /// The last sample before the level shift.
@@ -36,11 +36,11 @@ pub(crate) struct Jump {
     output: usize,
 }
 
-impl Jump {
+impl LevelShift {
     /// Description of the level shift as unexplained structure of the record.
-    pub fn left(self, record: &Record) -> Left {
-        Left {
-            what: Remains::Instant(record.time[self.before + 1], 0.0),
+    pub fn left(self, record: &Record) -> NotNoise {
+        NotNoise {
+            what: Pattern::Instant(record.time[self.before + 1], 0.0),
             record: Some(0),
             output: self.output,
         }
@@ -49,7 +49,7 @@ impl Jump {
 
 /// A model with a level shift of the reading at the best instant, weighted by a noise model; `None` if the record is too short, no fit
 /// succeeds, or there are several records.
-pub(crate) fn jump(node: &Node, noise: &Noise) -> Result<Option<Jump>, Error> {
+pub(crate) fn level_shift(node: &Node, noise: &Noise) -> Result<Option<LevelShift>, Error> {
     let [record] = node.setup.records else {
         return Ok(None);
     };
@@ -88,7 +88,7 @@ pub(crate) fn jump(node: &Node, noise: &Noise) -> Result<Option<Jump>, Error> {
         .into_par_iter()
         .take(INSTANTS)
         .filter_map(|(_, k, output)| {
-            Some(Jump {
+            Some(LevelShift {
                 bic: fitted(k, output).ok()?,
                 before: k - 1,
                 output,
@@ -146,19 +146,19 @@ mod tests {
         for by in [0.3, -0.3, 3.0] {
             let problem = problem(by, 1, 1);
             let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
-            let found = jump(&node, &noise).unwrap().unwrap();
+            let found = level_shift(&node, &noise).unwrap().unwrap();
             assert!(found.bic < node.fit.bic() - 100.0);
             let left = found.left(&problem.records[0]);
             assert_eq!(
                 left.what,
-                Remains::Instant(BEGIN + INTERVAL * AT as f64, 0.0)
+                Pattern::Instant(BEGIN + INTERVAL * AT as f64, 0.0)
             );
         }
         // Without a level shift, the best of several instants lowers the criterion by less than the penalty of its two parameters.
         let worth = (1..=10).filter(|seed| {
             let problem = problem(0.0, 1, *seed);
             let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
-            let found = jump(&node, &noise).unwrap().unwrap();
+            let found = level_shift(&node, &noise).unwrap().unwrap();
             found.bic < node.fit.bic()
         });
         assert_eq!(worth.count(), 0);
@@ -169,6 +169,6 @@ mod tests {
         let noise = Noise::white(1);
         let several = problem(0.3, 2, 1);
         let (node, _) = base(&several, &Options::default(), 1.0).unwrap();
-        assert!(jump(&node, &noise).unwrap().is_none());
+        assert!(level_shift(&node, &noise).unwrap().is_none());
     }
 }

@@ -4,18 +4,18 @@ use greybox::{Setup, coloured};
 
 use crate::{
     Error,
-    diagnostics::remains::remains,
+    diagnostics::residual_tests::not_noise,
     fit::{
         criterion::BIC_MARGIN,
         node::{Node, STOPPING},
         noise_model::NOISE_ORDER,
-        proposal::any_promise,
+        proposal::any_worthwhile,
     },
 };
 
 /// Structure of the residual of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Rest {
+pub(crate) enum ResidualKind {
     /// More than noise, or a further effect has a predicted reduction above its penalty.
     Structure,
     /// Coloured noise; the noise model may have absorbed an effect.
@@ -27,15 +27,15 @@ pub(crate) enum Rest {
 /// Residual of a set: noise, if no further effect has a predicted reduction above its penalty, with the noise model of the set's own
 /// residual.
 ///
-/// The colour is that of the set's own residual, so that a coloured noise does not keep the search going. A set beside this
-/// one, which leaves as little, is found where this one's effects are exchanged.
-pub(crate) fn rest(node: &Node) -> Result<Rest, Error> {
+/// The noise model is that of the set's own residual, so that coloured noise does not prolong the search. Other sets with the same error
+/// are found later, by swap steps.
+pub(crate) fn residual_kind(node: &Node) -> Result<ResidualKind, Error> {
     if node.setup.out_of_time() {
-        return Ok(Rest::Structure);
+        return Ok(ResidualKind::Structure);
     }
     let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?;
-    if remains(node, &own)?.is_some() {
-        return Ok(Rest::Structure);
+    if not_noise(node, &own)?.is_some() {
+        return Ok(ResidualKind::Structure);
     }
     let noise = own.noise.clone();
     let node = Node {
@@ -43,14 +43,15 @@ pub(crate) fn rest(node: &Node) -> Result<Rest, Error> {
         ..node.clone()
     };
     let (n, cost) = (node.setup.samples() as f64, node.fit.cost);
-    let pays = |setup: &Setup, promise: f64| {
-        n * (cost / promise).ln() - (setup.price(0) - node.setup.price(0)) > BIC_MARGIN
+    let pays = |setup: &Setup, predicted: f64| {
+        n * (cost / predicted).ln() - (setup.bic_penalty(0) - node.setup.bic_penalty(0))
+            > BIC_MARGIN
     };
-    Ok(if any_promise(&node, &noise, pays) {
-        Rest::Structure
+    Ok(if any_worthwhile(&node, &noise, pays) {
+        ResidualKind::Structure
     } else if noise.order() > 0 {
-        Rest::Coloured
+        ResidualKind::Coloured
     } else {
-        Rest::Noise
+        ResidualKind::Noise
     })
 }

@@ -1,18 +1,18 @@
 //! Tests whether the residual of a model is stationary AR noise that is independent of the input.
 //!
-//! An autoregressive model fits anything, a random walk included: that a residual *can* be whitened says nothing. Noise is
-//! what is independent of the command, has no place in time, no period, and forgets faster than the process does.
-//! Each of these is a test of the residual `w` whitened by the noise model of its own model's fit:
-//! - **the command**: the past of the command, of its square, and of the size of its moves, against `w` (Haugh's test; a
-//!   square and a move show what is even in the command or hangs on its direction). A whitened residual is independent of
-//!   the past of anything, a controller's output included.
-//! - **a period**: a line of the spectrum that stands out of its neighbours (`spectral_line.rs`).
-//! - **an instant**: windows of 1, 2, 4, ... samples of `w`, whose sums over the root of their length are standard normal.
-//! - **the level**: `w` against functions of what the model read a sample before. A term that is missing from a balance leaves a
-//!   residual that drifts with the level, and is no noise however slow it is. As `w` is white and independent of the past, its   regression
-//!   on any past is chi-square, whatever the colour of the regressors.
-//! - **slowness**: the integral of the noise's autocorrelation over positive lags is longer than the slowest time constant
-//!   of the process. Such a noise can stand for anything that the process lacks, so it is no answer.
+//! An autoregressive model fits any series, even a random walk, so a white innovation alone proves nothing. Noise is independent of the
+//! command, does not change over the record, has no period, and has a shorter correlation time than the process. Each test uses the
+//! residual `w`, whitened by the noise model that was fitted to this residual:
+//! - **command**: the past of the command, of its square and of the size of its changes against `w` (Haugh's test; the square and the
+//!   changes show what is even in the command or depends on its direction). A white series is independent of the past of any signal, the
+//!   output of a controller included.
+//! - **period**: a spectral line above its neighbours (`spectral_line.rs`).
+//! - **instant**: windows of 1, 2, 4, ... samples of `w`; a sum over the root of the window's length is standard normal.
+//! - **level**: `w` against functions of the model's output one sample before. A term that is missing from a balance leaves a residual that
+//!   depends on the level, however slow it is. As `w` is white and independent of the past, its regression on any past signal is
+//!   chi-square.
+//! - **drift**: the integral of the noise's autocorrelation over positive lags exceeds the slowest time constant of the process. Such noise
+//!   can imitate any missing effect, so it is no explanation.
 //!
 //! **References**: L. D. Haugh, J. American Statistical Association 71 (1976) 378-385; S. A. Billings, W. S. F. Voon,
 //! Correlation based model validity tests for non-linear models, Int. J. Control 44 (1986) 235-244.
@@ -33,7 +33,7 @@ const NOT_NOISE: f64 = 1e-4;
 
 /// Structure of a residual that noise does not explain; the first one found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Remains {
+pub(crate) enum Pattern {
     /// The command.
     Input,
     /// A period \[s\].
@@ -48,18 +48,18 @@ pub(crate) enum Remains {
 
 /// Structure of a residual that noise does not explain, with its record, if it is in one of the fitted records, and its output.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Left {
-    pub what: Remains,
+pub(crate) struct NotNoise {
+    pub what: Pattern,
     pub record: Option<usize>,
     pub output: usize,
 }
 
-impl Left {
+impl NotNoise {
     /// The noise level above which there is something to explain. A drift is noise too, and effects are confirmed with it as weighting;
     /// other unexplained structure is absorbed by the noise model, but hardly enters its innovations. By output.
     pub(crate) fn above(&self, noise: &Noise) -> Vec<f64> {
         let size = |noise: &ArModel| match self.what {
-            Remains::Slow(..) => noise.stationary_std(),
+            Pattern::Slow(..) => noise.stationary_std(),
             _ => noise.sigma(),
         };
         noise.iter().map(size).collect()
@@ -67,12 +67,12 @@ impl Left {
 }
 
 /// Structure in the residual of a model that is not noise; `own` is the model's fit with the noise model of its own residual.
-pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
+pub(crate) fn not_noise(node: &Node, own: &Fit) -> Result<Option<NotNoise>, Error> {
     let outputs = node.setup.outputs();
     let (p, series) = least_p(node, None, of_command)?;
     if p < NOT_NOISE {
-        return Ok(Some(Left {
-            what: Remains::Input,
+        return Ok(Some(NotNoise {
+            what: Pattern::Input,
             record: series.map(|i| i / outputs),
             output: series.map_or(0, |i| i % outputs),
         }));
@@ -80,7 +80,7 @@ pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
     let residuals = node.setup.disturbance(&own.x)?;
     let records = node.setup.records;
     let level = NOT_NOISE / residuals.len() as f64;
-    let left = |what: Remains, i: usize| Left {
+    let left = |what: Pattern, i: usize| NotNoise {
         what,
         record: Some(i / outputs),
         output: i % outputs,
@@ -98,7 +98,7 @@ pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
     };
     for (i, (model, residual)) in models.iter().zip(&residuals).enumerate() {
         if level_p(model, &standardised(own.noise.of_series(i), residual)) < level {
-            return Ok(Some(left(Remains::Level, i)));
+            return Ok(Some(left(Pattern::Level, i)));
         }
     }
     if own.noise.order() == 0 {
@@ -111,8 +111,8 @@ pub(crate) fn remains(node: &Node, own: &Fit) -> Result<Option<Left>, Error> {
     let process = slowest_time_constant(node)?;
     Ok(slowest
         .filter(|(wander, _)| *wander > process)
-        .map(|(wander, output)| Left {
-            what: Remains::Slow(wander, process),
+        .map(|(wander, output)| NotNoise {
+            what: Pattern::Slow(wander, process),
             record: None,
             output,
         }))
@@ -174,11 +174,11 @@ fn place_in_time(
     residual: &[f64],
     noise: &ArModel,
     level: f64,
-) -> Result<Option<Remains>, Error> {
+) -> Result<Option<Pattern>, Error> {
     if let Some(cycles) = period(residual, level)? {
-        return Ok(Some(Remains::Period(record.duration() / cycles as f64)));
+        return Ok(Some(Pattern::Period(record.duration() / cycles as f64)));
     }
     let found = instant(&standardised(noise, residual), level);
     Ok(found
-        .map(|(from, to)| Remains::Instant(record.time[from], record.time[to] - record.time[from])))
+        .map(|(from, to)| Pattern::Instant(record.time[from], record.time[to] - record.time[from])))
 }

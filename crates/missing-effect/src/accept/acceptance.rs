@@ -9,10 +9,10 @@ use crate::{
     Error, Problem, Step,
     accept::{
         groups::{Group, groups},
-        trail::trail,
+        ladder::ladder,
     },
     diagnostics::{
-        remains::{Left, Remains, remains},
+        residual_tests::{NotNoise, Pattern, not_noise},
         step,
     },
     fit::{
@@ -26,10 +26,9 @@ use crate::{
 /// If the residual is not noise, effects are the whole explanation if they explain at least this share of the excess error: the mean
 /// squared simulation error above the noise floor.
 ///
-/// The tests that confirm an effect take what remains for noise. Against a disturbance from outside, which is none, their
-/// probabilities do not hold: whatever effect happens to resemble it is "beyond chance". Over records of nine
-/// simulated disturbances such effects imitate up to six sevenths of one as a rule; a true effect beside which something small
-/// remains explains nineteen twentieths and more.
+/// The tests that confirm an effect assume that the residual is noise. If it is an unknown disturbance, their probabilities do not hold: an
+/// effect that resembles the disturbance is significant. Over records with nine simulated disturbances such effects imitated up to 6/7 of
+/// the excess error; a true effect beside a small unknown one explained 19/20 and more.
 pub(crate) const WHOLE: f64 = 0.9;
 /// Effects are a partial explanation from this share on.
 pub(crate) const PART: f64 = 0.38;
@@ -49,7 +48,7 @@ pub(crate) enum Grade {
 }
 
 /// Data for the acceptance test of a set.
-pub(crate) struct Judge<'s, 'a> {
+pub(crate) struct AcceptanceTest<'s, 'a> {
     pub base: &'s Node<'a>,
     pub noise: &'s Noise,
     pub wandering: bool,
@@ -60,7 +59,7 @@ pub(crate) struct Judge<'s, 'a> {
     /// Whether the set was cut to the permitted number of effects.
     pub stopped: bool,
     /// Structure of the residual after a level shift of the reading, if the structure is a level shift.
-    pub jumped: Option<Left>,
+    pub shifted: Option<NotNoise>,
     /// The single effects, with the weighting of their last refit.
     pub singles: &'s [Node<'a>],
     /// The sets that the search has fitted.
@@ -68,7 +67,7 @@ pub(crate) struct Judge<'s, 'a> {
 }
 
 /// Result of the acceptance test of a set.
-pub(crate) struct Judged<'a> {
+pub(crate) struct Accepted<'a> {
     pub course: Course<'a>,
     pub grade: Grade,
     /// The share of the excess error that the set explains.
@@ -79,19 +78,19 @@ pub(crate) struct Judged<'a> {
     pub dropped: Vec<Placed>,
 }
 
-impl<'a> Judge<'_, 'a> {
+impl<'a> AcceptanceTest<'_, 'a> {
     /// The accepted set, or the accepted part of it.
     ///
     /// If the residual is not noise, an effect that a function of time can replace is not accepted: an unknown disturbance may have caused
     /// both. This applies to that effect alone. The other effects stay if they are significant without it, and are accepted if they explain
     /// enough without it: effects that only compensated a rejected one are dropped too.
-    pub fn judge(&self, mut set: Node<'a>) -> Result<Judged<'a>, Error> {
-        let mut judged = self.as_it_is(&set, None)?;
+    pub fn accept(&self, mut set: Node<'a>) -> Result<Accepted<'a>, Error> {
+        let mut accepted = self.tested(&set, None)?;
         loop {
-            let courses = judged.courses_of_time();
+            let courses = accepted.courses_of_time();
             // If a set was cut, its unexplained part includes the effects that were cut off, and the result reports this.
-            if self.stopped || courses.is_empty() || judged.grade != Grade::Whole {
-                return Ok(judged);
+            if self.stopped || courses.is_empty() || accepted.grade != Grade::Whole {
+                return Ok(accepted);
             }
             for course in &courses {
                 if let Some(position) = set.added.iter().position(|on| on == course) {
@@ -99,18 +98,18 @@ impl<'a> Judge<'_, 'a> {
                 }
             }
             set = confirm(set, self.noise)?;
-            let others = (!set.added.is_empty()).then(|| self.as_it_is(&set, judged.course.left));
+            let others = (!set.added.is_empty()).then(|| self.tested(&set, accepted.course.left));
             match others.transpose()? {
                 Some(others) if others.grade == Grade::Whole => {
-                    let mut dropped = judged.dropped;
+                    let mut dropped = accepted.dropped;
                     dropped.extend(courses);
-                    judged = Judged { dropped, ..others };
+                    accepted = Accepted { dropped, ..others };
                 }
                 // A function of time can be a part of the explanation only.
                 _ => {
-                    return Ok(Judged {
+                    return Ok(Accepted {
                         grade: Grade::Part,
-                        ..judged
+                        ..accepted
                     });
                 }
             }
@@ -119,7 +118,7 @@ impl<'a> Judge<'_, 'a> {
 
     /// `beside`: structure in the residual of a larger set. A noise model that absorbs this structure, and the part that the larger set
     /// explained, does not make it noise.
-    fn as_it_is(&self, set: &Node<'a>, beside: Option<Left>) -> Result<Judged<'a>, Error> {
+    fn tested(&self, set: &Node<'a>, beside: Option<NotNoise>) -> Result<Accepted<'a>, Error> {
         let mut course = self.course(set)?;
         course.left = course.left.or(beside);
         let (share, grade) = match course.left {
@@ -142,7 +141,7 @@ impl<'a> Judge<'_, 'a> {
         } else {
             Vec::new()
         };
-        Ok(Judged {
+        Ok(Accepted {
             course,
             grade,
             share,
@@ -176,7 +175,7 @@ impl<'a> Judge<'_, 'a> {
 
     /// The models from the base to a set.
     pub fn course(&self, set: &Node<'a>) -> Result<Course<'a>, Error> {
-        let mut nodes = trail(self.base, set, &set.setup.white_noise())?;
+        let mut nodes = ladder(self.base, set, &set.setup.white_noise())?;
         let last = nodes.pop().unwrap_or_else(|| self.base.clone());
         let in_noise = if self.by_simulation || self.stopped {
             last.clone()
@@ -204,9 +203,9 @@ impl<'a> Judge<'_, 'a> {
     ) -> Result<Course<'a>, Error> {
         let own = coloured(&last.setup, in_noise, NOISE_ORDER, STOPPING)?;
         // A slow drift of the residual is weaker evidence than an abrupt change.
-        let left = match remains(&last, &own)? {
-            Some(left) if !matches!(left.what, Remains::Slow(..)) => Some(left),
-            left => self.jumped.or(left),
+        let left = match not_noise(&last, &own)? {
+            Some(left) if !matches!(left.what, Pattern::Slow(..)) => Some(left),
+            left => self.shifted.or(left),
         };
         // The last model is shown with the noise weighting, in which its parameters are most accurate. An incomplete model is not: a
         // weighting that treats the missing effect as noise would let its simulation drift.
@@ -218,7 +217,7 @@ impl<'a> Judge<'_, 'a> {
     }
 }
 
-impl Judged<'_> {
+impl Accepted<'_> {
     /// Effects of a set that a function of time can replace, if the residual is not noise.
     fn courses_of_time(&self) -> Vec<Placed> {
         if self.grade != Grade::Whole || self.course.left.is_none() {
@@ -239,7 +238,7 @@ pub(crate) struct Course<'a> {
     pub nodes: Vec<Node<'a>>,
     /// The last model with the noise model of its own residual.
     pub own: Fit,
-    pub left: Option<Left>,
+    pub left: Option<NotNoise>,
 }
 
 impl<'a> Course<'a> {
@@ -254,7 +253,7 @@ impl<'a> Course<'a> {
         problem: &Problem,
         widen: bool,
     ) -> Result<Vec<Step>, Error> {
-        let judge = floor.noise()?;
+        let noise = floor.noise()?;
         self.nodes
             .par_iter()
             .enumerate()
@@ -264,7 +263,7 @@ impl<'a> Course<'a> {
                 } else {
                     coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING)?.bic()
                 };
-                step::report(node, bic, &judge, &problem.test, widen)
+                step::report(node, bic, &noise, &problem.test, widen)
             })
             .collect()
     }
@@ -307,7 +306,7 @@ mod tests {
 
     /// A saturating pump together with an oscillation of the reading that has no name; returns the estimate of the saturation and a drift
     /// of the sensor.
-    fn judged(swing: f64) -> (bool, Vec<&'static str>, Vec<&'static str>) {
+    fn accepted(swing: f64) -> (bool, Vec<&'static str>, Vec<&'static str>) {
         let read = |t: f64, level: f64| level + swing * (t / 150.0).sin();
         let problem = simulated::tank(|u| u.min(4.2), read, 0.0, 1);
         let (base, _) = base(&problem, &Options::default(), 1.0).unwrap();
@@ -321,35 +320,35 @@ mod tests {
             let proposal = propose(&Parent::new(&set), placed, &white).unwrap();
             set = realise(proposal, &white, crate::fit::node::FINE).unwrap();
         }
-        let judged = Judge {
+        let accepted = AcceptanceTest {
             base: &base,
             noise: &colour(&set).unwrap(),
             wandering: true,
             in_loop: false,
             by_simulation: true,
             stopped: false,
-            jumped: None,
+            shifted: None,
             singles: &singles(&base, &white),
             searched: &[],
         }
-        .judge(set)
+        .accept(set)
         .unwrap();
-        assert!(judged.course.left.is_some());
+        assert!(accepted.course.left.is_some());
         let ids = |set: &[Placed]| set.iter().map(|placed| placed.effect.id).collect();
-        let kept = ids(&judged.course.last().added);
-        (judged.grade == Grade::Whole, kept, ids(&judged.dropped))
+        let kept = ids(&accepted.course.last().added);
+        (accepted.grade == Grade::Whole, kept, ids(&accepted.dropped))
     }
 
     #[test]
     fn a_course_of_time_is_taken_out_alone_where_the_others_explain_enough() {
-        let (fair, kept, dropped) = judged(0.15);
+        let (fair, kept, dropped) = accepted(0.15);
         assert!(fair);
         assert_eq!(
             (kept, dropped),
             (vec!["pump_saturation"], vec!["sensor_drift"])
         );
         // If the oscillation is as large as the effect of the saturation, the saturation is not accepted either.
-        let (fair, ..) = judged(1.0);
+        let (fair, ..) = accepted(1.0);
         assert!(!fair);
     }
 }

@@ -7,10 +7,10 @@ use crate::{
     Error,
     accept::{
         groups::NEARLY,
-        jump::{Jump, jump},
+        level_shift::{LevelShift, level_shift},
         random_walk::{Walk, beyond_random_walk},
     },
-    diagnostics::remains::remains,
+    diagnostics::residual_tests::not_noise,
     fit::{
         criterion::{BIC_MARGIN, beyond_chance},
         node::{FINE, Node, ROUGH, STOPPING, best_first, fitted, refine, without, without_clock},
@@ -20,20 +20,20 @@ use crate::{
 };
 
 /// Result of the comparison with alternatives.
-pub(crate) struct Doubted<'a> {
+pub(crate) struct Unambiguous<'a> {
     pub confirmed: Node<'a>,
     /// The believed model with a noise model fitted to its own residual.
     pub own_base: Fit,
     /// The level shift that explains more than the confirmed set.
-    pub jumped: Option<Jump>,
+    pub shifted: Option<LevelShift>,
 }
 
 /// Removes from the confirmed set what a simpler explanation covers as well; `in_loop`: the records come from a loop that is not simulated.
-pub(crate) fn doubt<'a>(
+pub(crate) fn remove_ambiguous<'a>(
     base: &Node<'a>,
     found: &Found<'a>,
     in_loop: bool,
-) -> Result<Doubted<'a>, Error> {
+) -> Result<Unambiguous<'a>, Error> {
     let noise = &found.noise;
     let mut confirmed = found.confirmed.clone();
     // Each model has a noise model of its own residual: an error that coloured noise explains needs no effect. The largest model explains a
@@ -51,12 +51,12 @@ pub(crate) fn doubt<'a>(
         confirmed = found.base.clone();
     }
     // A set of effects has to be better than the simplest course that no effect causes.
-    let jumped = if confirmed.added.is_empty() {
+    let shifted = if confirmed.added.is_empty() {
         None
     } else {
-        jump(&found.base, noise)?.filter(|jump| jump.bic < confirmed.fit.bic())
+        level_shift(&found.base, noise)?.filter(|shift| shift.bic < confirmed.fit.bic())
     };
-    if jumped.is_some() {
+    if shifted.is_some() {
         confirmed = found.base.clone();
     }
     // Slow noise also biases gains and saturations, because their inputs are slow.
@@ -80,7 +80,7 @@ pub(crate) fn doubt<'a>(
         let others = confirm(others, noise)?;
         if by_walk
             || (others.added.len() < count && !white)
-            || remains(&confirmed, &own_last)?.is_some()
+            || not_noise(&confirmed, &own_last)?.is_some()
         {
             confirmed = others;
         }
@@ -99,10 +99,10 @@ pub(crate) fn doubt<'a>(
     if !beyond_small_walk(&confirmed)? {
         confirmed = found.base.clone();
     }
-    Ok(Doubted {
+    Ok(Unambiguous {
         confirmed,
         own_base,
-        jumped,
+        shifted,
     })
 }
 
@@ -128,7 +128,7 @@ fn simpler<'a>(confirmed: &Node<'a>, found: &Found<'a>) -> Option<Node<'a>> {
     };
     let leaves_noise = |node: &Node| {
         let own = coloured(&node.setup, node.fit.clone(), NOISE_ORDER, STOPPING);
-        own.is_ok_and(|own| remains(node, &own).is_ok_and(|left| left.is_none()))
+        own.is_ok_and(|own| not_noise(node, &own).is_ok_and(|left| left.is_none()))
     };
     let sizes = 1..confirmed.added.len();
     let smaller: Vec<Node> = found

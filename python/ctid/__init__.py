@@ -13,8 +13,11 @@ are several experiments. Results are frames where pandas is installed; else mapp
 
 from . import tables
 from ._ctid import ContinuousRls, DataError, Error, ModelError, StabilizedOe
+from ._design import Design
+from ._diagnosis import Diagnosis
+from ._fit import Fit
 from ._linear import Fcloe, Identification, StateSpace, identify
-from ._model import Design, Diagnosis, Fit, Model
+from ._model import Model
 from ._monitor import Monitor, Step
 
 __all__ = [

@@ -211,3 +211,10 @@ def series(names: Sequence[str], values: Sequence[float | None], name: str) -> A
     if module is None:
         return dict(zip(names, numbers, strict=True))
     return module.Series(numbers, index=list(names), name=name, dtype=np.float64)
+
+
+def row_count(data: Data) -> int:
+    """Number of rows of a record."""
+    if isinstance(data, Mapping):
+        return max((np.asarray(values).size for values in data.values()), default=0)
+    return len(data)

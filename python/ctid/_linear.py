@@ -56,7 +56,7 @@ class StateSpace:
 
 
 class Identification:
-    """A linear model `A(s) y = B(s) u + d` that was identified; it never changes."""
+    """A linear model `A(s) y = B(s) u + d` that was identified; immutable."""
 
     __slots__ = ("_curves", "_found")
 

@@ -10,16 +10,21 @@ import numpy as np
 
 from . import _ctid
 from ._ctid import ModelError
+from ._design import Design
+from ._diagnosis import Diagnosis
+from ._fit import Fit
 from ._frames import Array, Data, Records, index_of, table, to_frame, to_frames
-from ._model import _SEED, Design, Diagnosis, Effort, Fit, Model, Progress, _clear, _teller
+from ._model import Model
+from ._options import SEED, Effort, Progress, clear_line, phase_printer
 from ._tank_model import TankModel
 from ._tank_plant import designed
 
 if TYPE_CHECKING:
     import pandas as pd
 
+
 class TankFit(Fit):
-    """A plant that was fitted; it never changes."""
+    """A plant that was fitted; immutable."""
 
     __slots__ = ("_parts", "_tank")
 
@@ -96,7 +101,7 @@ class TankFit(Fit):
         effort: Effort = "normal",
         time_limit: float | None = None,
         max_effects: int | None = None,
-        seed: int = _SEED,
+        seed: int = SEED,
         progress: Progress = True,
     ) -> Diagnosis:
         """Searches the catalogue for what the plant is missing, as `ctid diagnose` does; see `Fit.diagnose`."""
@@ -105,10 +110,10 @@ class TankFit(Fit):
             raise ModelError("max_effects is a whole number above zero")
         try:
             found = self._tank.diagnose(
-                frames, effort=effort, time_limit=time_limit, max_effects=max_effects, seed=seed, progress=_teller(progress)
+                frames, effort=effort, time_limit=time_limit, max_effects=max_effects, seed=seed, progress=phase_printer(progress)
             )
         finally:
-            _clear(progress)
+            clear_line(progress)
         kept = (self._tank.to_bytes(), self._tank.units)
         return TankDiagnosis(found.json(), found.sentences, found.html(), (found.series, found.output_units), self._parts, kept)
 
@@ -125,7 +130,7 @@ def _tank_fit_of(content: bytes, indexes: list[Any], parts: dict[str, Any]) -> T
 
 
 class TankDiagnosis(Diagnosis):
-    """What a plant is missing; it never changes."""
+    """What a plant is missing; immutable."""
 
     __slots__ = ("_html", "_json", "_kept", "_parts", "_sentences", "_series_of", "_units_of")
 
@@ -204,7 +209,7 @@ class TankDiagnosis(Diagnosis):
         duration: float | None = None,
         effort: Effort = "normal",
         time_limit: float | None = None,
-        seed: int = _SEED,
+        seed: int = SEED,
         progress: Progress = True,
     ) -> Design:
         """Proposes the next experiment, which tells two effects apart, as `ctid design` does; see `Diagnosis.design`.

@@ -10,10 +10,12 @@ import numpy as np
 
 from . import _ctid
 from ._ctid import DataError, ModelError
-from ._frames import Records, as_list, index_of, series, to_frames
+from ._fit import Fit
+from ._frames import Records, as_list, index_of, row_count, series, to_frames
 from ._linear import StateSpace, _guess
-from ._model import _SEED, Fit, Hold, Model, Progress, _clear, _rows, _teller
+from ._model import Model
 from ._monitor import Monitor
+from ._options import SEED, Hold, Progress, clear_line, phase_printer
 from ._tank_plant import linearized, monitored
 
 if TYPE_CHECKING:
@@ -41,7 +43,7 @@ def _toml(value: object) -> str:
 
 
 class TankModel(Model):
-    """A plant of the program; it never changes."""
+    """A plant of the program; immutable."""
 
     __slots__ = ("_parts", "_units", "_values")
 
@@ -115,7 +117,7 @@ class TankModel(Model):
         *,
         hold: Hold | None = None,
         starts: int = 12,
-        seed: int = _SEED,
+        seed: int = SEED,
         noise_order: int = 6,
         progress: Progress = False,
     ) -> Fit:
@@ -129,7 +131,7 @@ class TankModel(Model):
         """
         if isinstance(inputs, Mapping) or isinstance(outputs, Mapping):
             raise ModelError(f"{self.name} has no signals of its own names: give lists of columns")
-        if (starts, seed, noise_order) != (12, _SEED, 6):
+        if (starts, seed, noise_order) != (12, SEED, 6):
             raise ModelError(f"starts, seed and noise_order of {self.name} are the program's: leave them out")
         records = as_list(data)
         if not records:
@@ -148,10 +150,10 @@ class TankModel(Model):
         model = TankModel(parts)
         frames = to_frames(records, "data", [*u, *y])
         try:
-            fitted = model._native.fit(frames, progress=_teller(progress))
+            fitted = model._native.fit(frames, progress=phase_printer(progress))
         finally:
-            _clear(progress)
-        return TankFit(fitted, [index_of(record, _rows(record)) for record in records], parts)
+            clear_line(progress)
+        return TankFit(fitted, [index_of(record, row_count(record)) for record in records], parts)
 
     def to_modelica(self) -> str:
         """A plant of the program has no text: raises `ModelError`."""

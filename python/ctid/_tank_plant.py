@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from . import _ctid
 from ._ctid import ModelError
+from ._design import Design
 from ._frames import table
 from ._linear import StateSpace, state_space
-from ._model import Design, Progress, _clear, _teller
 from ._monitor import Monitor
+from ._options import Progress, clear_line, phase_printer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,15 +72,15 @@ def designed(
             seed=seed,
             effort=effort,
             time_limit=time_limit,
-            progress=_teller(progress),
+            progress=phase_printer(progress),
         )
     finally:
-        _clear(progress)
+        clear_line(progress)
     return TankDesign(json.loads(text), 1.0)
 
 
 class TankDesign(Design):
-    """An experiment that was proposed for a plant; it never changes."""
+    """An experiment that was proposed for a plant; immutable."""
 
     __slots__ = ()
 

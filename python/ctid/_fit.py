@@ -1,0 +1,333 @@
+"""The fit of a model to records."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _ctid
+from ._ctid import DataError, ModelError
+from ._diagnosis import Diagnosis
+from ._frames import (
+    Array,
+    Data,
+    Records,
+    index_of,
+    need_pandas,
+    series,
+    table,
+    to_frame,
+    to_frames,
+)
+from ._model import Model
+from ._options import SEED, Effort, Progress, clear_line, phase_printer
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from typing_extensions import Self
+
+
+def _p(value: float) -> str:
+    if np.isnan(value):
+        return "-"
+    return "< 0.001" if value < 0.001 else f"{value:.3f}"
+
+
+class Fit:
+    """A model that was fitted to records; immutable."""
+
+    __slots__ = ("_indexes", "_native")
+
+    def __init__(self, native: _ctid.Fit, indexes: Sequence[Any]) -> None:
+        self._native = native
+        self._indexes = list(indexes)
+
+    @property
+    def model(self) -> Model:
+        """The model with its fitted values."""
+        return Model(self._native.model)
+
+    @property
+    def params(self) -> pd.Series[float]:
+        """All parameters, then the initial states, in the units of the text."""
+        all = self._native.estimates
+        result: pd.Series[float] = series([e[0] for e in all], [e[1] for e in all], "value")
+        return result
+
+    @property
+    def std_errors(self) -> pd.Series[float]:
+        """Standard errors under the noise of the residual; NaN of what is known, at a bound, or not determined."""
+        all = self._native.estimates
+        result: pd.Series[float] = series([e[0] for e in all], [e[2] for e in all], "std_error")
+        return result
+
+    def conf_int(self, level: float = 0.95) -> pd.DataFrame:
+        """Intervals that hold the truth with probability `level`, within 0 and 1: columns `lower` and `upper`."""
+        halves = [np.nan if half is None else half for half in self._native.half_widths(level)]
+        all = self._native.estimates
+        lower = [e[1] - half for e, half in zip(all, halves, strict=True)]
+        upper = [e[1] + half for e, half in zip(all, halves, strict=True)]
+        result: pd.DataFrame = table({"lower": lower, "upper": upper}, [e[0] for e in all])
+        return result
+
+    @property
+    def cov(self) -> pd.DataFrame:
+        """Covariance of what was fitted, under the noise of the residual. Raises `DataError` where the records do not determine all of it."""
+        found = self._native.covariance()
+        if found is None:
+            which = "; ".join(" with ".join(names) for names in self._not_determined)
+            raise DataError(
+                f"the records do not determine all that is fitted ({which or 'see summary()'}): make some of it known, or give priors"
+            )
+        names, matrix = found
+        result: pd.DataFrame = need_pandas().DataFrame(matrix, index=names, columns=names)
+        return result
+
+    def _tables(self, of: Callable[[Array, Array], Array]) -> pd.DataFrame:
+        pandas = need_pandas()
+        parts = []
+        for k, (record, times, outputs) in enumerate(self._series):
+            columns = {name: of(measured, model) for name, measured, model in outputs}
+            index = self._indexes[k] if len(self._indexes) == len(self._series) else None
+            if index is None or len(index) != len(times):
+                index = pandas.Index(times, name="t [s]")
+            parts.append((record, pandas.DataFrame(columns, index=index)))
+        if len(parts) == 1:
+            result: pd.DataFrame = parts[0][1]
+            return result
+        names = [f"{name} ({k + 1})" if sum(n == name for n, _ in parts) > 1 else name for k, (name, _) in enumerate(parts)]
+        result = pandas.concat([part for _, part in parts], keys=names, names=["record"])
+        return result
+
+    @property
+    def residuals(self) -> pd.DataFrame:
+        """Measured minus simulated, a column for each output; NaN where nothing was measured. Several records stand under their names."""
+        return self._tables(lambda measured, model: measured - model)
+
+    @property
+    def fitted(self) -> pd.DataFrame:
+        """What the fitted model gives on its records, a column for each output."""
+        return self._tables(lambda _, model: model)
+
+    @property
+    def starts(self) -> dict[str, int]:
+        """How many starts were tried, and how many of them ended in the best minimum."""
+        tried, agree = self._native.starts
+        return {"tried": tried, "agree": agree}
+
+    @property
+    def bic(self) -> float:
+        """Bayesian information criterion; smaller is better."""
+        return self._native.bic
+
+    def scores(self, test: Records | None = None) -> pd.DataFrame:
+        """Simulation error (`rmse`, in the unit of the output) and fit (`fit_percent`, %) of each output, on the fitted records or others.
+
+        On others the initial states are fitted to the first rows, which are not scored.
+        """
+        found = self._scores if test is None else self._score_of(test)
+        result: pd.DataFrame = table(
+            {"rmse": [s[1] for s in found], "fit_percent": [s[2] for s in found]}, [s[0] for s in found]
+        )
+        return result
+
+    def score(self, test: Records) -> float:
+        """Simulation fit on other records, never one step ahead: `100 (1 - rmse/s)` with the standard deviation s of the readings, %.
+
+        Of several outputs it is their mean. `scores` has each. 100 is perfect, 0 no better than the mean, and below zero worse.
+        """
+        found = self._score_of(test)
+        if not found:
+            raise DataError("test: no record: give a frame, or a list of them")
+        return float(np.mean([s[2] for s in found]))
+
+    @property
+    def _not_determined(self) -> list[list[str]]:
+        return self._native.not_determined
+
+    @property
+    def _units(self) -> list[str]:
+        return self._native.output_units
+
+    @property
+    def _series(self) -> list[tuple[str, Array, list[tuple[str, Array, Array]]]]:
+        return self._native.series
+
+    @property
+    def _scores(self) -> list[tuple[str, float, float]]:
+        return self._native.scores
+
+    def _score_of(self, test: Records) -> list[tuple[str, float, float]]:
+        frames = to_frames(test, "test", self._wanted)
+        return self._native.score(frames) if frames else []
+
+    @property
+    def _name(self) -> str:
+        model = self._native.model
+        return " + ".join([model.name, *model.effects])
+
+    @property
+    def _wanted(self) -> list[str]:
+        model = self._native.model
+        return [column for _, column in model.inputs + model.outputs]
+
+    def simulate(self, data: Data, interval: float | None = 0.95, *, first: int = 5) -> pd.DataFrame:
+        """The fitted model on the inputs of another record.
+
+        Columns are pairs: the output, and `mean`, `lower` and `upper` of the band that holds the model's output with probability `interval`, and
+        `reading lower` and `reading upper` of the band of a reading. Where the record has readings, the initial states are fitted to the `first`
+        of each output; else they are those of the text. Without an interval, or where the records do not determine the parameters, there is the
+        mean alone.
+        """
+        model = self._native.model
+        signals = [column for _, column in model.inputs]
+        names = list(data)
+        present = [c for _, c in model.outputs if any(str(n) == c or str(n).split(" [")[0] == c for n in names)]
+        frame = to_frame(data, "test", signals + present)
+        found = self._native.simulate(frame, first, 0.95 if interval is None else interval)
+        columns: dict[Any, Array] = {}
+        for (output, _), found_series in zip(model.outputs, found["outputs"].values(), strict=True):
+            for name, values in found_series.items():
+                if interval is not None or name == "mean":
+                    columns[output, name] = values
+        rows = next(iter(columns.values())).size
+        result: pd.DataFrame = table(columns, index_of(data, rows))
+        return result
+
+    def failures(self) -> pd.DataFrame:
+        """Where the model fails on its records: windows of time, levels, inputs, directions and frequencies whose error is above the noise.
+
+        Columns: `output`, `by`, `record` of a window of time, the edges `from` and `to`, `samples`, the `mean` of the residual (measured minus
+        model), its `rms`, and its `share` of the squared error among those of the same `by`. The worst first. `failures_in_words` says the same.
+        """
+        rows: dict[str, list[Any]] = {
+            key: [] for key in ("output", "by", "record", "from", "to", "samples", "mean", "rms", "share")
+        }
+        found: list[tuple[Any, ...]] = []
+        for output, _, bins, _ in self._native.outputs:
+            sums: dict[str, float] = {}
+            for by, (_, _, _, count, _, rms, _) in bins:
+                sums[by] = sums.get(by, 0.0) + count * rms * rms
+            for by, (record, start, end, count, mean, rms, fails) in bins:
+                if fails:
+                    share = count * rms * rms / sums[by] if sums[by] > 0.0 else np.nan
+                    found.append((output, by, record, start, end, count, mean, rms, share))
+        for row in sorted(found, key=lambda row: -row[-1]):
+            for key, value in zip(rows, row, strict=True):
+                rows[key].append(value)
+        result: pd.DataFrame = table(rows)
+        return result
+
+    def failures_in_words(self) -> list[str]:
+        """Where the model fails, as the program says it."""
+        outputs = self._native.outputs
+        many = len(outputs) > 1
+        return [f"{name}: {line}" if many else line for name, _, _, lines in outputs for line in lines]
+
+    def summary(self) -> str:
+        """Parameters with standard errors and 95 % intervals, fit %, and the tests of the residual."""
+        estimates = self._native.estimates
+        halves = self._native.half_widths(0.95)
+        head = ["", "value", "std. error", "lower", "upper", "unit"]
+        rows = [head]
+        for (name, value, error, unit, known), half in zip(estimates, halves, strict=True):
+            if error is None or half is None:
+                why = "(known)" if known else "(at a bound, or not determined)"
+                rows.append([name, f"{value:.6g}", why, "", "", unit])
+            else:
+                numbers = [f"{value:.6g}", f"{error:.3g}", f"{value - half:.6g}", f"{value + half:.6g}"]
+                rows.append([name, *numbers, unit])
+        tried, agree = self._native.starts
+        lines = [self._name, "", *_aligned(rows), ""]
+        lines.append(f"{agree} of {tried} starts ended in this minimum")
+        for names in self._not_determined:
+            lines.append(f"warning: these records do not determine {' and '.join(names)} one without the other")
+        rows = [["", "fit %", "rmse", "whiteness p", "input p"]]
+        tests = {name: p for name, p, _, _ in self._native.outputs}
+        for name, rmse, percent in self._scores:
+            white, trace = tests.get(name, (np.nan, np.nan))
+            rows.append([name, f"{percent:.2f}", f"{rmse:.4g}", _p(white), _p(trace)])
+        lines += ["", *_aligned(rows)]
+        return "\n".join(line.rstrip() for line in lines) + "\n"
+
+    def diagnose(
+        self,
+        test: Records | None = None,
+        *,
+        effort: Effort = "normal",
+        time_limit: float | None = None,
+        max_effects: int | None = None,
+        seed: int = SEED,
+        progress: Progress = True,
+    ) -> Diagnosis:
+        """Searches the catalogue of effects, at every port of the model, for what it is missing.
+
+        `test`: records that take part in no fit and no choice, and are only scored. `effort`: `"quick"` (5 s), `"normal"` (40 s) or `"thorough"`
+        (10 min); `time_limit` in s goes before it, and what it does not allow is left out (`left_out`). Ctrl-C ends it.
+
+        Raises `DataError` and `ModelError`.
+        """
+        frames = to_frames(test, "test", self._wanted) if test is not None else []
+        if max_effects is not None and max_effects < 1:
+            raise ModelError("max_effects is a whole number above zero")
+        try:
+            found = self._native.diagnose(
+                frames,
+                effort=effort,
+                time_limit=time_limit,
+                max_effects=max_effects,
+                seed=seed,
+                progress=phase_printer(progress),
+            )
+        finally:
+            clear_line(progress)
+        return Diagnosis(found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as `ctid compare --json` writes it; numbers that are none are None."""
+        result: dict[str, Any] = json.loads(self._native.json())
+        return result
+
+    def to_modelica(self) -> str:
+        """The model's text with its fitted values, and their standard errors in comments."""
+        return self._native.to_modelica()
+
+    def report(self, path: str | os.PathLike[str]) -> None:
+        """Writes the page of `ctid compare --report`, which needs no network."""
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(self._native.html())
+
+    def plot(self, ax: Any = None) -> Any:
+        """Measured and simulated outputs, and their residuals; returns matplotlib axes."""
+        from ._plot import fit_axes
+
+        return fit_axes(self._series, self._units, ax)
+
+    def __repr__(self) -> str:
+        percent = ", ".join(f"{name} {fit:.1f} %" for name, _, fit in self._scores)
+        return f"<ctid.Fit of {self._name}: {percent}>"
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Self:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _fit_of, (self._native.to_bytes(), self._indexes)
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    first_left = [f"{row[0]:<{widths[0]}}  " for row in rows]
+    rest = ["  ".join(f"{cell:>{w}}" for cell, w in zip(row[1:-1], widths[1:-1], strict=True)) for row in rows]
+    last = [f"{row[-1]:>{widths[-1]}}" if row[-1][:1].isdigit() else row[-1] for row in rows]
+    return [f"  {a}{b}  {c}" for a, b, c in zip(first_left, rest, last, strict=True)]
+
+
+def _fit_of(content: bytes, indexes: list[Any]) -> Fit:
+    return Fit(_ctid.Fit.from_bytes(content), indexes)

@@ -18,7 +18,7 @@ from ._diagnosis import Diagnosis
 from ._fit import Fit
 from ._linear import Fcloe, Identification, StateSpace, identify
 from ._model import Model
-from ._monitor import Monitor, Step
+from ._monitor import Monitor, RowResult
 
 __all__ = [
     "ContinuousRls",
@@ -34,7 +34,7 @@ __all__ = [
     "Monitor",
     "StabilizedOe",
     "StateSpace",
-    "Step",
+    "RowResult",
     "identify",
     "tables",
 ]

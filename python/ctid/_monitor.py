@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Step:
+class RowResult:
     """What a row says."""
 
     #: Measured minus model, by output; NaN without a reading, and while it learns.
@@ -45,14 +45,14 @@ class Monitor:
         self._native = native
         self._inputs, self._outputs = native.signals
 
-    def update(self, t: float, inputs: Mapping[str, float], outputs: Mapping[str, float]) -> Step:
+    def update(self, t: float, inputs: Mapping[str, float], outputs: Mapping[str, float]) -> RowResult:
         """Takes in a row: the time in s, every input, and those outputs that have a reading. Raises `DataError`."""
         u = _values("inputs", inputs, self._inputs, True)
         y = _values("outputs", outputs, self._outputs, False)
         innovations, alarm, scatter, notices, lost = self._native.update(float(t), u, y)
         names = self._outputs
         pairs = [(name, pair or (np.nan, np.nan)) for name, pair in zip(names, innovations, strict=False)]
-        return Step(
+        return RowResult(
             residuals={name: pair[0] for name, pair in pairs},
             innovations={name: pair[1] for name, pair in pairs},
             alarm=None if alarm is None else json.loads(alarm),

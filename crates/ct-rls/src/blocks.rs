@@ -26,7 +26,7 @@ use nalgebra::SVector;
 
 use crate::estimator::{Innovation, Outcome};
 use crate::integrator::sealed::{BlockRule, Refusal, Rule};
-use crate::settings::{MAX_EPSILON, Step, Weights};
+use crate::settings::{MAX_EPSILON, StepFactors, Weights};
 use crate::{ContinuousRls, Euler, ExactHold, Integrator, UdFactor, factor};
 
 /// An integrator that can carry two blocks with one output error: [`ExactHold`] or [`Euler`].
@@ -98,7 +98,7 @@ pub type Block<'a, const P: usize, S> = (
     &'a mut S,
     &'a [f64; P],
     &'a Weights,
-    &'a Step,
+    &'a StepFactors,
 );
 
 impl BlockRule for Euler {
@@ -170,8 +170,8 @@ const PIECES: u32 = 8;
 
 /// Factor of `P_i phi_i eps(0)` over the step.
 fn shares(
-    (w1, step1, s1): (&Weights, &Step, f64),
-    (w2, step2, s2): (&Weights, &Step, f64),
+    (w1, step1, s1): (&Weights, &StepFactors, f64),
+    (w2, step2, s2): (&Weights, &StepFactors, f64),
 ) -> [f64; 2] {
     let (c1, c2, b) = (w1.c(), w2.c(), step1.length);
     let rate = c1 * s1 + c2 * s2;
@@ -236,7 +236,7 @@ fn shares(
 }
 
 /// `b_2` and `e^{(eta_2 - eta_1) t}` at the time where the first block has `b`.
-fn second_length(b: f64, step1: &Step, step2: &Step) -> (f64, f64) {
+fn second_length(b: f64, step1: &StepFactors, step2: &StepFactors) -> (f64, f64) {
     let (eta1, eta2) = (step1.eta(), step2.eta());
     let t = if eta1 * b < f64::EPSILON {
         b

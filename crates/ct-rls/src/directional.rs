@@ -47,7 +47,7 @@
 //! 1987, for the idea.
 
 use crate::integrator::sealed::{FactorRule, Memory, Refusal, Rule, step_on_factors};
-use crate::settings::{MAX_EPSILON, Step, Weights, in_range};
+use crate::settings::{MAX_EPSILON, StepFactors, Weights, in_range};
 use crate::{UdFactor, factor};
 
 /// Directional forgetting on `P = U D U'`: only the regressor's direction is forgotten. Positive definite whatever the step.
@@ -79,7 +79,7 @@ impl Memory for Directional {
 
     // the bound refers to the eigenvalues, which `weak` stores
     #[inline(always)]
-    fn raised(bound: f64, _step: &Step, _intensity: &[f64]) -> f64 {
+    fn raised(bound: f64, _step: &StepFactors, _intensity: &[f64]) -> f64 {
         bound
     }
 }
@@ -95,7 +95,7 @@ impl Rule for Directional {
         phi: &[f64; P],
         epsilon: f64,
         weights: &Weights,
-        step: &Step,
+        step: &StepFactors,
     ) -> Result<f64, Refusal> {
         step_on_factors::<Self, P>(theta, state, phi, epsilon, weights, step, &[])
     }
@@ -117,7 +117,7 @@ impl FactorRule for Directional {
         phi: &[f64],
         epsilon: f64,
         weights: &Weights,
-        step: &Step,
+        step: &StepFactors,
         _intensity: &[f64],
     ) -> Option<f64> {
         if !(in_range(weights, step, phi) && epsilon.abs() <= MAX_EPSILON) {

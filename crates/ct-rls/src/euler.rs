@@ -14,7 +14,7 @@ use crate::Error;
 use crate::factor::dot;
 use crate::integrator::sealed::{Memory, Refusal, Rule};
 use crate::integrator::{Plain, take};
-use crate::settings::{MAX_EPSILON, Step, Weights};
+use crate::settings::{MAX_EPSILON, StepFactors, Weights};
 
 /// Euler's rule for the full matrix `P`. Stops if its step is too long.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,7 @@ impl Rule for Euler {
         phi: &[f64; P],
         epsilon: f64,
         weights: &Weights,
-        step: &Step,
+        step: &StepFactors,
     ) -> Result<f64, Refusal> {
         let k = state.times(phi);
         let s = dot(&k, phi);

@@ -34,7 +34,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::integrator::sealed::{
     Capped, Covariance, FactorRule, Memory, Refusal, Rule, step_on_factors,
 };
-use crate::settings::{Step, Weights};
+use crate::settings::{StepFactors, Weights};
 use crate::{Error, UdFactor, factor};
 
 /// The exact solution for held signals, on `P = U D U'`: the default. Positive definite whatever the step.
@@ -54,7 +54,7 @@ impl Rule for ExactHold {
         phi: &[f64; P],
         epsilon: f64,
         weights: &Weights,
-        step: &Step,
+        step: &StepFactors,
     ) -> Result<f64, Refusal> {
         step_on_factors::<Self, P>(theta, state, phi, epsilon, weights, step, &[])
     }
@@ -76,7 +76,7 @@ impl FactorRule for ExactHold {
         phi: &[f64],
         epsilon: f64,
         weights: &Weights,
-        step: &Step,
+        step: &StepFactors,
         _intensity: &[f64],
     ) -> Option<f64> {
         let hold = (step.growth, step.length);

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::estimator::{Health, Outcome};
 use crate::integrator::sealed::{Capped, Memory, Refusal};
-use crate::settings::{Guards, MAX_PHI_SQUARED, Step, Weights};
+use crate::settings::{Guards, MAX_PHI_SQUARED, StepFactors, Weights};
 
 /// The start of the cap on the trace, times the trace of `P(0)`.
 const TRACE_LIMIT: f64 = 1e6;
@@ -17,7 +17,7 @@ pub(crate) struct Guard {
     /// The cap in force.
     limit: f64,
     silent_below_squared: f64,
-    pub step: Step,
+    pub step: StepFactors,
     failure: Option<Error>,
     used: u64,
     unused: u64,
@@ -82,7 +82,7 @@ impl Guard {
             bound: trace,
             limit: guards.cap(),
             silent_below_squared: 0.0,
-            step: Step::none(),
+            step: StepFactors::none(),
             failure: None,
             used: 0,
             unused: 0,
@@ -123,13 +123,13 @@ impl Guard {
         phi: &[f64],
         dt: f64,
         weights: &Weights,
-    ) -> Result<(Step, Outcome), Outcome> {
+    ) -> Result<(StepFactors, Outcome), Outcome> {
         let eta = weights.eta();
         if self.failure.is_some() {
             return Err(self.skip(Outcome::Stopped));
         }
         if !self.step.matches(eta, dt) {
-            match Step::new(eta, dt) {
+            match StepFactors::new(eta, dt) {
                 Some(step) => self.step = step,
                 None => return Err(self.skip(Outcome::BadStep)),
             }
@@ -164,7 +164,7 @@ impl Guard {
     #[inline(always)]
     pub fn grown<M: Memory, S: Capped>(
         &mut self,
-        step: &Step,
+        step: &StepFactors,
         outcome: Outcome,
         state: &mut S,
     ) -> Outcome {

@@ -26,7 +26,7 @@ pub(crate) mod sealed {
     use nalgebra::{SMatrix, SVector};
 
     use crate::blocks::Block;
-    use crate::settings::{Step, Weights};
+    use crate::settings::{StepFactors, Weights};
     use crate::{Error, UdFactor};
 
     /// Data that the cap on the trace needs.
@@ -59,7 +59,7 @@ pub(crate) mod sealed {
 
         /// A bound of the trace of `P` after the step, from one before it.
         #[inline(always)]
-        fn raised(bound: f64, step: &Step, _intensity: &[f64]) -> f64 {
+        fn raised(bound: f64, step: &StepFactors, _intensity: &[f64]) -> f64 {
             bound * step.growth
         }
     }
@@ -100,7 +100,7 @@ pub(crate) mod sealed {
             phi: &[f64; P],
             epsilon: f64,
             weights: &Weights,
-            step: &Step,
+            step: &StepFactors,
         ) -> Result<f64, Refusal>;
 
         /// One step for a constraint in addition to the data: without forgetting and without a random walk of the parameters, because the
@@ -111,7 +111,7 @@ pub(crate) mod sealed {
             f: &[f64; P],
             epsilon: f64,
             weights: &Weights,
-            step: &Step,
+            step: &StepFactors,
         ) -> Result<f64, Refusal> {
             Self::step(theta, state, f, epsilon, weights, step)
         }
@@ -130,7 +130,7 @@ pub(crate) mod sealed {
             phi: &[f64],
             epsilon: f64,
             weights: &Weights,
-            step: &Step,
+            step: &StepFactors,
             intensity: &[f64],
         ) -> Option<f64>;
     }
@@ -143,7 +143,7 @@ pub(crate) mod sealed {
         phi: &[f64; P],
         epsilon: f64,
         weights: &Weights,
-        step: &Step,
+        step: &StepFactors,
         intensity: &[f64],
     ) -> Result<f64, Refusal> {
         let (mut product, mut gain) = ([0.0; P], [0.0; P]);

@@ -37,7 +37,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::integrator::sealed::{
     Capped, Covariance, FactorRule, Memory, Refusal, Rule, step_on_factors,
 };
-use crate::settings::{MAX_EPSILON, Step, Weights, in_range};
+use crate::settings::{MAX_EPSILON, StepFactors, Weights, in_range};
 use crate::{ContinuousRls, Error, UdFactor, factor};
 
 /// Parameters that walk at random, on `P = U D U'`: an uncertainty that grows linearly. Positive definite whatever the step.
@@ -110,7 +110,7 @@ impl Memory for RandomWalk {
     const WALKS: bool = true;
 
     #[inline(always)]
-    fn raised(bound: f64, step: &Step, intensity: &[f64]) -> f64 {
+    fn raised(bound: f64, step: &StepFactors, intensity: &[f64]) -> f64 {
         let walk: f64 = intensity.iter().sum();
         bound * step.growth + walk * step.length
     }
@@ -127,7 +127,7 @@ impl Rule for RandomWalk {
         phi: &[f64; P],
         epsilon: f64,
         weights: &Weights,
-        step: &Step,
+        step: &StepFactors,
     ) -> Result<f64, Refusal> {
         let WalkState { factor, q } = state;
         step_on_factors::<Self, P>(theta, factor, phi, epsilon, weights, step, q)
@@ -139,7 +139,7 @@ impl Rule for RandomWalk {
         f: &[f64; P],
         epsilon: f64,
         weights: &Weights,
-        step: &Step,
+        step: &StepFactors,
     ) -> Result<f64, Refusal> {
         let factor = &mut state.factor;
         step_on_factors::<Self, P>(theta, factor, f, epsilon, weights, step, &[])
@@ -162,7 +162,7 @@ impl FactorRule for RandomWalk {
         phi: &[f64],
         epsilon: f64,
         weights: &Weights,
-        step: &Step,
+        step: &StepFactors,
         intensity: &[f64],
     ) -> Option<f64> {
         if !(in_range(weights, step, phi) && epsilon.abs() <= MAX_EPSILON) {

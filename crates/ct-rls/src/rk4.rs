@@ -10,7 +10,7 @@ use crate::Error;
 use crate::factor::dot;
 use crate::integrator::sealed::{Covariance, Memory, Refusal, Rule};
 use crate::integrator::{Plain, take};
-use crate::settings::{MAX_EPSILON, Step, Weights};
+use crate::settings::{MAX_EPSILON, StepFactors, Weights};
 
 /// Runge-Kutta method of fourth order for the full matrix `P`. Stops if `P` is no longer positive definite.
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +28,7 @@ impl Rule for Rk4 {
         phi: &[f64; P],
         epsilon: f64,
         weights: &Weights,
-        step: &Step,
+        step: &StepFactors,
     ) -> Result<f64, Refusal> {
         let s = dot(&state.times(phi), phi);
         if !(s.is_finite() && epsilon.abs() <= MAX_EPSILON) {

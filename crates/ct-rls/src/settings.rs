@@ -167,7 +167,7 @@ impl Guards {
 
 /// `e^{eta h}` and `(e^{eta h} - 1)/eta` of one step; valid while `eta` and `h` do not change.
 #[derive(Clone, Copy, Debug)]
-pub struct Step {
+pub struct StepFactors {
     eta: f64,
     /// The step h, s.
     pub dt: f64,
@@ -192,7 +192,7 @@ pub(crate) const MAX_TRACE: f64 = 1e100;
 /// Beyond this value, one step forgets everything, and `e^{eta h}` overflows.
 const MAX_ETA_DT: f64 = 300.0;
 
-impl Step {
+impl StepFactors {
     /// No step yet: equal to no step.
     pub fn none() -> Self {
         Self {
@@ -253,7 +253,7 @@ impl Step {
 /// Whether a step that first raises `P` stays in the floating-point range, decided before anything is changed: with a trace of at
 /// most [`MAX_TRACE`] before, `gamma b phi' P phi` is below 1e300.
 #[inline(always)]
-pub(crate) fn in_range(w: &Weights, step: &Step, phi: &[f64]) -> bool {
+pub(crate) fn in_range(w: &Weights, step: &StepFactors, phi: &[f64]) -> bool {
     let squared: f64 = phi.iter().map(|x| x * x).sum();
     w.gamma * step.length * squared <= 1e300 / MAX_TRACE
 }

@@ -13,7 +13,7 @@
 use nalgebra::SVector;
 
 use crate::integrator::sealed::{Covariance, Refusal};
-use crate::settings::{MAX_EPSILON, MAX_PHI_SQUARED, Step, Weights};
+use crate::settings::{MAX_EPSILON, MAX_PHI_SQUARED, StepFactors, Weights};
 use crate::{BlockIntegrator, ContinuousRls, Integrator};
 
 impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
@@ -136,7 +136,7 @@ fn relax_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
 }
 
 /// A step of the length of the information, if the length and the coefficients are in range.
-fn length_of(information: f64, squared: f64) -> Option<Step> {
+fn length_of(information: f64, squared: f64) -> Option<StepFactors> {
     let fits = information >= 0.0 && squared <= MAX_PHI_SQUARED;
-    fits.then(|| Step::remembering_for(information.min(MAX_PHI_SQUARED)))
+    fits.then(|| StepFactors::remembering_for(information.min(MAX_PHI_SQUARED)))
 }

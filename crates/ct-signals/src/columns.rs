@@ -10,7 +10,7 @@ mod header;
 use serde::{Deserialize, Serialize};
 
 use self::header::{Header, INPUT, OUTPUT, REFERENCE, Role, TIME};
-use crate::{ColumnFault, Error, Zone, quoted, unit, unit::Conversion};
+use crate::{ColumnFault, Error, ReadError, Zone, quoted, unit, unit::Conversion};
 
 /// The names of the columns, as `[columns]` of a model file gives them; what is absent is guessed.
 ///
@@ -341,11 +341,13 @@ impl Columns {
         if references.is_empty() {
             references.extend(header.guess(&REFERENCE, &taken).ok().flatten());
         }
-        let seconds = unit::seconds(&time.unit).ok_or_else(|| Error::UnknownTimeUnit {
-            file: file.into(),
-            row,
-            column: quoted(&time.header),
-            unit: quoted(&time.unit),
+        let seconds = unit::seconds(&time.unit).ok_or_else(|| {
+            Error::Read(ReadError::UnknownTimeUnit {
+                file: file.into(),
+                row,
+                column: quoted(&time.header),
+                unit: quoted(&time.unit),
+            })
         })?;
         Ok(Layout {
             time,

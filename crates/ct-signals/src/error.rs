@@ -1,265 +1,21 @@
 //! What can be wrong with a record or a setting: each message names the place, the numbers that
 //! disagree and the mend, in one line.
 
-use crate::{ColumnFault, TimestampError, shown};
+use crate::{ColumnFault, shown};
+
+pub use read::ReadError;
+
+mod read;
 
 /// Everything this crate can refuse.
 ///
-/// `row` is always the line number in the file as a text editor shows it, the header's included.
+/// `row` is the line number in the file as a text editor shows it, including the header.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The file could not be opened or read.
-    #[error("{file}: cannot be opened: {source}; check the path and the permissions")]
-    CannotOpen {
-        /// The path as it was given.
-        file: String,
-        /// What the operating system says.
-        source: std::io::Error,
-    },
-    /// A device, which may never end.
-    #[error("{file}: it is a device; name a file or a pipe")]
-    Device {
-        /// The path as it was given.
-        file: String,
-    },
-    /// A file that is larger than any of its kind.
-    #[error("{file}: it has more than {largest} bytes, which is the most that is read; {}", too_large(*.largest))]
-    FileTooLarge {
-        /// The path as it was given.
-        file: String,
-        /// The most that is read \[bytes\].
-        largest: u64,
-    },
-    /// A line that is longer than any row.
-    #[error(
-        "{file}, row {row}: the line has more than {longest} bytes; check what wrote the file, and end every row with a line feed"
-    )]
-    LongLine {
-        /// The path as it was given.
-        file: String,
-        /// Line number.
-        row: u64,
-        /// The longest line that is read \[bytes\].
-        longest: usize,
-    },
-    /// More columns than any record has.
-    #[error(
-        "{file}, row {row}: {found} columns, and {most} are the most; delete those that are not used"
-    )]
-    ManyColumns {
-        /// The path as it was given.
-        file: String,
-        /// Line number of the header.
-        row: u64,
-        /// Columns of the file.
-        found: usize,
-        /// The most that are read.
-        most: usize,
-    },
-    /// A folder where a file is expected.
-    #[error("{file}: it is a folder; name a file in it")]
-    Folder {
-        /// The path as it was given.
-        file: String,
-    },
-    /// The file is not text in an encoding that is understood.
-    #[error("{file}: this is not a UTF-8 text file but {found}; export it as CSV (UTF-8)")]
-    NotText {
-        /// The path as it was given.
-        file: String,
-        /// What it looks like.
-        found: &'static str,
-    },
-    /// Nothing in the file but blank lines and comments.
-    #[error(
-        "{file}: the file is empty; a header such as \"t [s],u [V],y [cm]\" and rows of numbers are needed"
-    )]
-    EmptyFile {
-        /// The path as it was given.
-        file: String,
-    },
-    /// The first row holds numbers where names are expected.
-    #[error(
-        "{file}, row {row}: the first row holds numbers ({first}), not names; put a header such as \"t [s],u [V],y [cm]\" above it"
-    )]
-    NoHeader {
-        /// The path as it was given.
-        file: String,
-        /// Line number of the first row.
-        row: u64,
-        /// The first row.
-        first: String,
-    },
-    /// Numbers without names, and neither time, input and outputs nor these with a reference.
-    #[error(
-        "{file}, row {row}: {found} numbers and no header; give t,u,{y} or t,r,u,{y}, or put a header such as \"t [s],u [V],y [cm]\" above",
-        y = crate::stream::letters(*.outputs, ",")
-    )]
-    NoOrder {
-        /// What is read.
-        file: String,
-        /// Line number.
-        row: u64,
-        /// Numbers in the row.
-        found: usize,
-        /// Outputs that are read.
-        outputs: usize,
-    },
-    /// The columns of the file are not those that were named or are needed.
-    #[error("{file}, row {row}{}", .fault.in_model())]
-    Column {
-        /// The path as it was given.
-        file: String,
-        /// Line number of the header.
-        row: u64,
-        /// What is wrong.
-        fault: Box<ColumnFault>,
-    },
-    /// The time column's unit is not a unit of time that is understood.
-    #[error(
-        "{file}, row {row}, column \"{column}\": {unit} is not a unit of time; use us, ms, s, min, h or d"
-    )]
-    UnknownTimeUnit {
-        /// The path as it was given.
-        file: String,
-        /// Line number of the header.
-        row: u64,
-        /// The column's header.
-        column: String,
-        /// The unit.
-        unit: String,
-    },
-    /// A row is longer or shorter than the header.
-    #[error(
-        "{file}, row {row}: {found} fields, but the header has {expected}; check for a missing or a surplus {delimiter}, and for commas inside numbers"
-    )]
-    WrongFieldCount {
-        /// The path as it was given.
-        file: String,
-        /// Line number.
-        row: u64,
-        /// Fields in the header.
-        expected: usize,
-        /// Fields in this row.
-        found: usize,
-        /// The delimiter's name.
-        delimiter: &'static str,
-    },
-    /// A cell that is needed is empty.
-    #[error(
-        "{file}, row {row}, column \"{column}\": the cell is empty; fill it in, or leave out --strict: then its sample is missing"
-    )]
-    EmptyCell {
-        /// The path as it was given.
-        file: String,
-        /// Line number.
-        row: u64,
-        /// The column's header.
-        column: String,
-    },
-    /// A cell holds something that is not a number.
-    #[error("{file}, row {row}, column \"{column}\": \"{text}\" is not a number; {mend}")]
-    TextInCell {
-        /// The path as it was given.
-        file: String,
-        /// Line number.
-        row: u64,
-        /// The column's header.
-        column: String,
-        /// The cell.
-        text: String,
-        /// What to do.
-        mend: &'static str,
-    },
-    /// Below the header stands a row without a number.
-    #[error(
-        "{file}, row {row}: no cell is a number; if these are units, write them into the header, \"{header}\", and delete this row"
-    )]
-    UnitRow {
-        /// The path as it was given.
-        file: String,
-        /// Line number.
-        row: u64,
-        /// The time's header with its unit.
-        header: String,
-    },
-    /// A cell holds NaN or an infinity.
-    #[error(
-        "{file}, row {row}, column \"{column}\": \"{text}\" is not a finite number; replace it, or leave out --strict: then its sample is missing"
-    )]
-    NotFinite {
-        /// The path as it was given.
-        file: String,
-        /// Line number.
-        row: u64,
-        /// The column's header.
-        column: String,
-        /// The cell.
-        text: String,
-    },
-    /// The file uses both marks for decimals, so a comma may separate thousands.
-    #[error(
-        "{file}, row {row}, column \"{column}\": \"{text}\" has a decimal {here}, but earlier rows have a decimal {before}; use one of them throughout"
-    )]
-    MixedDecimalMarks {
-        /// The path as it was given.
-        file: String,
-        /// Line number.
-        row: u64,
-        /// The column's header.
-        column: String,
-        /// The cell.
-        text: String,
-        /// The mark in this cell.
-        here: &'static str,
-        /// The mark in earlier cells.
-        before: &'static str,
-    },
-    /// Two rows in a row have the same time.
-    #[error(
-        "{file}, row {row}, column \"{column}\": the time {time} is repeated from the row before; remove one of the two rows, or write the time with more digits"
-    )]
-    RepeatedTime {
-        /// The path as it was given.
-        file: String,
-        /// Line number of the second of the two.
-        row: u64,
-        /// The column's header.
-        column: String,
-        /// The time, as the file gives it.
-        time: Box<str>,
-    },
-    /// The time runs backward.
-    #[error(
-        "{file}, row {row}, column \"{column}\": the time goes back from {previous} to {time}; {mend}"
-    )]
-    BackwardTime {
-        /// The path as it was given.
-        file: String,
-        /// Line number of the later row.
-        row: u64,
-        /// The column's header.
-        column: String,
-        /// The time in this row, as the file gives it.
-        time: Box<str>,
-        /// The time in the row before.
-        previous: Box<str>,
-        /// What to do.
-        mend: &'static str,
-    },
-    /// A date or a time that is not understood.
-    #[error("{file}, row {row}, column \"{column}\": {error}")]
-    Timestamp {
-        /// The path as it was given.
-        file: String,
-        /// Line number.
-        row: u64,
-        /// The column's header.
-        column: String,
-        /// What is wrong, and the mend.
-        error: Box<TimestampError>,
-    },
+    /// The file cannot be read as a record.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// A limit of the part of a file that is wanted is not understood.
     #[error("{option} \"{text}\": {mend}")]
     Bound {
@@ -509,19 +265,12 @@ impl Error {
     #[must_use]
     pub fn of_units(&self) -> bool {
         match self {
-            Self::UnknownTimeUnit { .. } => true,
-            Self::Column { fault, .. } => matches!(**fault, ColumnFault::Unit { .. }),
+            Self::Read(ReadError::UnknownTimeUnit { .. }) => true,
+            Self::Read(ReadError::Column { fault, .. }) => {
+                matches!(**fault, ColumnFault::Unit { .. })
+            }
             _ => false,
         }
-    }
-}
-
-/// The mend for a file that is too large.
-fn too_large(largest: u64) -> &'static str {
-    if largest == crate::LARGEST_RECORD {
-        "split the record, or leave rows out"
-    } else {
-        "check that it is the right file"
     }
 }
 

@@ -85,7 +85,7 @@ pub use csv::{
     Converted, MissingSamples, ReadOptions, ReadSummary, Reading, csv_header, parse_csv,
     parse_inputs_csv, read_csv, read_inputs_csv,
 };
-pub use error::Error;
+pub use error::{Error, ReadError};
 pub use gaps::Gaps;
 pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
 pub use quote::{escaped, quoted, shown};

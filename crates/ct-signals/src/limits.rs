@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 
-use crate::Error;
+use crate::{Error, ReadError};
 
 /// The largest record \[bytes\].
 pub const LARGEST_RECORD: u64 = 256 * 1024 * 1024;
@@ -16,23 +16,27 @@ pub const MOST_COLUMNS: usize = 4096;
 /// Reads a file or a pipe of at most `largest` bytes.
 ///
 /// # Errors
-/// [`Error::CannotOpen`], [`Error::Folder`], [`Error::Device`], [`Error::FileTooLarge`].
+/// [`ReadError::CannotOpen`], [`ReadError::Folder`], [`ReadError::Device`], [`ReadError::FileTooLarge`].
 pub fn read_file(path: &Path, largest: u64) -> Result<Vec<u8>, Error> {
     let file = || path.display().to_string();
-    let cannot_open = |source| Error::CannotOpen {
-        file: file(),
-        source,
+    let cannot_open = |source| {
+        Error::Read(ReadError::CannotOpen {
+            file: file(),
+            source,
+        })
     };
     let metadata = fs::metadata(path).map_err(cannot_open)?;
     if metadata.is_dir() {
-        return Err(Error::Folder { file: file() });
+        return Err(Error::Read(ReadError::Folder { file: file() }));
     }
     if is_device(metadata.file_type()) {
-        return Err(Error::Device { file: file() });
+        return Err(Error::Read(ReadError::Device { file: file() }));
     }
-    let too_large = || Error::FileTooLarge {
-        file: file(),
-        largest,
+    let too_large = || {
+        Error::Read(ReadError::FileTooLarge {
+            file: file(),
+            largest,
+        })
     };
     if metadata.len() > largest {
         return Err(too_large());

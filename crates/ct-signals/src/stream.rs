@@ -15,7 +15,8 @@ pub use self::bad_line::BadLine;
 use crate::columns::{Found, Layout, Purpose};
 use crate::csv::{Numbers, Times, check_width, delimiter, is_number, says_missing};
 use crate::{
-    Calendar, Columns, Conversion, Error, Timestamp, TimestampReader, escaped, quoted, unit,
+    Calendar, Columns, Conversion, Error, ReadError, Timestamp, TimestampReader, escaped, quoted,
+    unit,
 };
 
 /// The names of the columns in use, where they have no header.
@@ -83,7 +84,7 @@ impl Rows {
     /// The second value is whether the line is a row, to be read by [`Rows::read`] too.
     ///
     /// # Errors
-    /// As of [`read_csv`](crate::read_csv) for a header; [`Error::NoOrder`] for numbers that are neither time, input and outputs nor these
+    /// As of [`read_csv`](crate::read_csv) for a header; [`ReadError::NoOrder`] for numbers that are neither time, input and outputs nor these
     /// with a reference. There is one output where `columns` name none.
     pub fn begin(
         file: &str,
@@ -119,12 +120,12 @@ impl Rows {
                 Some(1) => 1,
                 Some(2) if inputs > 0 => 2,
                 _ => {
-                    return Err(Error::NoOrder {
+                    return Err(Error::Read(ReadError::NoOrder {
                         file: file.into(),
                         row,
                         found: cells.len(),
                         outputs,
-                    });
+                    }));
                 }
             };
             rows.inputs = inputs;

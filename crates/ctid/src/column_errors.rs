@@ -1,13 +1,13 @@
 //! Errors in the columns of a record that the option `--columns` names.
 
-use ct_signals::{ColumnFault, Error as Record};
+use ct_signals::{ColumnFault, Error as RecordError, ReadError};
 
 use crate::Error;
 
 /// The error with the correction for the option; that of `ct-signals` is for `[columns]` of a model file.
-pub(crate) fn of_option(error: Record) -> Error {
+pub(crate) fn of_option(error: RecordError) -> Error {
     const OPTION: &str = "--columns TIME,INPUT,OUTPUT";
-    let Record::Column { file, row, fault } = &error else {
+    let RecordError::Read(ReadError::Column { file, row, fault }) = &error else {
         return error.into();
     };
     let mend = match &**fault {

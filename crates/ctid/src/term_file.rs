@@ -148,7 +148,7 @@ pub(crate) fn of_curve(
 /// One line that names the file, the row, the column and the correction.
 pub fn read(path: &Path) -> Result<TermFile, Error> {
     let text = read_file(path, LARGEST as u64).map_err(|error| match error {
-        ct_signals::Error::CannotOpen { source, .. } => Error::file(
+        ct_signals::Error::Read(ct_signals::ReadError::CannotOpen { source, .. }) => Error::file(
             path,
             format!("the shape cannot be read: {source}; check the path"),
         ),

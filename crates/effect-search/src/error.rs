@@ -24,7 +24,7 @@ pub enum Error {
     Simulation(#[from] ct_model::NoSolution),
     /// An experiment that cannot be proposed.
     #[error(transparent)]
-    Design(#[from] crate::design::Refused),
+    Design(#[from] crate::design::NoExperiment),
     /// The unit of the model's time is not positive.
     #[error("a unit of the model's time of {seconds} s: it has to be above zero and finite")]
     TimeUnit {

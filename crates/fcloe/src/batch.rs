@@ -20,7 +20,7 @@
 use estimation::{Residuals, Triangle};
 use serde::Serialize;
 
-use crate::problem::Refused;
+use crate::problem::Undefined;
 use crate::{
     ClosedLoop, Coordinates, Damping, Error, Levels, Method, PlantModel, Problem, Settings,
 };
@@ -329,7 +329,7 @@ impl Run {
                 self.evaluations += 1;
                 Tried::Lower(next)
             }
-            Ok(_) | Err(Refused::Higher) => {
+            Ok(_) | Err(Undefined::Higher) => {
                 self.evaluations += 1;
                 // Reduction of J that the linearised model predicts.
                 let slope: f64 = step
@@ -344,11 +344,11 @@ impl Run {
                     Tried::Higher
                 }
             }
-            Err(Refused::Unstable) => {
+            Err(Undefined::Unstable) => {
                 self.refused += 1;
                 Tried::Unstable
             }
-            Err(Refused::NotFinite) => Tried::Higher,
+            Err(Undefined::NotFinite) => Tried::Higher,
         }
     }
 }

@@ -69,7 +69,7 @@ pub struct Problem {
 
 /// Reason why the criterion is undefined for these parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Refused {
+pub(crate) enum Undefined {
     /// P^ is not Hurwitz.
     Unstable,
     /// Numbers out of range.

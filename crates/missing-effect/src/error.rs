@@ -26,7 +26,7 @@ pub enum Error {
     Fit(#[from] greybox::Error),
     /// An experiment that cannot be proposed.
     #[error(transparent)]
-    Design(#[from] crate::design::Refused),
+    Design(#[from] crate::design::NoExperiment),
     /// A record has other outputs than the first one.
     #[error(
         "{record}: output {output} is {column}, but in {first} it is {needed}: give every record the same outputs in the same order"

@@ -74,11 +74,11 @@ pub enum Error {
     },
 }
 
-/// Reason why a row or one of its readings is not used ([`Step::lost`](crate::Step::lost)). A row that is not used does not change the
+/// Reason why a row or one of its readings is not used ([`RowResult::lost`](crate::RowResult::lost)). A row that is not used does not change the
 /// monitor, except for the count of times that go back.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Refused {
+pub enum NotUsed {
     /// A value is not finite.
     #[error("{value} is not a finite number")]
     NotFinite {
@@ -133,7 +133,7 @@ pub enum Refused {
     },
 }
 
-impl Refused {
+impl NotUsed {
     /// Index of the input or output in question, from zero.
     #[must_use]
     pub fn at(&self) -> usize {

@@ -13,7 +13,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Each, Notice, Refused, Row};
+use crate::{Each, NotUsed, Notice, Row};
 
 /// Number of steps from which the usual one is computed.
 const STEPS: usize = 21;
@@ -68,12 +68,12 @@ pub(crate) struct Taken {
 }
 
 /// Checks that a value can be used in computations; `at`: index of the input or output.
-pub(crate) fn usable(column: &'static str, at: usize, value: f64) -> Result<f64, Refused> {
+pub(crate) fn usable(column: &'static str, at: usize, value: f64) -> Result<f64, NotUsed> {
     if !value.is_finite() {
-        return Err(Refused::NotFinite { column, at, value });
+        return Err(NotUsed::NotFinite { column, at, value });
     }
     if value.abs() > LARGEST {
-        return Err(Refused::TooLarge {
+        return Err(NotUsed::TooLarge {
             column,
             at,
             value,
@@ -166,7 +166,7 @@ impl Intake {
     }
 
     /// Processes a row with its usable `readings`.
-    pub(crate) fn take(&mut self, row: &Row, readings: &Readings) -> Result<Taken, Refused> {
+    pub(crate) fn take(&mut self, row: &Row, readings: &Readings) -> Result<Taken, NotUsed> {
         let time = usable("time", 0, row.time)?;
         for at in 0..self.inputs.len() {
             usable("input", at, row.input(at))?;
@@ -174,7 +174,7 @@ impl Intake {
         let mut notice = None;
         if let Some(previous) = self.last {
             if time == previous {
-                return Err(Refused::Repeated { time });
+                return Err(NotUsed::Repeated { time });
             }
             notice = if time < previous {
                 Some(self.set_back(previous, time)?)
@@ -232,14 +232,14 @@ impl Intake {
     }
 
     /// A row with an earlier time is rejected, but not for ever: after a single wrong future time the monitor would reject all rows.
-    fn set_back(&mut self, previous: f64, time: f64) -> Result<Notice, Refused> {
+    fn set_back(&mut self, previous: f64, time: f64) -> Result<Notice, NotUsed> {
         let count = match self.back {
             Some((last, count)) if time >= last => count + usize::from(time > last),
             _ => 1,
         };
         self.back = Some((time, count));
         if count < BACK {
-            return Err(Refused::Backward { time, previous });
+            return Err(NotUsed::Backward { time, previous });
         }
         self.part();
         Ok(Notice::ClockSetBack {

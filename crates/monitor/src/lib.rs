@@ -4,7 +4,7 @@
 //! | question | answer |
 //! |---|---|
 //! | Where do I start? | [`Monitor::new`] with the believed [`Model`] or [`OwnModel`], then [`Monitor::update`] once a row |
-//! | What is the result of a row? | [`Step`]: the innovation of each output, and now and then an [`Alarm`], a [`ScatterAlarm`] or a [`Notice`] |
+//! | What is the result of a row? | [`RowResult`]: the innovation of each output, and now and then an [`Alarm`], a [`ScatterAlarm`] or a [`Notice`] |
 //! | What are the parameters now? | [`Monitor::estimates`] |
 //! | What if it is stopped? | save [`Monitor::state`]; [`Monitor::restore`] continues without a difference |
 //!
@@ -75,10 +75,10 @@ mod watch;
 mod watched;
 
 pub use alarm::{Alarm, Other, SCHEMA, Size, Stage, Units, Verdict};
-pub use error::{Error, Refused};
+pub use error::{Error, NotUsed};
 pub use learn::Model;
 pub use monitor::{
-    Each, Estimate, Gathered, Innovation, Monitor, Notice, Progress, Row, State, Step,
+    Each, Estimate, Gathered, Innovation, Monitor, Notice, Progress, Row, RowResult, State,
 };
 pub use own::{CandidateModel, OwnModel};
 pub use scatter::{ScatterAlarm, ScatterEvent};

@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 
 pub use self::progress::{Estimate, Gathered, Progress};
 use crate::{
-    Alarm, Error, Refused, ScatterAlarm, Settings, TimeAxis, Units, Watched,
+    Alarm, Error, NotUsed, ScatterAlarm, Settings, TimeAxis, Units, Watched,
     core::{Checkpoint, Core, Phase},
     fingerprint::{Fingerprint, TIME_UNIT, differences},
     intake::{Intake, Readings, Sample, usable},
@@ -57,11 +57,11 @@ impl Row {
 
 /// Result of a row.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Step {
+pub struct RowResult {
     /// The innovation of each output; `None` while learning, within a block of rows, and without a reading.
     pub innovations: Each<Option<Innovation>>,
     /// For each output the reason why its reading is not used, if so; the inputs are used.
-    pub lost: Each<Option<Refused>>,
+    pub lost: Each<Option<NotUsed>>,
     /// Notices about the rows or the phase.
     pub notices: [Option<Notice>; 2],
     /// Alarm that the model does not fit any more, or an update of an alarm.
@@ -261,15 +261,15 @@ impl Monitor {
 
     /// Processes a row.
     ///
-    /// A reading that is not finite, too large, or far above the tank is lost ([`Step::lost`]): the model moves on under the row's command,
+    /// A reading that is not finite, too large, or far above the tank is lost ([`RowResult::lost`]): the model moves on under the row's command,
     /// and no test uses a missing reading.
     ///
     /// # Errors
-    /// [`Refused`]: time or command cannot be used, and the row is not.
-    pub fn update(&mut self, row: &Row) -> Result<Step, Refused> {
+    /// [`NotUsed`]: time or command cannot be used, and the row is not.
+    pub fn update(&mut self, row: &Row) -> Result<RowResult, NotUsed> {
         let model = &self.model.0;
         let mut readings = Readings::new();
-        let mut step = Step::default();
+        let mut step = RowResult::default();
         for output in 0..model.outputs() {
             let value = row.outputs.get(output).copied().unwrap_or(f64::NAN);
             let reading = model

@@ -6,7 +6,7 @@ use ct_signals::Hold;
 use plants::{Domain, MAX_VESSELS, Scales, Structure};
 
 use crate::{
-    Alarm, Each, Error, Model, Refused, TimeAxis, Units, Watched,
+    Alarm, Each, Error, Model, NotUsed, TimeAxis, Units, Watched,
     alarm::alarm,
     fingerprint::{Fingerprint, fingerprint},
     intake::{Readings, Sample},
@@ -82,18 +82,18 @@ impl Believed for Model {
         self.hold
     }
 
-    fn check_input(&self, value: f64) -> Result<(), Refused> {
+    fn check_input(&self, value: f64) -> Result<(), NotUsed> {
         match self.known.input_range {
             Some(range) if value.abs() > BEYOND * range => {
-                Err(Refused::BeyondRange { value, range })
+                Err(NotUsed::BeyondRange { value, range })
             }
             _ => Ok(()),
         }
     }
 
-    fn check_reading(&self, value: f64) -> Result<(), Refused> {
+    fn check_reading(&self, value: f64) -> Result<(), NotUsed> {
         match self.known.tank_height {
-            Some(height) if value > ABOVE * height => Err(Refused::AboveTank { value, height }),
+            Some(height) if value > ABOVE * height => Err(NotUsed::AboveTank { value, height }),
             _ => Ok(()),
         }
     }

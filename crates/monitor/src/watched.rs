@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ct_signals::Hold;
 
 use crate::{
-    Alarm, Each, Error, Refused, Stage, TimeAxis, Units,
+    Alarm, Each, Error, NotUsed, Stage, TimeAxis, Units,
     fingerprint::Fingerprint,
     intake::{Readings, Sample},
     isolate::Kept,
@@ -42,9 +42,9 @@ pub(crate) trait Believed: Send + Sync {
     /// What the inputs do between rows.
     fn hold(&self) -> Hold;
     /// An input outside the possible range of this plant.
-    fn check_input(&self, value: f64) -> Result<(), Refused>;
+    fn check_input(&self, value: f64) -> Result<(), NotUsed>;
     /// A reading outside the possible range of this plant's sensors.
-    fn check_reading(&self, value: f64) -> Result<(), Refused>;
+    fn check_reading(&self, value: f64) -> Result<(), NotUsed>;
     /// Properties that a saved state has to agree with.
     fn fingerprint(&self) -> Fingerprint;
     /// The model fitted to rows, and the states at the first of them; or the reason in words why there is none.

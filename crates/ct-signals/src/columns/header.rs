@@ -1,7 +1,7 @@
 //! The columns of a header: found by their names, or guessed.
 
 use super::Found;
-use crate::{ColumnFault, Error, quoted, unit};
+use crate::{ColumnFault, Error, ReadError, quoted, unit};
 
 /// A role, and the words that name it.
 pub(super) struct Role {
@@ -45,7 +45,9 @@ impl Header<'_> {
     /// Whether no column has this name.
     pub(super) fn lacks(&self, role: &Role, wanted: &str) -> bool {
         match self.named(role, wanted) {
-            Err(Error::Column { fault, .. }) => matches!(*fault, ColumnFault::Missing { .. }),
+            Err(Error::Read(ReadError::Column { fault, .. })) => {
+                matches!(*fault, ColumnFault::Missing { .. })
+            }
             _ => false,
         }
     }
@@ -186,11 +188,11 @@ impl Header<'_> {
     }
 
     pub(super) fn fault(&self, fault: ColumnFault) -> Error {
-        Error::Column {
+        Error::Read(ReadError::Column {
             file: self.file.into(),
             row: self.row,
             fault: Box::new(fault),
-        }
+        })
     }
 }
 

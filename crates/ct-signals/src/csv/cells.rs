@@ -1,7 +1,7 @@
 //! Cells of a CSV file: numbers, and marks of missing samples.
 
 use super::place::Place;
-use crate::{Error, TimestampError, quoted};
+use crate::{Error, ReadError, TimestampError, quoted};
 
 /// Marks of missing samples in historians, loggers and spreadsheets, in small letters. A cell that begins with one of them and continues
 /// with a blank or a colon is a missing sample too (`Bad: sensor failure`).
@@ -112,33 +112,33 @@ impl CellFault {
     pub(super) fn at(self, place: Place, cell: &str, strict: bool) -> Error {
         let (file, row, column) = (place.file(), place.row(), place.column());
         let mend = match self {
-            Self::Empty => return Error::EmptyCell { file, row, column },
+            Self::Empty => return Error::Read(ReadError::EmptyCell { file, row, column }),
             Self::NotFinite => {
-                return Error::NotFinite {
+                return Error::Read(ReadError::NotFinite {
                     file,
                     row,
                     column,
                     text: quoted(cell),
-                };
+                });
             }
             Self::DecimalMark { here, before } => {
                 let word = |mark| if mark == ',' { "comma" } else { "point" };
-                return Error::MixedDecimalMarks {
+                return Error::Read(ReadError::MixedDecimalMarks {
                     file,
                     row,
                     column,
                     text: quoted(cell),
                     here: word(here),
                     before: word(before),
-                };
+                });
             }
             Self::Time(error) => {
-                return Error::Timestamp {
+                return Error::Read(ReadError::Timestamp {
                     file,
                     row,
                     column,
                     error,
-                };
+                });
             }
             Self::Thousands => THOUSANDS,
             Self::NoNumber => TIME_AS_NUMBER,
@@ -152,13 +152,13 @@ impl CellFault {
                 "correct the cell, or list the word under [columns] where it says that the sample is missing: missing = [\"...\"]"
             }
         };
-        Error::TextInCell {
+        Error::Read(ReadError::TextInCell {
             file,
             row,
             column,
             text: quoted(cell),
             mend,
-        }
+        })
     }
 }
 

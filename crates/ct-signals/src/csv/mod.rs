@@ -29,7 +29,7 @@ pub(crate) use self::{
     time::Times,
 };
 use crate::columns::{Columns, Heading, Purpose};
-use crate::{Error, Hold, LARGEST_RECORD, MIN_ROWS, Record, read_file};
+use crate::{Error, Hold, LARGEST_RECORD, MIN_ROWS, ReadError, Record, read_file};
 
 /// Options for reading a record.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -72,12 +72,12 @@ pub struct Reading {
 /// [`Record::require_moving_input`].
 ///
 /// # Errors
-/// [`Error::CannotOpen`], [`Error::Folder`], [`Error::NotText`], [`Error::EmptyFile`],
-/// [`Error::NoHeader`], [`Error::Column`], [`Error::UnknownTimeUnit`], [`Error::WrongFieldCount`],
-/// [`Error::UnitRow`], [`Error::TextInCell`], [`Error::MixedDecimalMarks`], [`Error::Timestamp`],
-/// [`Error::RepeatedTime`], [`Error::BackwardTime`], [`Error::Bound`], [`Error::TooFewRows`] (below
+/// [`ReadError::CannotOpen`], [`ReadError::Folder`], [`ReadError::NotText`], [`ReadError::EmptyFile`],
+/// [`ReadError::NoHeader`], [`ReadError::Column`], [`ReadError::UnknownTimeUnit`], [`ReadError::WrongFieldCount`],
+/// [`ReadError::UnitRow`], [`ReadError::TextInCell`], [`ReadError::MixedDecimalMarks`], [`ReadError::Timestamp`],
+/// [`ReadError::RepeatedTime`], [`ReadError::BackwardTime`], [`Error::Bound`], [`Error::TooFewRows`] (below
 /// [`MIN_ROWS`](crate::MIN_ROWS)), [`Error::NoSample`], [`Error::ConstantOutput`], [`Error::InvalidInterval`], [`Error::TooLarge`],
-/// [`Error::TooSmall`], [`Error::Saturated`]; where it is to be strict [`Error::EmptyCell`], [`Error::NotFinite`] and [`Error::Gap`] too.
+/// [`Error::TooSmall`], [`Error::Saturated`]; where it is to be strict [`ReadError::EmptyCell`], [`ReadError::NotFinite`] and [`Error::Gap`] too.
 pub fn read_csv(path: &Path, columns: &Columns, options: &ReadOptions) -> Result<Reading, Error> {
     read(path, columns, options, Purpose::Fit)
 }
@@ -163,7 +163,7 @@ pub fn csv_header(file: &str, content: &[u8]) -> Result<Vec<Heading>, Error> {
             return Ok(record.iter().map(Heading::of).collect());
         }
     }
-    Err(Error::EmptyFile { file: file.into() })
+    Err(Error::Read(ReadError::EmptyFile { file: file.into() }))
 }
 
 /// The fewest rows of a record.

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::columns::{Columns, Found, Layout, Purpose};
 use crate::csv::text::read as next_row;
-use crate::{Calendar, Channel, Error, Record, escaped, quoted, unit};
+use crate::{Calendar, Channel, Error, ReadError, Record, escaped, quoted, unit};
 
 /// The columns in use, with where each row ends in the file.
 #[derive(Default)]
@@ -64,23 +64,23 @@ pub(super) fn read_table(
             continue;
         };
         if record.len() != *fields {
-            return Err(Error::WrongFieldCount {
+            return Err(Error::Read(ReadError::WrongFieldCount {
                 file: file.into(),
                 row: line_number(text, end),
                 expected: *fields,
                 found: record.len(),
                 delimiter: delimiter_name(delimiter),
-            });
+            }));
         }
         if table.time.is_empty() && table.outside == 0 && is_row_of_units(&record) {
             let (name, unit) = unit::split(&layout.time.header);
             let below = &record[layout.time.index];
             let unit = if below.is_empty() { unit } else { below };
-            return Err(Error::UnitRow {
+            return Err(Error::Read(ReadError::UnitRow {
                 file: file.into(),
                 row: line_number(text, end),
                 header: quoted(&format!("{name} [{unit}]")),
-            });
+            }));
         }
         let cell = &record[layout.time.index];
         let place = Place {
@@ -142,7 +142,7 @@ pub(super) fn read_table(
     table.calendar = times.and_then(|(times, _)| times.calendar());
     match header {
         Some((layout, _)) => Ok((layout, table)),
-        None => Err(Error::EmptyFile { file: file.into() }),
+        None => Err(Error::Read(ReadError::EmptyFile { file: file.into() })),
     }
 }
 

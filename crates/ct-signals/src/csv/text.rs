@@ -2,13 +2,15 @@
 
 use csv::{Reader, ReaderBuilder, StringRecord, Trim};
 
-use crate::{Error, LONGEST_LINE, MOST_COLUMNS, quoted};
+use crate::{Error, LONGEST_LINE, MOST_COLUMNS, ReadError, quoted};
 
 /// The content of a file as text, without a byte-order mark.
 pub(super) fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<&'a str, Error> {
-    let not_text = |found| Error::NotText {
-        file: file.into(),
-        found,
+    let not_text = |found| {
+        Error::Read(ReadError::NotText {
+            file: file.into(),
+            found,
+        })
     };
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(not_text("UTF-16"));
@@ -23,11 +25,11 @@ pub(super) fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<&'a str, Error> 
     let mut begin = 0;
     for line in bytes.split(|byte| *byte == b'\n' || *byte == b'\r') {
         if line.len() > LONGEST_LINE {
-            return Err(Error::LongLine {
+            return Err(Error::Read(ReadError::LongLine {
                 file: file.into(),
                 row: line_number(text, begin + line.len()),
                 longest: LONGEST_LINE,
-            });
+            }));
         }
         begin += line.len() + 1;
     }
@@ -67,21 +69,23 @@ pub(super) fn read(
     reader: &mut Reader<&[u8]>,
     row: &mut StringRecord,
 ) -> Result<bool, Error> {
-    reader.read_record(row).map_err(|error| Error::CannotOpen {
-        file: file.into(),
-        source: error.into(),
+    reader.read_record(row).map_err(|error| {
+        Error::Read(ReadError::CannotOpen {
+            file: file.into(),
+            source: error.into(),
+        })
     })
 }
 
 /// A header names so many columns at most.
 pub(crate) fn check_width(file: &str, row: u64, found: usize) -> Result<(), Error> {
     if found > MOST_COLUMNS {
-        return Err(Error::ManyColumns {
+        return Err(Error::Read(ReadError::ManyColumns {
             file: file.into(),
             row,
             found,
             most: MOST_COLUMNS,
-        });
+        }));
     }
     Ok(())
 }
@@ -99,11 +103,11 @@ pub(super) fn check_header(
 ) -> Result<(), Error> {
     check_width(file, row(), record.len())?;
     if record.iter().all(is_number) {
-        return Err(Error::NoHeader {
+        return Err(Error::Read(ReadError::NoHeader {
             file: file.into(),
             row: row(),
             first: quoted(&record.iter().collect::<Vec<_>>().join(", ")),
-        });
+        }));
     }
     Ok(())
 }

@@ -10,7 +10,7 @@ use super::{
     text::{read, reader},
 };
 use crate::columns::Columns;
-use crate::{Calendar, Error, Timestamp, TimestampError, TimestampReader, Zone, quoted};
+use crate::{Calendar, Error, ReadError, Timestamp, TimestampError, TimestampReader, Zone, quoted};
 
 /// Format of a time column.
 #[derive(Debug, Clone)]
@@ -92,12 +92,12 @@ impl Times {
         }
         let (file, row, column) = (place.file(), place.row(), place.column());
         if time == previous {
-            return Err(Error::RepeatedTime {
+            return Err(Error::Read(ReadError::RepeatedTime {
                 file,
                 row,
                 column,
                 time: self.shown(time).into(),
-            });
+            }));
         }
         let mend = match self {
             // An hour occurs twice when clocks are set back.
@@ -106,14 +106,14 @@ impl Times {
             }
             _ => "sort the rows by time, or split the file there: each part is a record of its own",
         };
-        Err(Error::BackwardTime {
+        Err(Error::Read(ReadError::BackwardTime {
             file,
             row,
             column,
             time: self.shown(time).into(),
             previous: self.shown(previous).into(),
             mend,
-        })
+        }))
     }
 }
 

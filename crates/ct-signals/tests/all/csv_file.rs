@@ -4,7 +4,7 @@ mod refused;
 mod signals;
 
 use approx::assert_relative_eq;
-use ct_signals::{ColumnFault, Columns, Error, ReadOptions, Record, read_csv};
+use ct_signals::{ColumnFault, Columns, Error, ReadError, ReadOptions, Record, read_csv};
 
 /// 40 rows of a plausible experiment: time step 2, input and output moving.
 fn rows() -> Vec<[f64; 3]> {
@@ -65,7 +65,7 @@ fn says(error: &Error, words: &[&str]) {
 /// The fault of the columns, if the error is of this kind.
 fn fault(error: &Error) -> Option<&ColumnFault> {
     match error {
-        Error::Column { fault, .. } => Some(fault),
+        Error::Read(ReadError::Column { fault, .. }) => Some(fault),
         _ => None,
     }
 }

@@ -139,9 +139,11 @@ pub(crate) fn of_text(path: &Path, text: &str) -> Result<ModelFile, Error> {
 pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
     let cannot = |what: String| Error::file(path, what);
     let bytes = read_file(path, LARGEST as u64).map_err(|error| match error {
-        ct_signals::Error::CannotOpen { source, .. } => cannot(format!(
-            "the model file cannot be opened: {source}; check the path and the permissions"
-        )),
+        ct_signals::Error::Read(ct_signals::ReadError::CannotOpen { source, .. }) => {
+            cannot(format!(
+                "the model file cannot be opened: {source}; check the path and the permissions"
+            ))
+        }
         error => error.into(),
     })?;
     let text = String::from_utf8(bytes)

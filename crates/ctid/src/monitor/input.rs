@@ -2,7 +2,7 @@
 
 mod first_row;
 
-use ::monitor::{Refused, Row};
+use ::monitor::{NotUsed, Row};
 use ct_signals::{BadLine, LONGEST_LINE, Line, Rows, TimestampError, quoted};
 
 use super::{Halt, INPUT, Session, lines::Cut};
@@ -243,37 +243,37 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn refused(&mut self, refused: &Refused) {
+    fn refused(&mut self, refused: &NotUsed) {
         // Only errors of time and inputs reject a row.
         let text = self.named(refused, refused.at());
         self.bad(|| text);
     }
 
     /// Error in a row's value, with its column and the correction; `at`: number of the input or output.
-    fn named(&self, refused: &Refused, at: usize) -> String {
+    fn named(&self, refused: &NotUsed, at: usize) -> String {
         let column = self.rows.as_ref().map_or(String::new(), |rows| {
             quoted(rows.name(refused.column(), at))
         });
         let mend = match refused {
-            Refused::NotFinite { .. } => "check what writes it",
-            Refused::BeyondRange { .. } => {
+            NotUsed::NotFinite { .. } => "check what writes it",
+            NotUsed::BeyondRange { .. } => {
                 "check the program that writes it, or correct the range in the model file"
             }
-            Refused::AboveTank { .. } => {
+            NotUsed::AboveTank { .. } => {
                 "check the sensor, or give the height in the reading's unit in the model file"
             }
-            Refused::TooLarge { .. } => "correct it, or give the column in a larger unit",
+            NotUsed::TooLarge { .. } => "correct it, or give the column in a larger unit",
             _ => "rows have to come in the order of time: check the clock",
         };
         let axis = self.monitor.axis();
         let what = match refused {
-            Refused::Repeated { time } => {
+            NotUsed::Repeated { time } => {
                 format!(
                     "the time {} is repeated from the row before",
                     axis.value(*time)
                 )
             }
-            Refused::Backward { time, previous } => format!(
+            NotUsed::Backward { time, previous } => format!(
                 "the time goes back from {} to {}",
                 axis.value(*previous),
                 axis.value(*time)

@@ -2,8 +2,8 @@
 
 use ct_signals::{Heading, duration};
 use effect_search::design::{
-    Alternative, Design, Experiment, InputRange, InputSequenceKind, Kind, Limits, Prospect,
-    Refused, design as search,
+    Alternative, Design, Experiment, InputRange, InputSequenceKind, Kind, Limits, NoExperiment,
+    Prospect, design as search,
 };
 use effect_search::{Options, Progress};
 use serde::Serialize;
@@ -44,7 +44,7 @@ pub fn design(
     let found = search(&problem, [ids[0], ids[1]], limits, options, progress);
     found.map_err(|error| match error {
         // An error in the options, not in a file.
-        effect_search::Error::Design(refused) if refused != Refused::OutOfTime => {
+        effect_search::Error::Design(refused) if refused != NoExperiment::OutOfTime => {
             Error::Usage(refused.to_string())
         }
         error => blamed(&problem, &error),

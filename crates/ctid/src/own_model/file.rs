@@ -234,7 +234,8 @@ impl OwnModelFile {
 
     /// An error of the columns with the correction for this model, whose signals have names of their own under `[columns]`.
     pub fn named(&self, error: ct_signals::Error) -> Error {
-        let ct_signals::Error::Column { file, row, fault } = &error else {
+        let ct_signals::Error::Read(ct_signals::ReadError::Column { file, row, fault }) = &error
+        else {
             return error.into();
         };
         let ColumnFault::Missing { wanted, .. } = &**fault else {

@@ -191,7 +191,7 @@ impl Arguments {
 
 fn read(path: &Path, name: &str, held_out: bool) -> Result<Upload, Error> {
     let content = ct_signals::read_file(path, LARGEST_BODY as u64).map_err(|error| match error {
-        ct_signals::Error::FileTooLarge { .. } => Error::file(
+        ct_signals::Error::Read(ct_signals::ReadError::FileTooLarge { .. }) => Error::file(
             path,
             format!(
                 "it is larger than {} MB, the most that the page takes; run `ctid diagnose` on it",

@@ -8,7 +8,7 @@ use greybox::{ModelSetup, PriorValue};
 
 use super::limits::Bounds;
 use super::separation::{information, least};
-use super::{Experiment, InputSequenceKind, Kind, Power, Reach, Refused, power};
+use super::{Experiment, InputSequenceKind, Kind, NoExperiment, Power, Reach, power};
 use crate::Error;
 use crate::node::{Context, FINE, Node};
 
@@ -52,7 +52,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
         let no_fit = |i: usize| {
             let last = nodes[i].added[nodes[i].added.len() - 1];
             let effect = context.candidates[last].id.clone();
-            Error::from(Refused::NoFit { effect })
+            Error::from(NoExperiment::NoFit { effect })
         };
         let of = |i: usize| -> Result<(Triangle, Vec<Record>), Error> {
             let node = &nodes[i];

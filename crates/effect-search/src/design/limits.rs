@@ -31,7 +31,7 @@ pub struct Limits {
 /// An experiment that cannot be proposed. The messages name the options of `ctid design`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Refused {
+pub enum NoExperiment {
     /// The two effects are the same.
     #[error("--between {effect} {effect}: an effect cannot be told from itself; name two")]
     SameEffect {
@@ -131,16 +131,20 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 impl Bounds {
     /// `parameters`: how many are fitted.
-    pub fn new(problem: &Problem, limits: &Limits, parameters: usize) -> Result<Self, Refused> {
+    pub fn new(
+        problem: &Problem,
+        limits: &Limits,
+        parameters: usize,
+    ) -> Result<Self, NoExperiment> {
         let spec = &problem.spec;
         let names: Vec<&str> = spec.inputs.iter().map(|u| u.about.name.as_str()).collect();
         if names.is_empty() {
-            return Err(Refused::NoInput);
+            return Err(NoExperiment::NoInput);
         }
         let asked = limits.inputs.iter();
         for name in asked.chain(limits.ranges.keys()).chain(limits.slews.keys()) {
             if !names.contains(&name.as_str()) {
-                return Err(Refused::UnknownInput {
+                return Err(NoExperiment::UnknownInput {
                     name: name.clone(),
                     known: names.join(", "),
                 });
@@ -158,7 +162,7 @@ impl Bounds {
         let samples = (duration / interval).round().clamp(0.0, 1e9) as usize + 1;
         let least = SAMPLES_PER_PARAMETER * parameters.max(4);
         if !(least..=MOST_SAMPLES).contains(&samples) || !duration.is_finite() {
-            return Err(Refused::Duration {
+            return Err(NoExperiment::Duration {
                 duration,
                 samples,
                 least,
@@ -187,18 +191,18 @@ impl Bounds {
                 if limits.inputs.is_empty() && names.len() > 1 {
                     continue;
                 }
-                return Err(Refused::NoRange {
+                return Err(NoExperiment::NoRange {
                     input: (*name).to_string(),
                     value: from,
                 });
             }
             let input = (*name).to_string();
             if !(low < high && low.is_finite() && high.is_finite()) {
-                return Err(Refused::Range { input, low, high });
+                return Err(NoExperiment::Range { input, low, high });
             }
             let slew = limits.slews.get(*name).copied();
             if let Some(slew) = slew.filter(|slew| slew.is_nan() || slew * duration < high - low) {
-                return Err(Refused::Slew {
+                return Err(NoExperiment::Slew {
                     input,
                     slew,
                     duration,
@@ -224,7 +228,7 @@ impl Bounds {
             applied.push((i, range, room));
         }
         if applied.is_empty() {
-            return Err(Refused::NoRange {
+            return Err(NoExperiment::NoRange {
                 input: names[0].to_string(),
                 value: visited(0).0,
             });

@@ -19,7 +19,7 @@ use estimation::Noise;
 use rayon::prelude::*;
 
 use comparison::Comparison;
-pub use limits::{Limits, Refused};
+pub use limits::{Limits, NoExperiment};
 pub use power::{PLENTY, Power, Prospect, by_use, power, prospect, times_as_long};
 pub use result::{
     Alternative, Design, Experiment, InputRange, InputSequence, InputSequenceKind, Reach, Sequences,
@@ -61,14 +61,14 @@ pub fn design(
     let tell = |phase| progress(Progress { phase });
     if between[0] == between[1] {
         let effect = between[0].to_string();
-        return Err(Refused::SameEffect { effect }.into());
+        return Err(NoExperiment::SameEffect { effect }.into());
     }
     if let Some(id) = between
         .iter()
         .find(|id| problem.effects.iter().any(|own| own == *id))
     {
         let effect = (*id).to_string();
-        return Err(Refused::InModel { effect }.into());
+        return Err(NoExperiment::InModel { effect }.into());
     }
     // Errors in the limits are reported before the computation as far as possible.
     Bounds::new(problem, limits, 0)?;
@@ -80,7 +80,7 @@ pub fn design(
     context.limit.begin(Phase::White);
     let (base, nodes, noise) = context.alternatives(&base, between)?;
     if context.limit.passed() {
-        return Err(Refused::OutOfTime.into());
+        return Err(NoExperiment::OutOfTime.into());
     }
     let parameters = nodes.iter().map(|node| node.fit.parameters);
     let bounds = Bounds::new(problem, limits, parameters.max().unwrap_or(0))?;
@@ -121,7 +121,7 @@ pub fn design(
     // After this number of rounds, the best refitted experiment is used.
     tried.sort_by_key(|(experiment, _)| !experiment.refitted);
     let Some((best, inputs)) = tried.first().cloned() else {
-        return Err(Refused::OutOfTime.into());
+        return Err(NoExperiment::OutOfTime.into());
     };
     let ahead = comparison.ahead();
     let times_as_long = times_as_long(&best.power, ahead)
@@ -183,7 +183,7 @@ impl Context<'_> {
         let fitted = |id: &str| -> Result<Node, Error> {
             let known = self.candidates.iter().position(|c| c.id == *id);
             let i = known.ok_or_else(|| Error::UnknownEffect { id: id.to_string() })?;
-            let no_fit = || Refused::NoFit {
+            let no_fit = || NoExperiment::NoFit {
                 effect: id.to_string(),
             };
             let trial = self.trial(base, i, &white)?.ok_or_else(no_fit)?;

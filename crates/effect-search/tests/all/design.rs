@@ -2,7 +2,7 @@
 
 use ct_model::{Model, ModelSpec, Simulation};
 use ct_signals::{Record, noise};
-use effect_search::design::{Design, Kind, Limits, Prospect, Refused, design};
+use effect_search::design::{Design, Kind, Limits, NoExperiment, Prospect, design};
 use effect_search::{Error, Options, Problem};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -116,26 +116,35 @@ fn limits_that_allow_no_experiment_are_refused() {
         ..Limits::default()
     };
     let same = refused(["lag(u)", "lag(u)"], &Limits::default());
-    assert!(matches!(same, Refused::SameEffect { .. }));
+    assert!(matches!(same, NoExperiment::SameEffect { .. }));
     assert!(matches!(
         refused(between, &of("x")),
-        Refused::UnknownInput { .. }
+        NoExperiment::UnknownInput { .. }
     ));
     assert!(matches!(
         refused(between, &of("Ta")),
-        Refused::NoRange { .. }
+        NoExperiment::NoRange { .. }
     ));
     let mut limits = of("u");
     limits.ranges.insert("u".to_string(), (3.0, 3.0));
-    assert!(matches!(refused(between, &limits), Refused::Range { .. }));
+    assert!(matches!(
+        refused(between, &limits),
+        NoExperiment::Range { .. }
+    ));
     let mut limits = of("u");
     limits.slews.insert("u".to_string(), 1e-6);
-    assert!(matches!(refused(between, &limits), Refused::Slew { .. }));
+    assert!(matches!(
+        refused(between, &limits),
+        NoExperiment::Slew { .. }
+    ));
     let short = Limits {
         duration: Some(20.0),
         ..Limits::default()
     };
-    assert!(matches!(refused(between, &short), Refused::Duration { .. }));
+    assert!(matches!(
+        refused(between, &short),
+        NoExperiment::Duration { .. }
+    ));
     let unknown = proposed(&problem, ["lag(u)", "lag(z)"], &Limits::default());
     assert!(matches!(unknown, Err(Error::UnknownEffect { .. })));
 }

@@ -3,7 +3,7 @@
 use ct_lti::Hold;
 use estimation::{Residuals, Sample, Triangle};
 
-use super::{Problem, ROUNDING, Refused};
+use super::{Problem, ROUNDING, Undefined};
 use crate::simulation::BLOCK;
 use crate::{ClosedLoop, Error, LoopSimulator, PlantModel};
 
@@ -14,11 +14,11 @@ impl Problem {
         x: &[f64],
         limit: f64,
         sensitivities: bool,
-    ) -> Result<Triangle, Refused> {
-        let plant = self.plant(x).map_err(|_| Refused::NotFinite)?;
-        let closed = ClosedLoop::new(&plant, &self.controller).map_err(|_| Refused::NotFinite)?;
+    ) -> Result<Triangle, Undefined> {
+        let plant = self.plant(x).map_err(|_| Undefined::NotFinite)?;
+        let closed = ClosedLoop::new(&plant, &self.controller).map_err(|_| Undefined::NotFinite)?;
         if !closed.is_stable() {
-            return Err(Refused::Unstable);
+            return Err(Undefined::Unstable);
         }
         // Each record's rows have few nonzero columns: each record is reduced separately.
         let of_record = |index| {
@@ -51,8 +51,8 @@ impl Problem {
             let cost = all.cost() + own.1.cost();
             !(cost > limit && cost.is_finite())
         });
-        if !seen.map_err(|_| Refused::NotFinite)? {
-            return Err(Refused::Higher);
+        if !seen.map_err(|_| Undefined::NotFinite)? {
+            return Err(Undefined::Higher);
         }
         let (_, mut record, places) = own;
         record.finish();
@@ -61,7 +61,7 @@ impl Problem {
         if all.is_finite() {
             Ok(all)
         } else {
-            Err(Refused::NotFinite)
+            Err(Undefined::NotFinite)
         }
     }
 

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{
     INSTEAD, REFITS,
-    limits::{Bounds, Refused},
+    limits::{Bounds, NoExperiment},
     plan::{Candidate, Reach, SecondSensor, Wider},
     separation::{Metric, information, linear, misfit_before, noise_free, refitted},
     simulated::{Loop, SimulatedExperiment, simulate_experiment},
@@ -314,7 +314,7 @@ impl Search<'_, '_> {
         let before = self.before()?;
         // A misfit that is too large before the experiment would make that of the experiment too small.
         if self.nodes[0].setup.out_of_time() {
-            return Err(Refused::OutOfTime.into());
+            return Err(NoExperiment::OutOfTime.into());
         }
         let (mut tried, [overfull, limited]) = self.promises(bounds, seed, &before)?;
         let all_tried = !self.nodes[0].setup.out_of_time();
@@ -326,9 +326,9 @@ impl Search<'_, '_> {
         }
         let Some((best, sequence)) = tried.first().cloned() else {
             if !all_tried {
-                return Err(Refused::OutOfTime.into());
+                return Err(NoExperiment::OutOfTime.into());
             }
-            return Err(Refused::Overfull {
+            return Err(NoExperiment::Overfull {
                 low: bounds.low,
                 high: bounds.high,
                 height: self.problem.known.tank_height.unwrap_or(f64::INFINITY),

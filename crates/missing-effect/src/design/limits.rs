@@ -32,7 +32,7 @@ pub struct Limits {
 /// An experiment that cannot be proposed. The messages name the options of `ctid design`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Refused {
+pub enum NoExperiment {
     /// The two effects are the same.
     #[error("--between {effect} {effect}: an effect cannot be told from itself; name two")]
     SameEffect {
@@ -251,7 +251,7 @@ impl Bounds {
         limits: &Limits,
         looped: bool,
         parameters: usize,
-    ) -> Result<Self, Refused> {
+    ) -> Result<Self, NoExperiment> {
         let seen = visited(&problem.records, looped);
         let ((low, high), range_from) = match limits.range {
             Some(range) => (range, "as given"),
@@ -259,8 +259,8 @@ impl Bounds {
         };
         if !(low.is_finite() && high.is_finite() && low < high) {
             return Err(match limits.range {
-                Some((low, high)) => Refused::Range { low, high },
-                None => Refused::NoRange {
+                Some((low, high)) => NoExperiment::Range { low, high },
+                None => NoExperiment::NoRange {
                     what: if looped { "reference" } else { "command" },
                     value: low,
                 },
@@ -269,7 +269,7 @@ impl Bounds {
         if let (Some((from, to, what)), Some(_)) = (possible(problem, looped), limits.range)
             && (low < from || high > to)
         {
-            return Err(Refused::Beyond {
+            return Err(NoExperiment::Beyond {
                 low,
                 high,
                 from,
@@ -280,7 +280,7 @@ impl Bounds {
         let largest = seen.0.abs().max(seen.1.abs());
         let most = WIDEST * if largest > 0.0 { largest } else { 1.0 };
         if low.abs().max(high.abs()) > most {
-            return Err(Refused::TooWide { low, high, most });
+            return Err(NoExperiment::TooWide { low, high, most });
         }
         let longest = |of: fn(&Record) -> f64| problem.records.iter().map(of).fold(0.0, f64::max);
         let interval = problem
@@ -299,7 +299,7 @@ impl Bounds {
         };
         let needed = MIN_ROWS.max(parameters * ROWS_PER_PARAMETER);
         if samples < needed {
-            return Err(Refused::Duration {
+            return Err(NoExperiment::Duration {
                 duration,
                 samples,
                 needed,
@@ -307,7 +307,7 @@ impl Bounds {
             });
         }
         if samples > MOST_SAMPLES {
-            return Err(Refused::TooLong {
+            return Err(NoExperiment::TooLong {
                 duration,
                 samples,
                 most: MOST_SAMPLES,
@@ -317,7 +317,7 @@ impl Bounds {
         if let Some(slew) = limits.slew {
             let moves = slew * duration;
             if slew.is_nan() || moves < high - low {
-                return Err(Refused::Slew {
+                return Err(NoExperiment::Slew {
                     slew,
                     moves,
                     duration,

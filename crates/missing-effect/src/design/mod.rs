@@ -20,7 +20,7 @@ use std::time::Instant;
 use plants::{Domain, EffectInfo, Placed};
 
 pub use effect_search::design::{Kind, Power, Prospect};
-pub use limits::{Bounds, Limits, Refused};
+pub use limits::{Bounds, Limits, NoExperiment};
 pub use plan::{Alternative, Candidate, Design, Reach, SecondSensor, Sequence, Wider};
 
 use crate::{
@@ -95,11 +95,11 @@ pub fn design(
     let problem = mended.as_ref().map_or(problem, |mended| &mended.problem);
     if between[0].is_that_of(between[1]) {
         let effect = between[0].effect.id.to_string();
-        return Err(Refused::SameEffect { effect }.into());
+        return Err(NoExperiment::SameEffect { effect }.into());
     }
     for record in &problem.records {
         if let Some(second) = record.inputs.get(1) {
-            return Err(Refused::TwoCommands {
+            return Err(NoExperiment::TwoCommands {
                 record: record.name.clone(),
                 first: record.inputs[0].name.clone(),
                 second: second.name.clone(),
@@ -202,7 +202,7 @@ fn fitted<'a>(
         base.setup.structure.with(Placed { effect, vessel })?;
     }
     let white = base.setup.white_noise();
-    let fits = |candidacy: Candidacy| -> Result<Vec<Node<'a>>, Refused> {
+    let fits = |candidacy: Candidacy| -> Result<Vec<Node<'a>>, NoExperiment> {
         let sites = candidacy.effect.sites(problem.plant, &problem.known);
         let mut nodes: Vec<Node<'a>> = sites
             .filter(|site| candidacy.vessel.is_none_or(|vessel| vessel == *site))
@@ -238,7 +238,7 @@ fn fitted<'a>(
     let base = refine(&base, &noise, &[])?;
     // An incomplete fit would seem identical to the model without the effect.
     if base.setup.out_of_time() {
-        return Err(Refused::OutOfTime.into());
+        return Err(NoExperiment::OutOfTime.into());
     }
     Ok(Fitted {
         nodes,
@@ -260,8 +260,8 @@ fn apart([a, b]: [&Node; 2]) -> f64 {
     pairs.map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-fn no_fit(candidacy: Candidacy) -> Refused {
-    Refused::NoFit {
+fn no_fit(candidacy: Candidacy) -> NoExperiment {
+    NoExperiment::NoFit {
         effect: candidacy.effect.id.to_string(),
     }
 }

@@ -19,7 +19,7 @@ use missing_effect::GROUP_MARGIN;
 
 use self::simulation::running;
 use crate::{
-    Alarm, Each, Error, Other, Refused, Size, TimeAxis, Units, Verdict, Watched,
+    Alarm, Each, Error, NotUsed, Other, Size, TimeAxis, Units, Verdict, Watched,
     alarm::consistent,
     fingerprint::{Fingerprint, TIME_UNIT},
     intake::{Readings, Sample},
@@ -161,11 +161,11 @@ impl Believed for OwnModel {
         self.hold
     }
 
-    fn check_input(&self, _value: f64) -> Result<(), Refused> {
+    fn check_input(&self, _value: f64) -> Result<(), NotUsed> {
         Ok(())
     }
 
-    fn check_reading(&self, _value: f64) -> Result<(), Refused> {
+    fn check_reading(&self, _value: f64) -> Result<(), NotUsed> {
         Ok(())
     }
 

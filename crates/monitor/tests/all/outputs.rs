@@ -2,8 +2,8 @@
 
 use ct_signals::{excitation, noise};
 use monitor::{
-    Alarm, Error, Model, Monitor, Notice, Progress, Row, ScatterAlarm, Settings, Stage, State,
-    Step, Verdict,
+    Alarm, Error, Model, Monitor, Notice, Progress, Row, RowResult, ScatterAlarm, Settings, Stage,
+    State, Verdict,
 };
 use plants::{Known, Plant};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -76,7 +76,7 @@ fn model() -> Model {
 }
 
 /// The alarms of tanks in which something begins at 4000 s: the first is raised soon after, the last look is given.
-fn last_look(steps: &[Step]) -> Alarm {
+fn last_look(steps: &[RowResult]) -> Alarm {
     let alarms = alarms(steps);
     let first = alarms.first().unwrap();
     // The time constants are 100 and 90 s.
@@ -323,7 +323,7 @@ fn a_restored_monitor_of_two_outputs_goes_on_where_it_was() {
         let state: State = serde_json::from_str(&text).unwrap();
         let mut restored = Monitor::restore(model(), Settings::default(), state).unwrap();
         // A NaN in what is said is unlike itself: in words.
-        let words = |steps: &[Step]| format!("{steps:?}");
+        let words = |steps: &[RowResult]| format!("{steps:?}");
         assert_eq!(words(&all(&mut restored, &rows[at..])), words(&steps[at..]));
     }
     // Another choice of outputs makes another model.

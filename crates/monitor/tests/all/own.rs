@@ -4,7 +4,7 @@ mod plants;
 
 use ct_signals::{excitation, noise};
 use monitor::{
-    Error, Monitor, Notice, OwnModel, Progress, Row, Settings, State, Step, Units, Verdict,
+    Error, Monitor, Notice, OwnModel, Progress, Row, RowResult, Settings, State, Units, Verdict,
 };
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
@@ -170,7 +170,7 @@ fn a_saved_state_goes_on_as_if_nothing_had_happened() {
     later[1] = 0.4;
     plant.parameters.push((3000, later));
     let rows = plant.run();
-    let words = |steps: &[Step]| format!("{steps:?}");
+    let words = |steps: &[RowResult]| format!("{steps:?}");
     let whole = all(&mut monitor(&plant.model), &rows);
     for at in [500, 1500, 3020, 4500] {
         let mut first = monitor(&plant.model);

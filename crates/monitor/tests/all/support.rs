@@ -1,6 +1,6 @@
 //! Shared parts of the monitor's tests: build a monitor, give it rows, and check its results.
 
-use monitor::{Alarm, Model, Monitor, Notice, Row, Settings, Step, Units};
+use monitor::{Alarm, Model, Monitor, Notice, Row, RowResult, Settings, Units};
 
 /// Levels in cm, commands in V.
 pub fn units() -> Units {
@@ -16,14 +16,14 @@ pub fn new(model: Model) -> Monitor {
 }
 
 /// Results of the monitor for all rows.
-pub fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<Step> {
+pub fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<RowResult> {
     rows.iter()
         .map(|row| monitor.update(row).unwrap())
         .collect()
 }
 
 /// The alarms among what was said.
-pub fn alarms(steps: &[Step]) -> Vec<&Alarm> {
+pub fn alarms(steps: &[RowResult]) -> Vec<&Alarm> {
     steps
         .iter()
         .filter_map(|step| step.alarm.as_ref())
@@ -31,7 +31,7 @@ pub fn alarms(steps: &[Step]) -> Vec<&Alarm> {
 }
 
 /// The notices among what was said.
-pub fn notices(steps: &[Step]) -> Vec<&Notice> {
+pub fn notices(steps: &[RowResult]) -> Vec<&Notice> {
     steps
         .iter()
         .flat_map(|step| step.notices.iter().flatten())

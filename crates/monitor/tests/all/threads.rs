@@ -1,6 +1,6 @@
 //! Public types cross threads: where one no longer does, this does not compile.
 
-use monitor::{Alarm, Error, Model, Monitor, OwnModel, State, Step};
+use monitor::{Alarm, Error, Model, Monitor, OwnModel, RowResult, State};
 
 const fn crosses<T: Send + Sync>() {}
 
@@ -8,7 +8,7 @@ const _: () = {
     crosses::<Monitor>();
     crosses::<Model>();
     crosses::<OwnModel>();
-    crosses::<Step>();
+    crosses::<RowResult>();
     crosses::<State>();
     crosses::<Alarm>();
     crosses::<Error>();

@@ -1,6 +1,6 @@
 //! Files that are refused, each with its own message, and limits of what is read.
 
-use ct_signals::{ColumnFault, Columns, Error, ReadOptions, parse_csv, read_csv};
+use ct_signals::{ColumnFault, Columns, Error, ReadError, ReadOptions, parse_csv, read_csv};
 use std::path::Path;
 
 use super::{HEADER, fault, missing, named, read, read_bytes, rows, says, text, with_line};
@@ -13,7 +13,7 @@ fn no_such_file() {
         &ReadOptions::default(),
     );
     let error = error.unwrap_err();
-    assert!(matches!(error, Error::CannotOpen { .. }));
+    assert!(matches!(error, Error::Read(ReadError::CannotOpen { .. })));
     says(&error, &["nowhere/tank.csv", "check the path"]);
 }
 
@@ -22,7 +22,7 @@ fn empty_file() {
     for text in ["", "\n\n", "\u{feff}", "# only a comment\n"] {
         let error = read(text).unwrap_err();
         assert!(
-            matches!(error, Error::EmptyFile { .. }),
+            matches!(error, Error::Read(ReadError::EmptyFile { .. })),
             "{text:?}: {error}"
         );
         says(&error, &["tank.csv", "empty"]);
@@ -38,7 +38,10 @@ fn not_text() {
         b"t,u [\xb0C],y\n",
     ] {
         let error = read_bytes(bytes, &Columns::default()).unwrap_err();
-        assert!(matches!(error, Error::NotText { .. }), "{error}");
+        assert!(
+            matches!(error, Error::Read(ReadError::NotText { .. })),
+            "{error}"
+        );
         says(&error, &["export it as CSV"]);
     }
 }
@@ -48,7 +51,10 @@ fn no_header() {
     let plain = text(HEADER, &rows());
     let (_, data) = plain.split_once('\n').unwrap();
     let error = read(data).unwrap_err();
-    assert!(matches!(error, Error::NoHeader { row: 1, .. }));
+    assert!(matches!(
+        error,
+        Error::Read(ReadError::NoHeader { row: 1, .. })
+    ));
 }
 
 #[test]
@@ -128,7 +134,10 @@ fn unit_contradiction_names_both_units() {
 #[test]
 fn unknown_unit_of_time() {
     let error = read(&text("t [fortnight],u,y", &rows())).unwrap_err();
-    assert!(matches!(error, Error::UnknownTimeUnit { .. }));
+    assert!(matches!(
+        error,
+        Error::Read(ReadError::UnknownTimeUnit { .. })
+    ));
     says(&error, &["fortnight", "min"]);
 }
 
@@ -137,7 +146,7 @@ fn wrong_number_of_fields() {
     for (line, count) in [("8,3", 2), ("8,3,10,4", 4)] {
         let error = read(&with_line(6, line)).unwrap_err();
         assert!(
-            matches!(error, Error::WrongFieldCount { row: 6, expected: 3, found, .. } if found == count)
+            matches!(error, Error::Read(ReadError::WrongFieldCount { row: 6, expected: 3, found, .. }) if found == count)
         );
         says(&error, &["tank.csv", "row 6", "comma"]);
     }
@@ -146,14 +155,20 @@ fn wrong_number_of_fields() {
 #[test]
 fn bad_cells() {
     let error = read(&with_line(6, "8,,10")).unwrap_err();
-    assert!(matches!(error, Error::EmptyCell { row: 6, .. }));
+    assert!(matches!(
+        error,
+        Error::Read(ReadError::EmptyCell { row: 6, .. })
+    ));
     says(
         &error,
         &["tank.csv", "row 6", "\"u [V]\"", "empty", "fill it in"],
     );
 
     let error = read(&with_line(7, "10,3,failed")).unwrap_err();
-    assert!(matches!(error, Error::TextInCell { row: 7, .. }));
+    assert!(matches!(
+        error,
+        Error::Read(ReadError::TextInCell { row: 7, .. })
+    ));
     says(
         &error,
         &[
@@ -179,7 +194,7 @@ fn bad_cells() {
     for cell in ["NaN", "nan", "inf", "-Infinity", "1e999"] {
         let error = read(&with_line(41, &format!("78,3,{cell}"))).unwrap_err();
         assert!(
-            matches!(error, Error::NotFinite { row: 41, .. }),
+            matches!(error, Error::Read(ReadError::NotFinite { row: 41, .. })),
             "{cell}: {error}"
         );
         says(
@@ -215,7 +230,10 @@ fn decimal_marks_may_not_be_mixed() {
         .replace(',', ";")
         .replace("10.", "10,");
     let error = read(&text).unwrap_err();
-    assert!(matches!(error, Error::MixedDecimalMarks { .. }));
+    assert!(matches!(
+        error,
+        Error::Read(ReadError::MixedDecimalMarks { .. })
+    ));
     says(&error, &["decimal comma", "decimal point"]);
 }
 
@@ -243,18 +261,21 @@ fn a_row_of_units_below_the_header() {
     let numbers = text("", &rows()).trim_start().replace(',', ";");
     let with = |units: &str| format!("Time;Pump;Level\n{units}{numbers}");
     let error = read_bytes(with("s;V;cm\n").as_bytes(), &columns).unwrap_err();
-    assert!(matches!(error, Error::UnitRow { row: 2, .. }), "{error:?}");
+    assert!(
+        matches!(error, Error::Read(ReadError::UnitRow { row: 2, .. })),
+        "{error:?}"
+    );
     says(&error, &["write them into the header, \"Time [s]\""]);
     assert!(read_bytes(with("").as_bytes(), &columns).is_ok());
     // One word among numbers, and a date, are no units.
     let error = read_bytes(with("s;1;2\n").as_bytes(), &columns).unwrap_err();
     assert!(
-        matches!(error, Error::Timestamp { row: 2, .. }),
+        matches!(error, Error::Read(ReadError::Timestamp { row: 2, .. })),
         "{error:?}"
     );
     let error = read_bytes(with("2026-01-01;1.2.3;-x\n").as_bytes(), &columns).unwrap_err();
     assert!(
-        matches!(error, Error::TextInCell { row: 2, .. }),
+        matches!(error, Error::Read(ReadError::TextInCell { row: 2, .. })),
         "{error:?}"
     );
 }

@@ -1,20 +1,26 @@
 //! Times and signals that no record can hold: repeated and backward times, gaps, too few rows, constant and saturated signals.
 
-use ct_signals::{Error, require_samples};
+use ct_signals::{Error, ReadError, require_samples};
 
 use super::{HEADER, read, rows, says, text, with_line};
 
 #[test]
 fn repeated_and_backward_time() {
     let error = read(&with_line(6, "6,3,10")).unwrap_err();
-    assert!(matches!(error, Error::RepeatedTime { row: 6, .. }));
+    assert!(matches!(
+        error,
+        Error::Read(ReadError::RepeatedTime { row: 6, .. })
+    ));
     says(
         &error,
         &["tank.csv", "row 6", "\"t [s]\"", "repeated", "remove"],
     );
 
     let error = read(&with_line(6, "5,3,10")).unwrap_err();
-    assert!(matches!(error, Error::BackwardTime { row: 6, .. }));
+    assert!(matches!(
+        error,
+        Error::Read(ReadError::BackwardTime { row: 6, .. })
+    ));
     says(&error, &["from 6 to 5", "sort"]);
 }
 

@@ -22,7 +22,9 @@ impl<'a> Session<'a> {
         }
         let named = self.columns.names_any();
         let (mut rows, is_row) = match Rows::begin(INPUT, self.line, text, &self.columns) {
-            Err(ct_signals::Error::NoOrder { found, .. }) if self.parts < PARTS => {
+            Err(ct_signals::Error::Read(ct_signals::ReadError::NoOrder { found, .. }))
+                if self.parts < PARTS =>
+            {
                 self.parts += 1;
                 let y = match self.columns.outputs.len() {
                     0 | 1 => "y".to_string(),
@@ -34,7 +36,9 @@ impl<'a> Session<'a> {
                 self.bad(|| format!("{found} numbers and no header; if this is no part of a row, give t,u,{y} or t,r,u,{y}"));
                 return Ok(false);
             }
-            Err(ct_signals::Error::NoOrder { .. }) | Ok((_, true)) if named => {
+            Err(ct_signals::Error::Read(ct_signals::ReadError::NoOrder { .. })) | Ok((_, true))
+                if named =>
+            {
                 return Err(Error::Usage(format!(
                     "{INPUT}, row {}: no header, and [columns] of {} names columns by it; {HEADER_FIRST}",
                     self.line,

@@ -12,7 +12,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 
 use crate::design::{
-    Bounds, Candidacy, Fitted, Limits, Metric, Prospect, Refused, Search, design, fitted,
+    Bounds, Candidacy, Fitted, Limits, Metric, NoExperiment, Prospect, Search, design, fitted,
     separation::{information, linear, misfit_before, noise_free, refitted, unlooped, vector},
     simulated::{Loop, simulate_experiment},
 };
@@ -79,7 +79,7 @@ fn what_there_is_no_time_for_is_not_claimed() {
     let at_once = limited(Duration::ZERO);
     let none = design(&problem, two, &Limits::default(), &at_once, &|_| {});
     assert!(
-        matches!(none, Err(Error::Design(Refused::OutOfTime))),
+        matches!(none, Err(Error::Design(NoExperiment::OutOfTime))),
         "{none:?}"
     );
     let hour = limited(Duration::from_secs(3600));
@@ -129,7 +129,7 @@ fn a_range_that_cannot_be_computed_with_is_refused() {
         let pair = between("const_leak", "pump_deadzone");
         let found = design(&problem, pair, &limits, &Options::default(), &|_| {});
         assert!(
-            matches!(found, Err(Error::Design(Refused::TooWide { .. }))),
+            matches!(found, Err(Error::Design(NoExperiment::TooWide { .. }))),
             "{found:?}"
         );
     }
@@ -156,7 +156,7 @@ fn what_cannot_be_is_refused() {
     };
     assert!(matches!(
         refused(between("overflow", "overflow"), none),
-        Refused::SameEffect { .. }
+        NoExperiment::SameEffect { .. }
     ));
     for (low, high) in [
         (5.0, 5.0),
@@ -166,13 +166,13 @@ fn what_cannot_be_is_refused() {
     ] {
         assert!(matches!(
             refused(pair, range(low, high)),
-            Refused::Range { .. }
+            NoExperiment::Range { .. }
         ));
     }
     for (low, high) in [(-1.0, 5.0), (2.0, 10.5)] {
         assert!(matches!(
             refused(pair, range(low, high)),
-            Refused::Beyond { .. }
+            NoExperiment::Beyond { .. }
         ));
     }
     for duration in [-5.0, 0.0, 20.0, f64::NAN] {
@@ -180,19 +180,25 @@ fn what_cannot_be_is_refused() {
             duration: Some(duration),
             ..none
         };
-        assert!(matches!(refused(pair, limits), Refused::Duration { .. }));
+        assert!(matches!(
+            refused(pair, limits),
+            NoExperiment::Duration { .. }
+        ));
     }
     let endless = Limits {
         duration: Some(1e12),
         ..none
     };
-    assert!(matches!(refused(pair, endless), Refused::TooLong { .. }));
+    assert!(matches!(
+        refused(pair, endless),
+        NoExperiment::TooLong { .. }
+    ));
     for slew in [-1.0, 0.0, 1e-6, f64::NAN] {
         let limits = Limits {
             slew: Some(slew),
             ..none
         };
-        assert!(matches!(refused(pair, limits), Refused::Slew { .. }));
+        assert!(matches!(refused(pair, limits), NoExperiment::Slew { .. }));
     }
 }
 

@@ -1,7 +1,7 @@
 //! Gaps, clocks that go back, other sampling intervals, and rows in blocks.
 
 use ct_signals::Hold;
-use monitor::{Model, Monitor, Notice, Progress, Refused, Row, Settings};
+use monitor::{Model, Monitor, NotUsed, Notice, Progress, Row, Settings};
 
 use super::{Tank, model};
 use crate::support::{alarms, all, new, notices, units};
@@ -61,7 +61,7 @@ fn a_clock_that_goes_back_is_followed() {
         all(&mut monitor, &rows[..2001]);
         for row in &rows[2001..2100] {
             let refused = monitor.update(row).unwrap_err();
-            assert!(matches!(refused, Refused::Backward { .. }), "{refused}");
+            assert!(matches!(refused, NotUsed::Backward { .. }), "{refused}");
         }
         let mut monitor = Monitor::restore(model(), Settings::default(), monitor.state()).unwrap();
         let steps = all(&mut monitor, &rows[2100..]);

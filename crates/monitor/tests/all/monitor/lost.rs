@@ -1,6 +1,6 @@
 //! Readings that are lost.
 
-use monitor::{Alarm, Monitor, Notice, Progress, Row, Settings, State, Step};
+use monitor::{Alarm, Monitor, Notice, Progress, Row, RowResult, Settings, State};
 
 use super::{Tank, first_and_last, model};
 use crate::support::{alarms, all, new, notices};
@@ -104,7 +104,7 @@ fn a_state_with_lost_readings_goes_on_where_it_was() {
         let state: State = serde_json::from_str(&text).unwrap();
         let mut restored = Monitor::restore(model(), Settings::default(), state).unwrap();
         // A NaN differs from itself, so the comparison uses text.
-        let words = |steps: &[Step]| format!("{steps:?}");
+        let words = |steps: &[RowResult]| format!("{steps:?}");
         assert_eq!(words(&all(&mut restored, &rows[at..])), words(&steps[at..]));
     }
 }

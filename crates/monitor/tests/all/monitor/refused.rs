@@ -1,6 +1,6 @@
 //! Rows that are refused and change nothing.
 
-use monitor::{Model, Refused, Row};
+use monitor::{Model, NotUsed, Row};
 
 use super::{Tank, model};
 use crate::support::{all, new};
@@ -40,7 +40,7 @@ fn bad_rows_change_nothing() {
     let repeated = monitor.update(&rows[1499]).unwrap_err();
     assert_eq!(
         repeated,
-        Refused::Repeated {
+        NotUsed::Repeated {
             time: rows[1499].time
         }
     );
@@ -48,7 +48,7 @@ fn bad_rows_change_nothing() {
 }
 
 /// Reason why a first row of input and output is rejected, next to an accepted one.
-pub(super) fn refused(model: Model, row: [f64; 2], taken: [f64; 2]) -> Refused {
+pub(super) fn refused(model: Model, row: [f64; 2], taken: [f64; 2]) -> NotUsed {
     let mut monitor = new(model);
     let row_of = |[input, output]: [f64; 2]| Row::new(0.0, input, &[output]);
     let refused = monitor.update(&row_of(row)).unwrap_err();
@@ -62,7 +62,7 @@ fn a_command_that_no_pump_gets_is_refused() {
     let mut model = model();
     model.known.input_range = Some(10.0);
     let refused = refused(model, [65535.0, 16.0], [10.0, 16.0]);
-    assert!(matches!(refused, Refused::BeyondRange { .. }));
+    assert!(matches!(refused, NotUsed::BeyondRange { .. }));
     assert_eq!(refused.column(), "input");
 }
 
@@ -76,6 +76,6 @@ fn a_reading_that_no_tank_of_this_height_gives_is_lost() {
         let row = Row::new(time, 5.0, &[output]);
         monitor.update(&row).unwrap().lost[0].clone()
     };
-    assert!(matches!(lost(0.0, 160.0), Some(Refused::AboveTank { .. })));
+    assert!(matches!(lost(0.0, 160.0), Some(NotUsed::AboveTank { .. })));
     assert_eq!(lost(1.0, 33.0), None);
 }

@@ -2,7 +2,7 @@
 
 use ct_model::{Model, ModelSpec, Simulation};
 use ct_signals::{excitation, noise};
-use monitor::{Monitor, OwnModel, Row, Settings, Step, Units};
+use monitor::{Monitor, OwnModel, Row, RowResult, Settings, Units};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
@@ -128,13 +128,13 @@ pub(super) fn monitor(model: &Model) -> Monitor {
     Monitor::new(own(model), Settings::default(), Units::default()).unwrap()
 }
 
-pub(crate) fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<Step> {
+pub(crate) fn all(monitor: &mut Monitor, rows: &[Row]) -> Vec<RowResult> {
     rows.iter()
         .map(|row| monitor.update(row).unwrap())
         .collect()
 }
 
-pub(crate) fn alarms(steps: &[Step]) -> Vec<&monitor::Alarm> {
+pub(crate) fn alarms(steps: &[RowResult]) -> Vec<&monitor::Alarm> {
     steps.iter().filter_map(|s| s.alarm.as_ref()).collect()
 }
 

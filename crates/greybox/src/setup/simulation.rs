@@ -195,19 +195,24 @@ impl Setup<'_> {
         self.records.iter().flat_map(|record| &record.outputs)
     }
 
-    /// Chooses the smallest number of substeps for which halving the step changes no reading by more than `1e-6` of the outputs' range.
+    /// Chooses the smallest number of substeps for which halving the step changes no reading by more than `1e-6` of its output's range.
     ///
     /// # Errors
     /// As [`Setup::simulate`].
     pub fn choose_substeps(&mut self, x: &[f64]) -> Result<(), Error> {
-        let ranges = self.measured().map(Channel::range);
-        let (low, high) = ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), range| {
-            (low.min(range.0), high.max(range.1))
-        });
-        let tolerance = 1e-6 * (high - low);
+        // By output, over all records.
+        let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); self.outputs()];
+        for (series, channel) in self.measured().enumerate() {
+            let (low, high) = channel.range();
+            let range = &mut ranges[series % self.outputs()];
+            *range = (range.0.min(low), range.1.max(high));
+        }
         // The simulator cuts steps that are long against a time constant by itself. While these cuts are finer than the substeps, more
         // substeps change nothing, which is no evidence of accuracy.
-        let rounding = 1e-13 * low.abs().max(high.abs());
+        let limits: Vec<(f64, f64)> = ranges
+            .iter()
+            .map(|(low, high)| (1e-6 * (high - low), 1e-13 * low.abs().max(high.abs())))
+            .collect();
         let mut enough = None;
         self.substeps = 1;
         let mut coarse = self.simulate(x)?;
@@ -215,18 +220,21 @@ impl Setup<'_> {
             let n = self.substeps;
             self.substeps = 2 * n;
             let fine = self.simulate(x)?;
-            let moved = coarse
-                .output
-                .iter()
-                .flatten()
-                .zip(fine.output.iter().flatten())
-                .map(|(a, b)| (a - b).abs())
-                .fold(0.0, f64::max);
-            if moved > tolerance {
+            let mut moved = vec![0.0_f64; limits.len()];
+            for (series, (a, b)) in coarse.output.iter().zip(&fine.output).enumerate() {
+                let most = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+                let moved = &mut moved[series % limits.len()];
+                *moved = most.fold(*moved, f64::max);
+            }
+            let above = |limit: fn(&(f64, f64)) -> f64| {
+                let mut pairs = moved.iter().zip(&limits);
+                pairs.any(|(moved, limits)| *moved > limit(limits))
+            };
+            if above(|(tolerance, _)| *tolerance) {
                 enough = None;
             } else {
                 enough = enough.or(Some(n));
-                if moved > rounding {
+                if above(|(_, rounding)| *rounding) {
                     break;
                 }
             }

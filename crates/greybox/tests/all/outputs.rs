@@ -244,6 +244,27 @@ fn records_with_another_number_of_outputs_are_refused() {
     );
 }
 
+/// The step is chosen for each output by its own range: an output that varies a thousand times more does not allow a longer one.
+#[test]
+fn the_step_is_short_enough_for_the_smallest_output() {
+    let mut records = [record(8, 100, 0.0)];
+    // The interval becomes long against the time constants.
+    for time in &mut records[0].time {
+        *time *= 8.0;
+    }
+    let chosen = |records: &[Record]| {
+        let mut setup = setup(records);
+        setup.choose_substeps(&truth(1)).unwrap();
+        setup.substeps
+    };
+    let own = chosen(&records);
+    assert!(own > 1, "{own}");
+    for value in &mut records[0].outputs[0].values {
+        *value *= 1e3;
+    }
+    assert_eq!(chosen(&records), own);
+}
+
 #[test]
 fn starts_follow_the_vessels_and_not_the_order_of_the_columns() {
     let records = [record(7, 200, 0.0)];

@@ -110,7 +110,6 @@ impl<T: Scalar> Varied<T> {
 /// slip occurs or no longer occurs. A finite difference is used instead: a slightly narrower and a slightly wider element follow the same
 /// command. The derivative by `begin` is computed in the same way. The choice between backlash and stiction is made by the starts; it has
 /// no derivative, and a fit does not change it.
-/// has no slope, and a fit does not move it.
 struct StictionBacklash<T> {
     width: T,
     begin: T,

@@ -25,6 +25,7 @@ mod own_unknown;
 mod own_without_inputs;
 mod prior;
 mod program;
+mod readme;
 mod results;
 mod side_by_side;
 mod simulate;

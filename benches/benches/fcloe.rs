@@ -1,7 +1,7 @@
 //! Closed-loop output error: time per sample of the loop with its whole Jacobian, and a whole fit, and SRIVC and RIVC, beside dsmc's SRIVC.
 //!
 //! After criterion's figures come tables: the shortest of many short runs, in turns, so that a busy machine disturbs both
-//! sides alike; and the estimates of both over 40 noise realisations.
+//! sides alike; and the estimates of both over 100 noise realisations.
 #![allow(missing_docs, clippy::expect_used)]
 
 use std::hint::black_box;

@@ -126,7 +126,7 @@ fn where_it_fails(diagnosis: &Diagnosis, look: Look) -> String {
 
 fn what_is_missing(diagnosis: &Diagnosis, look: Look) -> String {
     let text = "Every effect of the catalogue is tried at every place where it can act, alone and together, \
-                and confirmed by a refit. `visible from` is the smallest size that these data would have shown (minimum detectable size).";
+                and confirmed by a refit. `detectable` is the smallest size that these data would have shown (minimum detectable size).";
     step(3, "Learn what is missing", text, look)
         + &terminal::ranking(diagnosis, look)
         + &terminal::groups(diagnosis, look)

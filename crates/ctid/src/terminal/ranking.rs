@@ -82,7 +82,7 @@ fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<S
         Ranked::Gain => look.faint("BIC falls"),
         Ranked::Error => look.faint(error_heading),
         Ranked::Size | Ranked::SizeAlone => look.faint("size found"),
-        Ranked::Visible => look.faint("visible from"),
+        Ranked::Visible => look.faint("detectable"),
     };
     let mut rows = vec![columns.iter().map(heading).collect::<Vec<_>>()];
     for (index, score) in scores.iter().enumerate() {
@@ -106,7 +106,7 @@ fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<S
             Ranked::Error => with_unit(&errors[index], unit),
             Ranked::Size => size(true),
             Ranked::SizeAlone => size(false),
-            Ranked::Visible => visible_from(score),
+            Ranked::Visible => detectable_from(score),
         };
         rows.push(columns.iter().map(cell).collect());
     }
@@ -132,7 +132,7 @@ fn size(parameter: &Parameter, with_error: bool) -> String {
 }
 
 /// The minimum detectable size.
-fn visible_from(score: &Score) -> String {
+fn detectable_from(score: &Score) -> String {
     match (score.smallest_visible, &score.size) {
         (Some(smallest), Some(size)) => with_unit(&numbers::significant(smallest, 2), &size.unit),
         (Some(smallest), None) => numbers::significant(smallest, 2),
@@ -159,7 +159,7 @@ mod tests {
             );
             let widest = text.lines().skip(1).map(|line| line.chars().count()).max();
             assert!(widest <= Some(width), "{text}");
-            ["size found", "visible from", "error after"].map(|column| text.contains(column))
+            ["size found", "detectable", "error after"].map(|column| text.contains(column))
         };
         assert_eq!(seen(200), [true, true, true]);
         assert_eq!(seen(80), [false, true, true]);

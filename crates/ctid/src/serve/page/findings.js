@@ -65,8 +65,8 @@ function row(state, one, k, widest, fail) {
       make("details", {}, make("summary", {}, make("code", {}, named(one))),
         make("p", {}, one.physics), make("p", {}, make("code", {}, one.equation)), one.confirm ? make("p", { className: "caption" }, `To confirm it: ${one.confirm}`) : null),
       toggle(state, one.effect, one.place, fail, `add-ranked-${k}`)),
-    make("p", { className: "figures" }, make("span", {}, "error then ", make("b", {}, units(one.rmse))), make("span", { title: "fall of the Bayesian information criterion; below 6 is not significant" }, `evidence ${one.evidence}`),
-      one.size ? make("span", {}, units(one.size)) : null, one.visible ? make("span", {}, "visible from ", units(one.visible)) : null),
+    make("p", { className: "figures" }, make("span", {}, "error then ", make("b", {}, units(one.rmse))), make("span", { title: "fall of the Bayesian information criterion; below 6 is not significant" }, `BIC falls by ${one.evidence}`),
+      one.size ? make("span", {}, units(one.size)) : null, one.visible ? make("span", {}, "detectable from ", units(one.visible)) : null),
     make("div", { className: "track" }, bar));
 }
 

@@ -29,7 +29,7 @@ pub use fit::criterion::GROUP_MARGIN;
 pub use fitted::{Fitted, fitted};
 pub use result::{
     Acceptance, Bin, ControlLoop, Diagnosis, Effort, Failures, HeldOutError, LONGEST_HOLD,
-    MendedGaps, NoiseFloor, NotNoise, OutputStep, Parameter, PerOutput, PlaceLikelihood,
-    PlaceScore, Primitive, Rankings, Remark, ResidualTests, Score, Share, Shown, ShownInput, Step,
-    Unknown, Verdict, Window,
+    MendedGaps, NoiseFloor, NotNoise, NotSimulated, OutputStep, Parameter, PerOutput,
+    PlaceLikelihood, PlaceScore, Primitive, Rankings, Remark, ResidualTests, Score, Share, Shown,
+    ShownInput, Step, Unknown, Verdict, Window,
 };

@@ -2,6 +2,7 @@
 //!
 //! Every sentence is a function of the typed result alone.
 
+mod control_loop;
 mod design;
 mod effects;
 mod remarks;
@@ -14,6 +15,7 @@ mod verdict;
 use missing_effect::numbers::value_and_error;
 use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
 
+use self::control_loop::of_the_loop;
 pub use self::design::of_design;
 
 /// The findings of a comparison or a diagnosis in sentences: first one for each accepted effect, or the verdict; then the rest of the
@@ -51,7 +53,7 @@ pub fn of_diagnosis(diagnosis: &Diagnosis) -> Vec<String> {
     );
     said.extend(remarks::of_rankings(&diagnosis.rankings));
     let control_loop = diagnosis.control_loop.iter();
-    said.extend(control_loop.flat_map(|known| known.said.iter().cloned()));
+    said.extend(control_loop.map(|known| of_the_loop(known, &diagnosis.input_unit)));
     said.extend(diagnosis.gaps.and_then(|gaps| gaps.sentence()));
     said
 }

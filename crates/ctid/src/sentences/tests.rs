@@ -1,6 +1,6 @@
 //! Sentences of a few typical results.
 
-use missing_effect::{NotNoise, Remark, Verdict};
+use missing_effect::{ControlLoop, NotNoise, NotSimulated, Remark, Verdict};
 
 use super::of_diagnosis;
 use crate::report::sample;
@@ -85,4 +85,54 @@ fn remarks_follow_the_verdict_in_their_order() {
         rounding.is_some() && rounding < stopped && stopped < coloured,
         "{said:?}"
     );
+}
+
+#[test]
+fn a_loop_that_is_not_simulated_says_why() {
+    let mut found = sample::comparison();
+    let mut last = |why: NotSimulated, mismatch: Option<f64>| {
+        found.control_loop = Some(ControlLoop {
+            simulated: false,
+            feedback_p: None,
+            mismatch,
+            not_simulated: Some(why),
+        });
+        of_diagnosis(&found).pop().unwrap_or_default()
+    };
+    let record = "rig".to_string();
+    for (why, mismatch, parts) in [
+        (
+            NotSimulated::AsRequested,
+            None,
+            ["as was asked for", "The model runs on the measured command"],
+        ),
+        (
+            NotSimulated::NoReference {
+                record: record.clone(),
+            },
+            None,
+            ["rig: the record holds no reference", "[columns]"],
+        ),
+        (
+            NotSimulated::ConstantReference {
+                record,
+                value: 16.0,
+            },
+            None,
+            ["reference stays at 16", "set point changes"],
+        ),
+        (
+            NotSimulated::OtherController { share: 0.3 },
+            Some(0.25),
+            [
+                "R/S (r - y), by 0.250 V rms, 30 % of what it moves",
+                "check gain",
+            ],
+        ),
+    ] {
+        let said = last(why, mismatch);
+        for part in parts {
+            assert!(said.contains(part), "{said}");
+        }
+    }
 }

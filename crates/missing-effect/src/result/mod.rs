@@ -19,7 +19,7 @@ use plants::{Domain, Plant};
 use serde::{Deserialize, Serialize};
 
 pub use self::{
-    control_loop::ControlLoop,
+    control_loop::{ControlLoop, NotSimulated},
     gaps::{LONGEST_HOLD, MendedGaps},
     noise_floor::NoiseFloor,
     not_noise::NotNoise,

@@ -8,7 +8,10 @@ use crate::report::sample;
 #[test]
 fn effects_come_first_with_size_and_alternatives() {
     let said = of_diagnosis(&sample::two_tanks());
-    assert_eq!(said[0], "It is overflow (rim = 7.500 ± 0.034 V).");
+    assert_eq!(
+        said[0],
+        "It is overflow in the upper tank (rim = 7.500 ± 0.034 V)."
+    );
     assert!(
         said[1].starts_with(
             "It is pump_deadzone or pump_nonlinearity: these data cannot tell them apart; pump_deadzone (u_dz = 0.550 ± 0.027 V) fits best."

@@ -4,6 +4,7 @@
 use std::{error::Error, fs, path::PathBuf};
 
 use clap::Parser;
+use ctid::sentences::of_diagnosis;
 use ctid_tests::measured::{Case, Mark, Source, cases, claims_feedback, folder};
 use missing_effect::{Diagnosis, Options, Step, TIME_LIMIT, diagnose};
 use serde_json::{Value, json};
@@ -72,10 +73,9 @@ fn main() -> Result<(), Box<dyn Error>> {
                 row.slowest = row.slowest.max(found.seconds);
                 println!("{}", line(&case, &found));
                 if arguments.sentences {
-                    found
-                        .sentences
-                        .iter()
-                        .for_each(|said| println!("    {said}"));
+                    for sentence in of_diagnosis(&found) {
+                        println!("    {sentence}");
+                    }
                 }
                 all.push(entry(&case, &found));
             }

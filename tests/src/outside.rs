@@ -3,17 +3,26 @@
 /// At a time \[s\], what the pump is given beside the command \[V\], and what the sensor reads beside the level \[cm\].
 pub type Outside = fn(f64) -> (f64, f64);
 
+/// Structure that a disturbance leaves in the residual.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Structure {
+    /// A drift.
+    Drift,
+    /// An abrupt change, which begins at this time \[s\] where it can be determined.
+    Instant(Option<f64>),
+}
+
 /// Disturbances that no effect of the catalogue describes: a level shift of the sensor, permanent or temporary, a slow change of it, and an
-/// unmeasured flow; and their names in a sentence.
-pub const OUTSIDE: [(&str, Outside); 6] = [
-    ("drifts", |t| (0.0, 0.5 * (0.00209 * t).sin())),
-    ("abrupt change, from 1002", |t| {
+/// unmeasured flow; and the structure that each leaves in the residual.
+pub const OUTSIDE: [(Structure, Outside); 6] = [
+    (Structure::Drift, |t| (0.0, 0.5 * (0.00209 * t).sin())),
+    (Structure::Instant(Some(1002.0)), |t| {
         (0.0, if t > 1000.0 { 3.0 } else { 0.0 })
     }),
-    ("abrupt change, from 1002", |t| {
+    (Structure::Instant(Some(1002.0)), |t| {
         (0.0, if t > 1000.0 { 0.3 } else { 0.0 })
     }),
-    ("abrupt change", |t| {
+    (Structure::Instant(None), |t| {
         (
             if (900.0..1100.0).contains(&t) {
                 0.5
@@ -23,7 +32,7 @@ pub const OUTSIDE: [(&str, Outside); 6] = [
             0.0,
         )
     }),
-    ("abrupt change, from 1000", |t| {
+    (Structure::Instant(Some(1000.0)), |t| {
         (
             0.0,
             if (1000.0..1100.0).contains(&t) {
@@ -33,7 +42,7 @@ pub const OUTSIDE: [(&str, Outside); 6] = [
             },
         )
     }),
-    ("abrupt change, from 600", |t| {
+    (Structure::Instant(Some(600.0)), |t| {
         (
             0.0,
             if (600.0..700.0).contains(&t) {

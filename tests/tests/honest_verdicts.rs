@@ -4,9 +4,9 @@
 use ct_signals::noise;
 use ctid_tests::{
     Drive, Rig,
-    outside::{BY_CLOCK, OUTSIDE, Outside},
+    outside::{BY_CLOCK, OUTSIDE, Outside, Structure},
 };
-use missing_effect::{Diagnosis, Options, Problem, Verdict, compare, diagnose};
+use missing_effect::{Diagnosis, NotNoise, Options, Problem, Remark, Verdict, compare, diagnose};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -57,22 +57,17 @@ fn what_is_outside_the_catalogue_is_not_called_noise() {
         let problem = problem(&rig, 1);
         let compared = compare(&problem, &Options::default()).unwrap();
         let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
-        assert_eq!(
-            compared.verdict,
-            Verdict::Unexplained,
-            "{:?}",
-            compared.sentences
-        );
+        assert_eq!(compared.verdict, Verdict::Unexplained, "{says:?}");
         assert!(
             compared.effects.is_empty(),
-            "{says}: {:?}",
+            "{says:?}: {:?}",
             compared.effects
         );
         // An effect may resemble the larger part of a disturbance; it is never accepted as the whole explanation.
         assert!(
             matches!(found.verdict, Verdict::Unexplained | Verdict::Partial),
-            "{:?}",
-            found.sentences
+            "{says:?}: {:?}",
+            found.verdict
         );
         for found in [compared, found] {
             assert!(found.residual_unexplained);
@@ -81,15 +76,18 @@ fn what_is_outside_the_catalogue_is_not_called_noise() {
                 assert!(acceptance.share.unwrap() < acceptance.required);
                 continue;
             }
-            assert!(
-                found.sentences[0].contains(says),
-                "{says}: {:?}",
-                found.sentences
-            );
+            let as_expected = match (&found.not_noise, says) {
+                (Some(NotNoise::Slow { .. }), Structure::Drift) => true,
+                (Some(NotNoise::Instant { from, .. }), Structure::Instant(begin)) => {
+                    begin.is_none_or(|begin| (from - begin).abs() < 1.0)
+                }
+                _ => false,
+            };
+            assert!(as_expected, "{says:?}: {:?}", found.not_noise);
             // The part that cannot be predicted is slightly more than the instrument's noise.
             assert!(
                 found.noise_floor < 2.5 * rig.noise,
-                "{says}: {}",
+                "{says:?}: {}",
                 found.noise_floor
             );
         }
@@ -111,29 +109,27 @@ fn what_follows_the_clock_is_named_where_it_leaves_noise() {
 #[ignore = "takes minutes"]
 fn what_is_outside_the_catalogue_is_not_named_as_an_effect() {
     let mut named = Vec::new();
-    let described = BY_CLOCK
-        .into_iter()
-        .map(|(effect, o)| (effect, o, Some(effect)));
-    let outside = OUTSIDE.into_iter().map(|(says, o)| (says, o, None));
-    for (kind, (says, outside, effect)) in outside.chain(described).enumerate() {
+    let described = BY_CLOCK.into_iter().map(|(effect, o)| (o, Some(effect)));
+    let outside = OUTSIDE.into_iter().map(|(_, o)| (o, None));
+    for (kind, (outside, effect)) in outside.chain(described).enumerate() {
         let mut verdicts = std::collections::BTreeMap::new();
         for seed in 11..=30 {
             let found = diagnosed(&disturbed(outside), seed, &Options::default());
-            for remark in found
-                .sentences
-                .iter()
-                .filter(|said| said.contains("the effect is not accepted"))
-            {
-                let (rmse, floor) = (found.steps[0].rmse, found.noise_floor);
-                println!("{kind} seed {seed}: {rmse:.3} cm, floor {floor:.3} cm: {remark}");
+            for remark in &found.remarks {
+                if let Remark::BestPart { effects, .. } = remark {
+                    let (rmse, floor) = (found.steps[0].rmse, found.noise_floor);
+                    println!(
+                        "{kind} seed {seed}: {rmse:.3} cm, floor {floor:.3} cm, not accepted: {effects:?}"
+                    );
+                }
             }
             *verdicts.entry(format!("{:?}", found.verdict)).or_insert(0) += 1;
             if found.effects.iter().any(|id| Some(id.as_str()) != effect) {
-                println!("{kind} seed {seed}: {:?}", found.sentences);
+                println!("{kind} seed {seed}: {:?}", found.groups);
                 named.push((kind, seed, found.effects));
             }
         }
-        println!("{kind} ({says}): {verdicts:?}");
+        println!("{kind} ({effect:?}): {verdicts:?}");
     }
     // 2 of 120 at the time of writing.
     assert!(named.len() <= 120 / 20, "{named:?}");
@@ -161,11 +157,11 @@ fn an_effect_that_explains_a_small_part_is_a_remark() {
     double.records[1].name = "disturbed.csv".to_string();
     for problem in [single, double] {
         let found = diagnose(&problem, &Options::default(), &|_| {}).unwrap();
-        let said = found.sentences.join(" ");
-        assert_eq!(found.verdict, Verdict::Unexplained, "{said}");
+        assert_eq!(found.verdict, Verdict::Unexplained);
         assert!(found.effects.is_empty() && found.steps.len() == 1);
         if problem.records.len() > 1 {
-            assert!(said.contains("(in disturbed.csv)"), "{said}");
+            let left = found.not_noise.as_ref().unwrap();
+            assert_eq!(left.record(), Some("disturbed.csv"), "{left:?}");
             let windows = &found.steps[0].outputs[0].failures.by_time;
             assert!(windows.iter().any(|bin| bin.fails));
             assert!(
@@ -193,15 +189,12 @@ fn an_effect_that_explains_nearly_all_is_named() {
     };
     for rig in [beside_a_jump, in_a_wander] {
         let found = diagnosed(&rig, 1, &Options::default());
-        let said = found.sentences.join(" ");
         assert!(
             found.effects.contains(&"pump_saturation".to_string()),
-            "{said}"
+            "{:?}",
+            found.effects
         );
-        assert!(
-            found.residual_unexplained && said.contains("Something remains"),
-            "{said}"
-        );
+        assert!(found.residual_unexplained && found.not_noise.is_some());
     }
 }
 
@@ -240,7 +233,7 @@ fn a_comparison_knows_the_noise_of_a_white_record() {
                 let failing: Vec<usize> = (0..12)
                     .filter(|k| found.steps[0].outputs[0].failures.by_time[*k].fails)
                     .collect();
-                assert_eq!(failing, [6], "{:?}", found.sentences);
+                assert_eq!(failing, [6], "{:?}", found.verdict);
             }
         }
     }
@@ -258,7 +251,7 @@ fn coloured_noise_is_no_failure() {
                 ..Rig::single_tank()
             };
             let found = compare(&problem(&rig, seed), &Options::default()).unwrap();
-            assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.sentences);
+            assert_eq!(found.verdict, Verdict::Adequate, "{:?}", found.not_noise);
             records += 1;
             let sentences = &found.steps[0].outputs[0].failures.sentences;
             if !sentences[0].starts_with("no region stands out") {
@@ -289,15 +282,13 @@ fn a_search_that_is_stopped_says_so() {
         found.verdict,
         Verdict::Effect | Verdict::Undecided
     ));
-    let said = found.sentences.join(" ");
-    assert!(
-        said.contains("stopped at 1 effect: the data call for 2"),
-        "{said}"
-    );
+    let limit = Remark::EffectLimit { most: 1, needed: 2 };
+    assert!(found.remarks.contains(&limit), "{:?}", found.remarks);
     assert!((found.noise_floor - rig.noise).abs() < 0.1 * rig.noise);
     let found = diagnosed(&rig, 3, &Options::default());
     assert_eq!(found.effects.len(), 2);
-    assert!(!found.sentences.join(" ").contains("stopped"));
+    let limited = |remark: &Remark| matches!(remark, Remark::EffectLimit { .. });
+    assert!(!found.remarks.iter().any(limited), "{:?}", found.remarks);
 }
 
 /// The believed model makes of an unmeasured level what fits without the rim: the rim may be far below all of it.

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use ctid::output::Written;
 use ctid_tests::{Drive, Rig};
 use missing_effect::{
     Acceptance, Diagnosis, Effort, HeldOutError, Options, PerOutput, PlaceScore, Primitive,
@@ -57,7 +58,7 @@ fn found(problem: &Problem, threads: usize) -> Diagnosis {
 
 /// What `--json` writes.
 fn json(found: &Diagnosis) -> Value {
-    serde_json::to_value(found).unwrap()
+    serde_json::to_value(Written::of(found)).unwrap()
 }
 
 #[test]

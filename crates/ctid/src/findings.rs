@@ -7,6 +7,7 @@ use plants::Domain;
 
 use crate::effort::{EffortLevel, limit_text};
 use crate::numbers;
+use crate::sentences::with_unit;
 
 /// Number of effects of each ranking that are shown if two rankings differ.
 const COMPARED: usize = 5;
@@ -371,10 +372,6 @@ pub(crate) fn effort(effort: &Effort, reader: Reader) -> Vec<String> {
     };
     said.push(more);
     said
-}
-
-fn with_unit(number: &str, unit: &str) -> String {
-    format!("{number} {unit}").trim_end().to_string()
 }
 
 #[cfg(test)]

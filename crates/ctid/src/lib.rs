@@ -14,6 +14,7 @@
 //! | linear models from a record, as text | [`mod@identify`] |
 //! | the page | [`mod@serve`] |
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |
+//! | findings in sentences | [`sentences`] |
 //! | what is written, and what is not overwritten | [`output`] |
 //!
 //! The algorithms are in the crates below, the search in `missing-effect`, linear models in `linear-identification`, the papers' tables in
@@ -42,6 +43,7 @@ mod plot;
 mod program;
 pub mod progress;
 pub mod report;
+pub mod sentences;
 pub mod serve;
 mod signature;
 pub mod simulate;

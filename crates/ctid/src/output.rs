@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use missing_effect::Diagnosis;
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, atomic, report, term_file};
+use crate::{Error, atomic, report, sentences, term_file};
 use linear_identification::{Identification, side_by_side::SideBySide};
 
 /// Number of bytes of an existing page that are searched for the mark.
@@ -21,7 +21,26 @@ const WRITTEN_BY: &str = "ctid";
 struct Marked<'a, T> {
     written_by: &'static str,
     #[serde(flatten)]
+    found: Written<'a, T>,
+}
+
+/// A result with its findings in sentences, as both are written.
+#[derive(Debug, Serialize)]
+pub struct Written<'a, T> {
+    #[serde(flatten)]
     found: &'a T,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sentences: Option<Vec<String>>,
+}
+
+impl<'a, T: Found> Written<'a, T> {
+    /// A result with its findings.
+    pub fn of(found: &'a T) -> Self {
+        Self {
+            found,
+            sentences: found.sentences(),
+        }
+    }
 }
 
 /// Mark that identifies JSON files of ctid.
@@ -54,6 +73,11 @@ pub trait Found: Serialize {
         String::new()
     }
 
+    /// The findings in sentences, if they are written beside the values.
+    fn sentences(&self) -> Option<Vec<String>> {
+        None
+    }
+
     /// The record as CSV, if there is one.
     fn record(&self) -> Option<String> {
         None
@@ -74,6 +98,11 @@ impl Found for Diagnosis {
     fn page(&self) -> String {
         report::html(self)
     }
+
+    fn sentences(&self) -> Option<Vec<String>> {
+        Some(sentences::of_diagnosis(self))
+    }
+
     fn unknown(&self) -> Option<String> {
         self.unknown.as_ref().map(term_file::text)
     }
@@ -154,7 +183,7 @@ impl Output {
             Kind::Json => {
                 let marked = Marked {
                     written_by: WRITTEN_BY,
-                    found,
+                    found: Written::of(found),
                 };
                 let text = serde_json::to_string_pretty(&marked)
                     .map_err(|error| Error::file(&self.path, error.to_string()))?;

@@ -118,7 +118,6 @@ pub struct Diagnosis {
     /// The share of the squared error above the noise that the effects explain; `None` without effects.
     pub share: Option<f64>,
     /// Structure in the residual of the last model that is not noise.
-    #[serde(rename = "left")]
     pub not_noise: Option<NotNoise>,
     /// The unexplained error of the last model; `None` if its residual is noise.
     pub unknown: Option<Unknown>,

@@ -5,7 +5,7 @@ use std::time::Instant;
 use greybox::{Fit, coloured};
 
 use crate::{
-    ControlLoop, Diagnosis, Error, Options, Problem, Verdict,
+    ControlLoop, Diagnosis, Error, NotNoise, Options, Problem, Verdict,
     base::{
         believed::base,
         gaps::Mended,
@@ -13,7 +13,8 @@ use crate::{
     },
     diagnostics::{
         assemble::{assemble, floors},
-        residual_tests::{NotNoise, not_noise},
+        remarks::of_terms,
+        residual_tests::not_noise,
         step,
     },
     fit::{
@@ -23,7 +24,6 @@ use crate::{
         proposal::singles,
     },
     result::Floors,
-    sentences,
 };
 
 /// Share of a diagnosis' time limit for a comparison, and the shares of this after which its phases end: further starts, single effects.
@@ -43,7 +43,6 @@ pub fn compare(problem: &Problem, options: &Options) -> Result<Diagnosis, Error>
         Some(mended) => {
             let mut diagnosis = compare_whole(&mended.problem, options)?;
             mended.report(&mut diagnosis);
-            diagnosis.sentences.extend(sentences::of_gaps(&mended.gaps));
             diagnosis
         }
     };
@@ -135,12 +134,9 @@ fn compare_whole(problem: &Problem, options: &Options) -> Result<Diagnosis, Erro
     let step = step::report(&shown, own.bic(), &floor.noise()?, &problem.test, widen)?;
     let mut diagnosis = assemble(problem, verdict, vec![step], floor);
     diagnosis.residual_unexplained = lacking;
-    diagnosis.sentences = sentences::of_comparison(&diagnosis, left);
-    let held_out = sentences::of_held_out(&diagnosis);
-    let minimum = sentences::of_a_minimum(&diagnosis);
-    let more = [held_out, minimum, sentences::of_terms(problem)];
-    diagnosis.sentences.extend(more.into_iter().flatten());
-    diagnosis.speak_of_the_loop(control_loop);
+    diagnosis.not_noise = left;
+    diagnosis.remarks = of_terms(problem).into_iter().collect();
+    diagnosis.control_loop = control_loop;
     diagnosis.effort = effort(&shown, &of_one_model(options));
     Ok(diagnosis)
 }

@@ -7,7 +7,8 @@ use greybox::Noise;
 use plants::Placed;
 
 use crate::{
-    Acceptance, ControlLoop, Diagnosis, Error, Options, PerOutput, Problem, Progress, Verdict,
+    Acceptance, ControlLoop, Diagnosis, Error, Options, PerOutput, Problem, Progress, Remark,
+    Verdict,
     accept::{
         acceptance::{AcceptanceTest, Course, Grade, PART, WHOLE},
         ambiguity::remove_ambiguous,
@@ -23,6 +24,7 @@ use crate::{
     diagnostics::{
         assemble::{assemble, floors},
         held_out::share_on_held_out,
+        remarks::of_terms,
         residual_tests::not_noise,
         unknown::{self, unknown},
     },
@@ -32,7 +34,6 @@ use crate::{
         rankings::{ranked, rankings},
         scores::{loss_by_coloured_noise, scores},
     },
-    sentences,
 };
 
 /// Shares of the time limit after which the phases end: further starts of the believed model, the search of sets, all later steps except
@@ -42,6 +43,9 @@ const SEARCHED: f64 = 0.65;
 const CONFIRMED: f64 = 0.82;
 const REPORTED: f64 = 0.88;
 const SHAPED: f64 = 0.95;
+
+/// A loss of detectability by coloured noise is reported from this ratio of sizes on.
+const CLEAR_LOSS: f64 = 1.2;
 
 /// Searches the catalogue for what the believed model is missing.
 ///
@@ -59,7 +63,6 @@ pub fn diagnose(
         Some(mended) => {
             let mut diagnosis = diagnose_whole(&mended.problem, options, progress)?;
             mended.report(&mut diagnosis);
-            diagnosis.sentences.extend(sentences::of_gaps(&mended.gaps));
             diagnosis
         }
     };
@@ -113,7 +116,7 @@ fn diagnose_whole(
         in_loop: widen,
         by_simulation: found.by_simulation,
         stopped,
-        shifted,
+        shifted: shifted.as_ref(),
         singles: &single,
         searched: &searched,
     };
@@ -128,7 +131,10 @@ fn diagnose_whole(
     );
     let accepted = accepted?;
     let (mut course, mut groups) = (accepted.course, accepted.groups);
-    let mut remark = sentences::of_courses(&accepted.dropped);
+    // Why better effects are not among the accepted ones.
+    let mut refused = (!accepted.dropped.is_empty()).then(|| Remark::ReplacedByTime {
+        effects: ids(&accepted.dropped),
+    });
     let mut acceptance = Acceptance {
         effects: ids(&course.last().added),
         share: (!course.last().added.is_empty()).then_some(accepted.share),
@@ -166,11 +172,15 @@ fn diagnose_whole(
                 };
                 course = test.course(&tested.node)?;
                 groups = test.groups(course.last())?;
-                remark = None;
+                refused = None;
                 partial = true;
             }
             None if accepted.grade != Grade::Whole => {
-                remark = Some(sentences::of_a_part(course.last()));
+                let last = course.last();
+                refused = Some(Remark::BestPart {
+                    effects: ids(&last.added),
+                    rmse_per_output: PerOutput::of(&last.setup.records[0].outputs, &last.fit.rmse),
+                });
                 course = Course {
                     left: not_noise(&base, &unambiguous.own_base)?,
                     own: unambiguous.own_base,
@@ -190,15 +200,16 @@ fn diagnose_whole(
             "the residual of the richest model that was tried"
         },
     );
-    let mut rounding = None;
+    let mut remarks = Vec::new();
     if !partial
         && course.last().added.len() < options.max_effects
         && let Some(rounded) = rounded(course.last())?
     {
-        rounding = Some(sentences::of_rounding(
-            &rounded.outputs,
-            &problem.records[0].outputs,
-        ));
+        remarks.extend(rounded.outputs.iter().map(|rounded| Remark::Quantisation {
+            output: problem.records[0].outputs[rounded.output].name.clone(),
+            step: rounded.step,
+            share: rounded.share,
+        }));
         let longer = test.longer(course.nodes.clone(), rounded.node)?;
         // If rounding leaves structure in the residual, the error stays unexplained.
         if longer.left.is_none() || !course.last().added.is_empty() {
@@ -207,7 +218,7 @@ fn diagnose_whole(
             acceptance.effects = ids(&course.last().added);
             (acceptance.share, acceptance.bic_fall) = (None, None);
             acceptance.reasons.clear();
-            remark = remark.filter(|_| course.left.is_some());
+            refused = refused.filter(|_| course.left.is_some());
         }
     }
     if (course.left.is_some() || partial) && !stopped {
@@ -218,11 +229,11 @@ fn diagnose_whole(
     tell("telling apart", 2, 3);
     allow(&base, REPORTED);
     let steps = course.steps(&floor, problem, widen)?;
-    let Course { left, .. } = course;
+    let left = course.left.clone();
     let last = course.last();
-    let verdict = match (last.added.is_empty(), left) {
+    let verdict = match (last.added.is_empty(), &left) {
         (true, Some(_)) => Verdict::Unexplained,
-        (true, None) if remark.is_some() => Verdict::Unexplained,
+        (true, None) if refused.is_some() => Verdict::Unexplained,
         (true, None) => Verdict::Adequate,
         (false, _) if partial => Verdict::Partial,
         (false, _) if groups.iter().any(|group| group.members.len() > 1) => Verdict::Undecided,
@@ -256,18 +267,17 @@ fn diagnose_whole(
         tell("shaping the unknown", 2, 3);
         diagnosis.unknown = unknown(last)?;
     }
-    diagnosis.sentences = sentences::of_diagnosis(&diagnosis, left);
-    let held_out = sentences::of_held_out(&diagnosis);
-    let minimum = sentences::of_a_minimum(&diagnosis);
-    let terms = sentences::of_terms(problem);
-    let stop = stopped.then(|| sentences::of_a_stop(options.max_effects, needed));
-    let colour = loss.and_then(sentences::of_coloured_noise);
-    let disagree = sentences::of_rankings(&diagnosis.rankings);
-    let more = [
-        rounding, remark, held_out, minimum, stop, terms, colour, disagree,
-    ];
-    diagnosis.sentences.extend(more.into_iter().flatten());
-    diagnosis.speak_of_the_loop(control_loop);
+    diagnosis.not_noise = left;
+    remarks.extend(refused);
+    remarks.extend(stopped.then_some(Remark::EffectLimit {
+        most: options.max_effects,
+        needed,
+    }));
+    remarks.extend(of_terms(problem));
+    let loss = loss.filter(|ratio| *ratio >= CLEAR_LOSS);
+    remarks.extend(loss.map(|ratio| Remark::ColouredNoise { ratio }));
+    diagnosis.remarks = remarks;
+    diagnosis.control_loop = control_loop;
     diagnosis.effort = effort(&base, options);
     tell("done", 3, 3);
     Ok(diagnosis)

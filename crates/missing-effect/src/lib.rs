@@ -1,6 +1,6 @@
 #![doc = include_str!("../README.md")]
 
-// Each module uses only earlier ones: error, numbers, result; fit, base, diagnostics, search, accept, sentences; compare, diagnose, fitted,
+// Each module uses only earlier ones: error, numbers, result; fit, base, diagnostics, search, accept; compare, diagnose, fitted,
 // design.
 mod accept;
 mod base;
@@ -14,20 +14,22 @@ mod fitted;
 pub mod numbers;
 mod result;
 mod search;
-mod sentences;
 #[cfg(test)]
 mod simulated;
 
 pub use base::{Options, Problem, ProblemBuilder, Progress, TIME_LIMIT};
 pub use compare::compare;
 pub use diagnose::diagnose;
-pub use diagnostics::locate::{Located, Series, locate};
+pub use diagnostics::{
+    locate::{Located, Series, locate},
+    unknown::SAME_PLACE,
+};
 pub use error::Error;
 pub use fit::criterion::GROUP_MARGIN;
 pub use fitted::{Fitted, fitted};
 pub use result::{
     Acceptance, Bin, ControlLoop, Diagnosis, Effort, Failures, HeldOutError, LONGEST_HOLD,
-    MendedGaps, NoiseFloor, OutputStep, Parameter, PerOutput, PlaceLikelihood, PlaceScore,
-    Primitive, Rankings, ResidualTests, Score, Share, Shown, ShownInput, Step, Unknown, Verdict,
-    Window,
+    MendedGaps, NoiseFloor, NotNoise, NotSimulated, OutputStep, Parameter, PerOutput,
+    PlaceLikelihood, PlaceScore, Primitive, Rankings, Remark, ResidualTests, Score, Share, Shown,
+    ShownInput, Step, Unknown, Verdict, Window,
 };

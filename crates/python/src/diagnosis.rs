@@ -101,9 +101,7 @@ impl Diagnosis {
     /// The finding in sentences.
     #[getter]
     fn sentences(&self) -> Vec<String> {
-        diagnosed_page(&self.model.file, &self.records, &self.found)
-            .diagnosis
-            .sentences
+        diagnosed_page(&self.model.file, &self.records, &self.found).sentences
     }
 
     /// The page of `ctid diagnose --report`.

@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 
 use ct_signals::ReadOptions;
 use ctid::effort::EffortLevel;
-use ctid::own_model::{Comparison, FitLimit, FittedModel, compared_page, diagnose};
+use ctid::own_model::{Comparison, Document, FitLimit, FittedModel, compared_page, diagnose};
 use effect_search::Options;
 use greybox::FitOptions;
 use numpy::{PyArray1, PyArray2};
@@ -29,7 +29,7 @@ pub struct Fit {
     fitted: FittedModel,
     comparison: Comparison,
     /// Data for the program's page, computed on demand.
-    page: OnceLock<missing_effect::Diagnosis>,
+    page: OnceLock<Document>,
 }
 
 /// The fit in its pickled form: its problem and the result.
@@ -77,9 +77,9 @@ impl Fit {
         })
     }
 
-    fn page(&self) -> &missing_effect::Diagnosis {
+    fn page(&self) -> &Document {
         let of = || compared_page(self.fitted.given(), self.fitted.records(), &self.comparison);
-        self.page.get_or_init(|| of().diagnosis)
+        self.page.get_or_init(of)
     }
 
     fn step(&self) -> &effect_search::Step {
@@ -214,7 +214,7 @@ impl Fit {
         Vec<(&'static str, crate::diagnosis::Bin)>,
         Vec<String>,
     )> {
-        let steps = &self.page().steps;
+        let steps = &self.page().diagnosis.steps;
         let outputs = steps.first().map_or(&[][..], |step| &step.outputs);
         let all = outputs.iter().map(|output| {
             let tests = (output.tests.whiteness_p, output.tests.input_p);
@@ -248,7 +248,7 @@ impl Fit {
 
     /// The page of `ctid compare --report`.
     fn html(&self, py: Python<'_>) -> String {
-        py.detach(|| ctid::report::html(self.page()))
+        py.detach(|| self.page().html())
     }
 
     /// The model with its fitted values, as `ctid export --modelica` writes it.

@@ -8,6 +8,7 @@ use ct_signals::{Heading, ReadOptions, Reading};
 use ctid::effort::EffortLevel;
 use ctid::input;
 use ctid::model_file::{self, ModelFile};
+use ctid::output::Written;
 use ctid::simulate::{TimeColumn, of_plant};
 use missing_effect::{Diagnosis as Found, Options, Problem, compare, diagnose};
 use numpy::{PyArray1, PyArray2};
@@ -230,7 +231,7 @@ impl TankFit {
 
     #[getter]
     fn sentences(&self) -> Vec<String> {
-        self.found.sentences.clone()
+        ctid::sentences::of_diagnosis(&self.found)
     }
 
     #[getter]
@@ -240,7 +241,7 @@ impl TankFit {
 
     /// The result as `ctid compare --json` or `ctid diagnose --json` writes it, without its mark.
     fn json(&self) -> PyResult<String> {
-        json(&self.found)
+        json(&Written::of(&self.found))
     }
 
     fn html(&self, py: Python<'_>) -> String {

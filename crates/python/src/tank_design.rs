@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use ctid::effort::EffortLevel;
+use ctid::output::Written;
 use missing_effect::design::{Limits, design};
 use pyo3::prelude::*;
 
@@ -61,5 +62,5 @@ pub fn tank_design(
             error => error.into(),
         })
     })?;
-    crate::diagnosis::json(&found)
+    crate::diagnosis::json(&Written::of(&found))
 }

@@ -21,7 +21,7 @@ use crate::model_file::ModelFile;
 use crate::output::{self, Found, Kind, Output};
 use crate::own_model::{self, AnyModelFile, OwnModelFile, OwnProposal};
 use crate::progress::Bar;
-use crate::{Error, names};
+use crate::{Error, names, sentences};
 
 /// Command line options.
 #[derive(Debug, Args)]
@@ -134,7 +134,17 @@ fn digits(value: f64) -> String {
         .to_string()
 }
 
+impl Found for Design {
+    fn sentences(&self) -> Option<Vec<String>> {
+        Some(sentences::of_design(self))
+    }
+}
+
 impl Found for Proposal {
+    fn sentences(&self) -> Option<Vec<String>> {
+        self.design.sentences()
+    }
+
     fn record(&self) -> Option<String> {
         // An experiment that does not distinguish the two is not worth applying.
         if self.design.twins() {

@@ -5,15 +5,12 @@ use missing_effect::design::{Alternative, Candidate, Design, Power};
 use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};
 use crate::numbers;
+use crate::sentences::{self, with_unit};
 
 /// Number of experiments in the table.
 pub(crate) const SHOWN: usize = 10;
 /// Meaning of the table's columns.
 pub(crate) const NOTE: &str = "(power: the expected rise of the criterion of the wrong model; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; among experiments with ample power the first stays closest to the range of the records)";
-
-fn with_unit(number: &str, unit: &str) -> String {
-    format!("{number} {unit}").trim_end().to_string()
-}
 
 fn named(alternative: &Alternative) -> String {
     match &alternative.place {
@@ -149,7 +146,7 @@ pub(crate) fn power(power: &Power, refitted: bool) -> String {
 fn findings(design: &Design, look: Look) -> String {
     let mut text = format!("{}\n", look.heading("The next experiment"));
     let effort = findings::effort(&design.effort, Reader::Commands);
-    for sentence in design.sentences.iter().chain(&effort) {
+    for sentence in sentences::of_design(design).iter().chain(&effort) {
         text += &look.paragraph("  ", sentence);
     }
     text

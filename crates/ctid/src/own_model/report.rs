@@ -58,8 +58,10 @@ impl<T: Serialize> Found for Paged<'_, T> {
 /// Content of the report.
 #[derive(Debug, Clone)]
 pub struct Document {
-    /// Curves, table and sentences.
+    /// Curves and tables.
     pub diagnosis: Diagnosis,
+    /// The findings in sentences, in the words of the model; empty of a comparison.
+    pub sentences: Vec<String>,
     /// The unexplained error, as a function at a port.
     pub(crate) term: Option<MissingTerm>,
 }
@@ -68,7 +70,7 @@ impl Document {
     /// The report as a complete HTML file.
     #[must_use]
     pub fn html(&self) -> String {
-        report::html_with(&self.diagnosis, self.term.as_ref())
+        report::html_with(&self.diagnosis, &self.sentences, self.term.as_ref())
     }
 }
 
@@ -111,6 +113,7 @@ pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> D
     shown.seconds = found.seconds;
     Document {
         diagnosis: shown,
+        sentences: Vec::new(),
         term: None,
     }
 }
@@ -146,11 +149,11 @@ pub fn diagnosed(
         }
     });
     shown.scores = singles.collect();
-    shown.sentences = sentences(found, &words);
     shown.seconds = found.seconds;
     let unknown = found.unknown.as_ref();
     Document {
         diagnosis: shown,
+        sentences: sentences(found, &words),
         term: unknown.map(|unknown| missing_term(&words, unknown)),
     }
 }
@@ -245,6 +248,7 @@ fn document(
         places: Vec::new(),
         acceptance: None,
         residual_unexplained: false,
+        not_noise: None,
         ranked: Vec::new(),
         steps,
         noise_floor: only(&floors),
@@ -254,7 +258,7 @@ fn document(
         scores: Vec::new(),
         unknown: None,
         control_loop: None,
-        sentences: Vec::new(),
+        remarks: Vec::new(),
         plant: spec.name.clone(),
         known_effects: file.effects.on.clone(),
         input_unit: spec

@@ -37,6 +37,7 @@ pub use self::side_by_side::html as side_by_side;
 use self::text::{escape, significant};
 pub use self::udink::html as udink;
 use crate::findings::{self, Reader};
+use crate::sentences;
 
 /// Script that draws a diagnosis, in the report and on the served page.
 pub(crate) const DIAGNOSIS_FIGURES: &str = include_str!("diagnosis_figures.js");
@@ -47,15 +48,19 @@ const SCRIPT: &str = concat!(
 
 /// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and no scores; empty parts are omitted.
 pub fn html(diagnosis: &Diagnosis) -> String {
-    html_with(diagnosis, None)
+    html_with(diagnosis, &sentences::of_diagnosis(diagnosis), None)
 }
 
-/// The report of a user's own model, with its unexplained error.
-pub(crate) fn html_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> String {
+/// The report of a diagnosis with other sentences, and with the unexplained error of a user's own model.
+pub(crate) fn html_with(
+    diagnosis: &Diagnosis,
+    sentences: &[String],
+    term: Option<&MissingTerm>,
+) -> String {
     let title = format!("ctid: {}", escape(&diagnosis.plant));
     let data = data::json_with(diagnosis, term);
     let body: String = [
-        headline(diagnosis),
+        headline(diagnosis, sentences),
         shown(diagnosis),
         "<main>".to_owned(),
         fit(diagnosis),
@@ -78,10 +83,9 @@ pub(crate) fn html_with(diagnosis: &Diagnosis, term: Option<&MissingTerm>) -> St
 }
 
 /// The verdict, the fall of the error in large numbers, and the analysed data.
-fn headline(diagnosis: &Diagnosis) -> String {
+fn headline(diagnosis: &Diagnosis, sentences: &[String]) -> String {
     let effort = findings::effort(&diagnosis.effort, Reader::Commands);
-    let sentences: String = diagnosis
-        .sentences
+    let sentences: String = sentences
         .iter()
         .chain(&effort)
         .map(|sentence| format!("<p>{}</p>\n", text::prose(sentence)))

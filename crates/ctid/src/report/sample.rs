@@ -292,6 +292,7 @@ fn diagnosis(outputs: &[&str]) -> Diagnosis {
         rankings: Rankings::default(),
         effort: Effort::default(),
         residual_unexplained: false,
+        not_noise: None,
         ranked: [
             "overflow",
             "sensor_saturation",
@@ -347,12 +348,7 @@ fn diagnosis(outputs: &[&str]) -> Diagnosis {
         ],
         unknown: None,
         control_loop: None,
-        sentences: vec![
-            "The model lacks an overflow of the upper tank: its rim is at 7.50 ± 0.03 V.".into(),
-            "It also lacks pump_deadzone or pump_nonlinearity; these data cannot tell them apart. \
-             A slow ramp of the pump from 0 to 2 V would."
-                .into(),
-        ],
+        remarks: Vec::new(),
         plant: "cascaded-tanks".into(),
         known_effects: vec!["sqrt_outflow".into()],
         input_unit: "V".into(),

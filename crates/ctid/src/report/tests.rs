@@ -1,3 +1,5 @@
+use missing_effect::Remark;
+
 use super::*;
 
 /// Addresses that a browser would load: `src`, `href`, `url(` and the like that point outside the file.
@@ -53,8 +55,8 @@ fn every_step_and_every_record_is_there() {
     for score in &diagnosis.scores {
         assert!(page.contains(&text::code(&score.effect)));
     }
-    for sentence in &diagnosis.sentences {
-        assert!(page.contains(&escape(sentence)));
+    for sentence in sentences::of_diagnosis(&diagnosis) {
+        assert!(page.contains(&text::prose(&sentence)));
     }
     assert!(page.contains("cannot tell it from <code>pump_<wbr>nonlinearity</code>"));
     assert!(page.contains("<td class=\"number\" data-step=\"2\">0.550 ± 0.027</td>"));
@@ -178,7 +180,9 @@ fn names_are_escaped_wherever_they_stand() {
     diagnosis.plant = hostile.to_owned();
     diagnosis.output_unit = hostile.to_owned();
     diagnosis.input_unit = hostile.to_owned();
-    diagnosis.sentences.push(hostile.to_owned());
+    diagnosis.remarks.push(Remark::Terms {
+        names: vec![hostile.to_owned()],
+    });
     diagnosis.noise[0].source = hostile.to_owned();
     diagnosis.known_effects.push(hostile.to_owned());
     diagnosis.effects[0] = hostile.to_owned();
@@ -305,7 +309,6 @@ fn an_empty_diagnosis_is_still_a_page() {
     let mut diagnosis = sample::comparison();
     diagnosis.steps.clear();
     diagnosis.records.clear();
-    diagnosis.sentences.clear();
     diagnosis.noise[0].level = f64::NAN;
     let page = html(&diagnosis);
     assert!(page.ends_with("</html>\n"));

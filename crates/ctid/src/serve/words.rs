@@ -9,6 +9,7 @@ use super::session::{Found, Session};
 use crate::findings::{self, Reader};
 use crate::model_file::ModelFile;
 use crate::report;
+use crate::sentences::{self, with_unit};
 
 /// Number of experiments in the design's table.
 const EXPERIMENTS: usize = 8;
@@ -18,7 +19,7 @@ pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
     let drawing = RawValue::from_string(report::drawing(diagnosis)).ok();
     let step = diagnosis.steps.last();
     #[derive(serde::Serialize)]
-    struct Body<'a> {
+    struct Body {
         id: u64,
         drawing: Option<Box<RawValue>>,
         parameters: Vec<Value>,
@@ -26,12 +27,12 @@ pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
         starts_agree: usize,
         /// Parts of the error on held-out data.
         held_out_error: Option<String>,
-        sentences: Vec<&'a str>,
+        sentences: Vec<String>,
         noise: String,
         seconds: f64,
     }
-    let effort = findings::effort(&diagnosis.effort, Reader::Page);
-    let sentences = diagnosis.sentences.iter().chain(&effort);
+    let mut sentences = sentences::of_diagnosis(diagnosis);
+    sentences.extend(findings::effort(&diagnosis.effort, Reader::Page));
     let body = Body {
         id,
         drawing,
@@ -41,7 +42,7 @@ pub(super) fn fitted(id: u64, diagnosis: &Diagnosis) -> String {
         starts: step.map_or(0, |step| step.starts),
         starts_agree: step.map_or(0, |step| step.starts_agree),
         held_out_error: step.and_then(|step| held_out_errors(diagnosis, step)),
-        sentences: sentences.map(String::as_str).collect(),
+        sentences,
         noise: noise(diagnosis),
         seconds: diagnosis.seconds,
     };
@@ -66,10 +67,6 @@ fn errors(diagnosis: &Diagnosis, step: &Step) -> String {
     findings::per_output(&step.rmse_per_output, 3, &diagnosis.output_unit)
 }
 
-fn with_unit(number: &str, unit: &str) -> String {
-    format!("{number} {unit}").trim_end().to_string()
-}
-
 fn parameter(parameter: &Parameter) -> Value {
     let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
     json!({ "name": parameter.name, "value": value, "error": error, "unit": parameter.unit })
@@ -86,6 +83,7 @@ fn size(parameter: &Parameter) -> String {
 pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
     let diagnosis = &found.found;
     let unit = &diagnosis.output_unit;
+    let sentences = sentences::of_diagnosis(diagnosis);
     let ranked = diagnosis
         .scores
         .iter()
@@ -97,7 +95,7 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
             "place": findings::tank(diagnosis, k),
             "size": diagnosis.steps.last().and_then(|step| own_size(step, effect)),
             "rmse": diagnosis.steps.get(k + 1).map(|step| errors(diagnosis, step)),
-            "sentence": diagnosis.sentences.get(k),
+            "sentence": sentences.get(k),
             "in_doubt": diagnosis.in_doubt.get(k),
             "places": diagnosis.places.get(k).filter(|places| places.len() > 1).map(|places| findings::place_scores(diagnosis.domain(), places)),
             "others": group.iter().filter(|other| *other != effect).collect::<Vec<_>>(),
@@ -121,7 +119,7 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
         "tone": tone,
         "groups": groups.collect::<Vec<_>>(),
         // The first sentences belong to the groups.
-        "sentences": diagnosis.sentences.get(diagnosis.groups.len()..).unwrap_or_default(),
+        "sentences": sentences.get(diagnosis.groups.len()..).unwrap_or_default(),
         "before": diagnosis.steps.first().map_or("-".to_owned(), |step| errors(diagnosis, step)),
         "noise": noise(diagnosis),
         "acceptance": acceptance,
@@ -232,7 +230,7 @@ pub(super) fn design(id: u64, design: &Design) -> Value {
             Some(place) => format!("{} ({place})", alternative.effect),
             None => alternative.effect.clone(),
         }),
-        "sentences": design.sentences.iter().cloned().chain(findings::left_out(&design.effort)).collect::<Vec<_>>(),
+        "sentences": sentences::of_design(design).into_iter().chain(findings::left_out(&design.effort)).collect::<Vec<_>>(),
         "rows": candidates.chain(&design.again).map(row).collect::<Vec<_>>(),
         "twins": design.twins(),
         "limits": format!(

@@ -13,6 +13,7 @@ use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot;
+use crate::sentences::{self, with_unit};
 
 /// Number of findings about where a model fails.
 const FAILURES: usize = 5;
@@ -155,10 +156,6 @@ fn placed(effect: &str, place: Option<&str>) -> String {
         Some(place) => format!("{effect} ({place})"),
         None => effect.to_string(),
     }
-}
-
-fn with_unit(number: &str, unit: &str) -> String {
-    format!("{number} {unit}").trim_end().to_string()
 }
 
 /// Sentences about where a model fails, output by output.
@@ -344,8 +341,8 @@ pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
         }
     };
     let mut text = format!("{headline}\n");
-    for sentence in &diagnosis.sentences {
-        text += &look.paragraph("  ", sentence);
+    for sentence in sentences::of_diagnosis(diagnosis) {
+        text += &look.paragraph("  ", &sentence);
     }
     for sentence in findings::effort(&diagnosis.effort, Reader::Commands) {
         text += &look.paragraph("  ", &sentence);

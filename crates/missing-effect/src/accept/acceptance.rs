@@ -6,15 +6,12 @@ use plants::{EffectInfo, Placed};
 use rayon::prelude::*;
 
 use crate::{
-    Error, Problem, Step,
+    Error, NotNoise, Problem, Step,
     accept::{
         groups::{Group, groups},
         ladder::ladder,
     },
-    diagnostics::{
-        residual_tests::{NotNoise, Pattern, not_noise},
-        step,
-    },
+    diagnostics::{residual_tests::not_noise, step},
     fit::{
         node::{FINE, Node, STOPPING, refine, without},
         noise_model::{NOISE_ORDER, longest_memory, residual_colour, slowness},
@@ -59,7 +56,7 @@ pub(crate) struct AcceptanceTest<'s, 'a> {
     /// Whether the set was cut to the permitted number of effects.
     pub stopped: bool,
     /// Structure of the residual after a level shift of the reading, if the structure is a level shift.
-    pub shifted: Option<NotNoise>,
+    pub shifted: Option<&'s NotNoise>,
     /// The single effects, with the weighting of their last refit.
     pub singles: &'s [Node<'a>],
     /// The sets that the search has fitted.
@@ -98,7 +95,8 @@ impl<'a> AcceptanceTest<'_, 'a> {
                 }
             }
             set = confirm(set, self.noise)?;
-            let others = (!set.added.is_empty()).then(|| self.tested(&set, accepted.course.left));
+            let others =
+                (!set.added.is_empty()).then(|| self.tested(&set, accepted.course.left.as_ref()));
             match others.transpose()? {
                 Some(others) if others.grade == Grade::Whole => {
                     let mut dropped = accepted.dropped;
@@ -118,10 +116,10 @@ impl<'a> AcceptanceTest<'_, 'a> {
 
     /// `beside`: structure in the residual of a larger set. A noise model that absorbs this structure, and the part that the larger set
     /// explained, does not make it noise.
-    fn tested(&self, set: &Node<'a>, beside: Option<NotNoise>) -> Result<Accepted<'a>, Error> {
+    fn tested(&self, set: &Node<'a>, beside: Option<&NotNoise>) -> Result<Accepted<'a>, Error> {
         let mut course = self.course(set)?;
-        course.left = course.left.or(beside);
-        let (share, grade) = match course.left {
+        course.left = course.left.or_else(|| beside.cloned());
+        let (share, grade) = match &course.left {
             Some(left) if !self.stopped && !course.last().added.is_empty() => {
                 let share = explained(self.base, course.last(), &left.above(self.noise))?;
                 let grade = match share {
@@ -204,8 +202,8 @@ impl<'a> AcceptanceTest<'_, 'a> {
         let own = coloured(&last.setup, in_noise, NOISE_ORDER, STOPPING)?;
         // A slow drift of the residual is weaker evidence than an abrupt change.
         let left = match not_noise(&last, &own)? {
-            Some(left) if !matches!(left.what, Pattern::Slow(..)) => Some(left),
-            left => self.shifted.or(left),
+            Some(left) if !matches!(left, NotNoise::Slow { .. }) => Some(left),
+            left => self.shifted.cloned().or(left),
         };
         // The last model is shown with the noise weighting, in which its parameters are most accurate. An incomplete model is not: a
         // weighting that treats the missing effect as noise would let its simulation drift.

@@ -10,8 +10,7 @@ use plants::{Fitted, Place, Term, Variable};
 use rayon::prelude::*;
 
 use crate::{
-    Error,
-    diagnostics::residual_tests::{NotNoise, Pattern},
+    Error, NotNoise,
     fit::{
         node::{FINE, Node},
         noise_model::residual_colour,
@@ -39,10 +38,12 @@ pub(crate) struct LevelShift {
 impl LevelShift {
     /// Description of the level shift as unexplained structure of the record.
     pub fn left(self, record: &Record) -> NotNoise {
-        NotNoise {
-            what: Pattern::Instant(record.time[self.before + 1], 0.0),
-            record: Some(0),
-            output: self.output,
+        let at = record.time[self.before + 1];
+        NotNoise::Instant {
+            output: record.outputs[self.output].name.clone(),
+            record: record.name.clone(),
+            from: at,
+            to: at,
         }
     }
 }
@@ -148,10 +149,11 @@ mod tests {
             let (node, _) = base(&problem, &Options::default(), 1.0).unwrap();
             let found = level_shift(&node, &noise).unwrap().unwrap();
             assert!(found.bic < node.fit.bic() - 100.0);
+            let at = BEGIN + INTERVAL * AT as f64;
             let left = found.left(&problem.records[0]);
-            assert_eq!(
-                left.what,
-                Pattern::Instant(BEGIN + INTERVAL * AT as f64, 0.0)
+            assert!(
+                matches!(left, NotNoise::Instant { from, to, .. } if from == at && to == at),
+                "{left:?}"
             );
         }
         // Without a level shift, the best of several instants lowers the criterion by less than the penalty of its two parameters.

@@ -112,10 +112,10 @@ fn rounded_outputs(node: &Node) -> Vec<RoundedOutput> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::{Options, base::believed::base, sentences::of_rounding, simulated};
+    use crate::{Options, base::believed::base, simulated};
 
     #[test]
-    fn every_output_that_is_rounded_is_said() {
+    fn every_rounded_output_is_found() {
         let mut problem = simulated::two_levels(4);
         for (output, step) in problem.records[0].outputs.iter_mut().zip([0.8, 0.3]) {
             for y in &mut output.values {
@@ -135,11 +135,5 @@ mod tests {
             "{steps:?}"
         );
         assert_eq!(found.node.added.last().unwrap().vessel, 1);
-        let said = of_rounding(&found.outputs, &problem.records[0].outputs);
-        assert!(
-            said.contains("of lower are multiples of 0.300 cm")
-                && said.contains("of upper are multiples of 0.800 cm"),
-            "{said}"
-        );
     }
 }

@@ -7,7 +7,7 @@ use greybox::{Replay, Setup, coloured, fit_from};
 use plants::Variable;
 
 use crate::{
-    ControlLoop, Error, Options, Problem,
+    ControlLoop, Error, NotSimulated, Options, Problem,
     base::{control_loop::check_stable, feedback_test},
     fit::{
         node::{Node, STOPPING},
@@ -20,9 +20,6 @@ const FEEDBACK: f64 = 1e-4;
 /// Largest relative difference between the controller's command and the measured one. A controller with a larger difference is not used; a
 /// smaller difference is simulated as a known input of the loop.
 const OTHER_CONTROLLER: f64 = 0.05;
-
-/// Consequence of running a model on the measured command of a loop.
-const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and scores are biased; the standard errors are enlarged for this.";
 
 /// Closes the loop around a fitted model if possible, and describes the loop.
 pub(crate) fn enclose<'a>(
@@ -40,56 +37,52 @@ pub(crate) fn enclose<'a>(
         if timed {
             return Ok((node, None));
         }
-        return Ok(match feedback_p(&node)? {
-            p if p < FEEDBACK => {
-                let said = format!(
-                    "Feedback detected: the command depends on the last {} residuals (F test beside the command's own past, p {}), and no [controller] is in the model file; give it, and the reference, and the loop is simulated. {MEASURED}",
-                    feedback_test::LAGS,
-                    chance(p)
-                );
-                (node, Some(ControlLoop::measured(Some(p), None, said)))
-            }
-            _ => (node, None),
+        let p = feedback_p(&node)?;
+        let lags = feedback_test::LAGS;
+        let detected = (p < FEEDBACK).then(|| ControlLoop {
+            feedback_p: Some(p),
+            ..ControlLoop::measured(NotSimulated::UnknownController { lags })
         });
+        return Ok((node, detected));
     };
     check_stable(&node, controller)?;
     if !options.simulate_loop {
-        return Ok((node, Some(not_simulated("as was asked for", None))));
+        return Ok((node, Some(ControlLoop::measured(NotSimulated::AsRequested))));
     }
     let lacking = problem.records.iter().find(|r| {
         let read = r.outputs.get(controller.output());
         read.is_some_and(|output| output.missing() > 0)
     });
     if let Some(record) = lacking {
-        let why = format!(
-            "readings are missing in {}, so the controller cannot be checked against its commands",
-            record.name
-        );
-        return Ok((node, Some(not_simulated(&why, None))));
+        let record = record.name.clone();
+        let why = NotSimulated::MissingReadings { record };
+        return Ok((node, Some(ControlLoop::measured(why))));
     }
     let (setup, x) = match node.setup.in_loop(controller, &node.fit.x) {
         Ok(closed) => closed,
-        Err(
-            why @ (greybox::Error::NoReference { .. }
-            | greybox::Error::ConstantReference { .. }
-            | greybox::Error::CommandNotHeld { .. }),
-        ) => return Ok((node, Some(not_simulated(&why.to_string(), None)))),
-        Err(error) => return Err(error.into()),
+        Err(error) => {
+            let why = match error {
+                greybox::Error::NoReference { record } => NotSimulated::NoReference { record },
+                greybox::Error::ConstantReference { record, value } => {
+                    NotSimulated::ConstantReference { record, value }
+                }
+                greybox::Error::CommandNotHeld { record } => {
+                    NotSimulated::CommandNotHeld { record }
+                }
+                error => return Err(error.into()),
+            };
+            return Ok((node, Some(ControlLoop::measured(why))));
+        }
     };
-    let (mismatch, part) = disagreement(setup.replays());
-    if part > OTHER_CONTROLLER {
-        let why = format!(
-            "the measured command disagrees with the controller of the model file, R/S (r - y), by {mismatch:.3} {} rms, {:.0} % of what it moves: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
-            problem.records[0].inputs[0].unit,
-            100.0 * part
-        );
-        return Ok((node, Some(not_simulated(&why, Some(mismatch)))));
+    let (mismatch, share) = disagreement(setup.replays());
+    if share > OTHER_CONTROLLER {
+        let other = ControlLoop {
+            mismatch: Some(mismatch),
+            ..ControlLoop::measured(NotSimulated::OtherController { share })
+        };
+        return Ok((node, Some(other)));
     }
     let fit = fit_from(&setup, &[x], &node.fit.noise, STOPPING)?.continuing(&node.fit);
-    let said = format!(
-        "The loop is simulated from its reference: so noise fed back through the command does not enter the model. The measured command agrees with the controller's to {mismatch:.4} {} rms.",
-        problem.records[0].inputs[0].unit
-    );
     let enclosed = Node { setup, fit, ..node };
     Ok((
         enclosed,
@@ -97,22 +90,9 @@ pub(crate) fn enclose<'a>(
             simulated: true,
             feedback_p: None,
             mismatch: Some(mismatch),
-            said: vec![said],
+            not_simulated: None,
         }),
     ))
-}
-
-fn not_simulated(why: &str, mismatch: Option<f64>) -> ControlLoop {
-    let said = format!("The loop is not simulated: {why}. {MEASURED}");
-    ControlLoop::measured(None, mismatch, said)
-}
-
-fn chance(p: f64) -> String {
-    if p < 1e-9 {
-        "< 1e-9".to_string()
-    } else {
-        format!("= {p:.0e}")
-    }
 }
 
 /// Difference between the measured commands and the controller's output, and its ratio to the standard deviation of the command; for the

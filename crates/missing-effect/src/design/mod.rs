@@ -8,7 +8,6 @@ mod experiments;
 mod limits;
 mod plan;
 mod second_sensor;
-mod sentences;
 mod separation;
 mod simulated;
 
@@ -144,7 +143,7 @@ pub fn design(
         (Some(reference), true) => reference,
         _ => &problem.records[0].inputs[0],
     };
-    let mut design = Design {
+    let design = Design {
         schema: 1,
         between: [0, 1].map(|i| alternative(&fitted, i)),
         bic_ahead: search.ahead(),
@@ -171,14 +170,11 @@ pub fn design(
         },
         limits: bounds,
         noise_floor: fitted.metric.noise_floor(),
-        sentences: Vec::new(),
         effort: effort(&fitted.base, options),
         plant: problem.plant.id().to_string(),
         output_unit: problem.records[0].outputs[0].unit.clone(),
-        seconds: 0.0,
+        seconds: begun.elapsed().as_secs_f64(),
     };
-    design.sentences = sentences::of(&design);
-    design.seconds = begun.elapsed().as_secs_f64();
     Ok(design)
 }
 

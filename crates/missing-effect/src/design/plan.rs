@@ -137,8 +137,6 @@ pub struct Design {
     pub experiment: Sequence,
     /// Standard deviation of the noise, in the output's unit.
     pub noise_floor: f64,
-    /// The findings in words.
-    pub sentences: Vec<String>,
     /// Steps that the time limit left out.
     pub effort: Effort,
     /// The plant, as the model file names it.

@@ -40,6 +40,7 @@ pub(crate) fn assemble(
         rankings: Rankings::default(),
         effort: Effort::default(),
         residual_unexplained: false,
+        not_noise: None,
         ranked: Vec::new(),
         steps,
         noise_floor: match &noise[..] {
@@ -50,7 +51,7 @@ pub(crate) fn assemble(
         scores: Vec::new(),
         unknown: None,
         control_loop: None,
-        sentences: Vec::new(),
+        remarks: Vec::new(),
         gaps: None,
         clock: Clock::of(problem.records.iter().chain(&problem.test)),
         plant: problem.plant.id().to_string(),

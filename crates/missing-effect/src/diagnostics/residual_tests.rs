@@ -17,13 +17,13 @@
 //! **References**: L. D. Haugh, J. American Statistical Association 71 (1976) 378-385; S. A. Billings, W. S. F. Voon,
 //! Correlation based model validity tests for non-linear models, Int. J. Control 44 (1986) 235-244.
 
-use ct_signals::{ArModel, Record, residual_tests::prewhitened_input_test};
+use ct_signals::{ArModel, residual_tests::prewhitened_input_test};
 use effect_search::residual::{instant, level_p, of_command, period, standardised};
 use greybox::{Fit, Noise};
 use rayon::prelude::*;
 
 use crate::{
-    Error,
+    Error, NotNoise,
     base::control_loop::slowest_time_constant,
     fit::{node::Node, noise_model::slowness_of},
 };
@@ -31,35 +31,12 @@ use crate::{
 /// Significance level of each residual test, corrected for the number of its comparisons.
 const NOT_NOISE: f64 = 1e-4;
 
-/// Structure of a residual that noise does not explain; the first one found.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Pattern {
-    /// The command.
-    Input,
-    /// A period \[s\].
-    Period(f64),
-    /// An abrupt change from an instant on, for a while \[s\].
-    Instant(f64, f64),
-    /// The level.
-    Level,
-    /// A drift: its correlation time and the process's slowest time constant \[s\].
-    Slow(f64, f64),
-}
-
-/// Structure of a residual that noise does not explain, with its record, if it is in one of the fitted records, and its output.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct NotNoise {
-    pub what: Pattern,
-    pub record: Option<usize>,
-    pub output: usize,
-}
-
 impl NotNoise {
     /// The noise level above which there is something to explain. A drift is noise too, and effects are confirmed with it as weighting;
     /// other unexplained structure is absorbed by the noise model, but hardly enters its innovations. By output.
     pub(crate) fn above(&self, noise: &Noise) -> Vec<f64> {
-        let size = |noise: &ArModel| match self.what {
-            Pattern::Slow(..) => noise.stationary_std(),
+        let size = |noise: &ArModel| match self {
+            Self::Slow { .. } => noise.stationary_std(),
             _ => noise.sigma(),
         };
         noise.iter().map(size).collect()
@@ -68,28 +45,36 @@ impl NotNoise {
 
 /// Structure in the residual of a model that is not noise; `own` is the model's fit with the noise model of its own residual.
 pub(crate) fn not_noise(node: &Node, own: &Fit) -> Result<Option<NotNoise>, Error> {
+    let records = node.setup.records;
     let outputs = node.setup.outputs();
+    let output = |i: usize| records[0].outputs[i % outputs].name.clone();
+    let record = |i: usize| records[i / outputs].name.clone();
     let (p, series) = least_p(node, None, of_command)?;
-    if p < NOT_NOISE {
-        return Ok(Some(NotNoise {
-            what: Pattern::Input,
-            record: series.map(|i| i / outputs),
-            output: series.map_or(0, |i| i % outputs),
+    if let Some(i) = series.filter(|_| p < NOT_NOISE) {
+        return Ok(Some(NotNoise::Input {
+            output: output(i),
+            record: record(i),
         }));
     }
     let residuals = node.setup.disturbance(&own.x)?;
-    let records = node.setup.records;
     let level = NOT_NOISE / residuals.len() as f64;
-    let left = |what: Pattern, i: usize| NotNoise {
-        what,
-        record: Some(i / outputs),
-        output: i % outputs,
-    };
     for (i, residual) in residuals.iter().enumerate() {
-        let record = &records[i / outputs];
-        let found = place_in_time(record, residual, own.noise.of_series(i), level)?;
-        if let Some(what) = found {
-            return Ok(Some(left(what, i)));
+        let time = &records[i / outputs].time;
+        if let Some(cycles) = period(residual, level)? {
+            return Ok(Some(NotNoise::Period {
+                output: output(i),
+                record: record(i),
+                period: records[i / outputs].duration() / cycles as f64,
+            }));
+        }
+        let white = standardised(own.noise.of_series(i), residual);
+        if let Some((from, to)) = instant(&white, level) {
+            return Ok(Some(NotNoise::Instant {
+                output: output(i),
+                record: record(i),
+                from: time[from],
+                to: time[to],
+            }));
         }
     }
     let models = match node.setup.simulate_loop(&own.x)? {
@@ -98,23 +83,26 @@ pub(crate) fn not_noise(node: &Node, own: &Fit) -> Result<Option<NotNoise>, Erro
     };
     for (i, (model, residual)) in models.iter().zip(&residuals).enumerate() {
         if level_p(model, &standardised(own.noise.of_series(i), residual)) < level {
-            return Ok(Some(left(Pattern::Level, i)));
+            return Ok(Some(NotNoise::Level {
+                output: output(i),
+                record: record(i),
+            }));
         }
     }
     if own.noise.order() == 0 {
         return Ok(None);
     }
     let interval = node.setup.structure.scales.sample_interval;
-    let wanders = own.noise.iter().enumerate();
-    let wanders = wanders.map(|(o, noise)| (0.5 * interval * slowness_of(noise), o));
-    let slowest = wanders.max_by(|a, b| a.0.total_cmp(&b.0));
-    let process = slowest_time_constant(node)?;
+    let times = own.noise.iter().enumerate();
+    let times = times.map(|(o, noise)| (0.5 * interval * slowness_of(noise), o));
+    let slowest = times.max_by(|a, b| a.0.total_cmp(&b.0));
+    let time_constant = slowest_time_constant(node)?;
     Ok(slowest
-        .filter(|(wander, _)| *wander > process)
-        .map(|(wander, output)| NotNoise {
-            what: Pattern::Slow(wander, process),
-            record: None,
-            output,
+        .filter(|(time, _)| *time > time_constant)
+        .map(|(correlation_time, o)| NotNoise::Slow {
+            output: output(o),
+            correlation_time,
+            time_constant,
         }))
 }
 
@@ -166,19 +154,4 @@ fn least_p(
         }
     }
     Ok(((least * count).min(1.0), at))
-}
-
-/// A period of a residual, or otherwise an instant.
-fn place_in_time(
-    record: &Record,
-    residual: &[f64],
-    noise: &ArModel,
-    level: f64,
-) -> Result<Option<Pattern>, Error> {
-    if let Some(cycles) = period(residual, level)? {
-        return Ok(Some(Pattern::Period(record.duration() / cycles as f64)));
-    }
-    let found = instant(&standardised(noise, residual), level);
-    Ok(found
-        .map(|(from, to)| Pattern::Instant(record.time[from], record.time[to] - record.time[from])))
 }

@@ -12,18 +12,58 @@ pub struct ControlLoop {
     /// Measured command minus the controller's output for the measured reading, root mean square, in the input's unit; `None` if not
     /// computed.
     pub mismatch: Option<f64>,
-    /// Notes on the loop for the user, in words.
-    pub said: Vec<String>,
+    /// Why the loop was not simulated; `None` if it was.
+    pub not_simulated: Option<NotSimulated>,
+}
+
+/// Reason why a loop is not simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum NotSimulated {
+    /// No controller is known, and the command depends on past residuals.
+    UnknownController {
+        /// Number of past residuals in the feedback test.
+        lags: usize,
+    },
+    /// The options ask for the measured command.
+    AsRequested,
+    /// Readings are missing, so the controller cannot be checked against its commands.
+    MissingReadings {
+        /// The record, by its name.
+        record: String,
+    },
+    /// The record contains no reference.
+    NoReference {
+        /// The record, by its name.
+        record: String,
+    },
+    /// The reference is constant, so only noise excites the loop.
+    ConstantReference {
+        /// The record, by its name.
+        record: String,
+        /// Value of the reference \[output unit\].
+        value: f64,
+    },
+    /// The record says that the command is interpolated, but a controller holds it.
+    CommandNotHeld {
+        /// The record, by its name.
+        record: String,
+    },
+    /// The measured command disagrees with the controller's output by `mismatch`.
+    OtherController {
+        /// `mismatch` over the standard deviation of the command, above 0.05.
+        share: f64,
+    },
 }
 
 impl ControlLoop {
-    /// A loop whose model ran on the measured command, with the consequences.
-    pub(crate) fn measured(feedback_p: Option<f64>, mismatch: Option<f64>, said: String) -> Self {
+    /// A loop whose model ran on the measured command.
+    pub(crate) fn measured(why: NotSimulated) -> Self {
         Self {
             simulated: false,
-            feedback_p,
-            mismatch,
-            said: vec![said],
+            feedback_p: None,
+            mismatch: None,
+            not_simulated: Some(why),
         }
     }
 

@@ -3,10 +3,12 @@
 mod control_loop;
 mod gaps;
 mod noise_floor;
+mod not_noise;
 mod parameter;
 mod per_output;
 mod read;
 mod record;
+mod remark;
 mod scores;
 mod step;
 mod unknown;
@@ -17,12 +19,14 @@ use plants::{Domain, Plant};
 use serde::{Deserialize, Serialize};
 
 pub use self::{
-    control_loop::ControlLoop,
+    control_loop::{ControlLoop, NotSimulated},
     gaps::{LONGEST_HOLD, MendedGaps},
     noise_floor::NoiseFloor,
+    not_noise::NotNoise,
     parameter::Parameter,
     per_output::PerOutput,
     record::{Shown, ShownInput},
+    remark::Remark,
     scores::{Acceptance, PlaceScore, Rankings, Score},
     step::{Bin, Failures, HeldOutError, OutputStep, ResidualTests, Step},
     unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window},
@@ -74,6 +78,8 @@ pub struct Diagnosis {
     pub acceptance: Option<Acceptance>,
     /// The residual of the last model is more than noise: an effect is missing, or a disturbance acts.
     pub residual_unexplained: bool,
+    /// The property of the last model's residual that noise does not have; `None` if no test of the residual found one.
+    pub not_noise: Option<NotNoise>,
     /// The single effects, best first, at the first step; `none` first when the model is adequate.
     pub ranked: Vec<String>,
     /// The base model and every model after it.
@@ -97,8 +103,9 @@ pub struct Diagnosis {
     pub unknown: Option<Unknown>,
     /// The control loop of the records, if there is one.
     pub control_loop: Option<ControlLoop>,
-    /// The findings in words.
-    pub sentences: Vec<String>,
+    /// What else has to be known: each remark that does not follow from the other fields.
+    #[serde(default)]
+    pub remarks: Vec<Remark>,
     /// The plant, as the model file names it.
     pub plant: String,
     /// The effects and the terms that the model file already had.
@@ -133,12 +140,11 @@ impl Diagnosis {
         self.output_units.get(output).unwrap_or(&self.output_unit)
     }
 
-    /// Adds the description of the loop, and remarks on it.
-    pub(crate) fn speak_of_the_loop(&mut self, known: Option<ControlLoop>) {
-        if let Some(known) = &known {
-            self.sentences.extend_from_slice(&known.said);
-        }
-        self.control_loop = known;
+    /// Whether the catalogue was searched: true of a diagnosis, false of a comparison.
+    #[must_use]
+    pub fn searched(&self) -> bool {
+        // An adequate diagnosis ranks at least `none`; any other has an acceptance test.
+        self.acceptance.is_some() || !self.ranked.is_empty()
     }
 }
 

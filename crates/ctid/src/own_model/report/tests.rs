@@ -47,6 +47,7 @@ fn what_nothing_explains_is_shown_with_its_port_and_units() {
     assert_eq!(of_parameter.unit, "");
     let document = Document {
         diagnosis: crate::report::sample::two_tanks(),
+        sentences: Vec::new(),
         term: Some(term),
     };
     let html = document.html();

@@ -33,7 +33,6 @@ pub(crate) fn comparison_of(mut diagnosis: Diagnosis) -> Diagnosis {
             output.rmse_test = None;
         }
     }
-    diagnosis.sentences = vec!["The model errs by 7 times the noise floor.".into()];
     diagnosis
 }
 
@@ -93,10 +92,6 @@ pub(crate) fn partial_of(mut diagnosis: Diagnosis) -> Diagnosis {
             shape: 0.64 * rmse,
         });
     }
-    diagnosis.sentences = vec![
-        "The model lacks an overflow of the upper tank: its rim is at 7.50 ± 0.03 V.".into(),
-        "Something remains that no effect of the catalogue explains.".into(),
-    ];
     diagnosis
 }
 

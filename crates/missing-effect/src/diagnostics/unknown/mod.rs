@@ -26,8 +26,8 @@ use crate::{Error, PlaceLikelihood, Share, Unknown, Window, fit::node::Node};
 const BAND: f64 = 1.96;
 /// A path is shown if its log-likelihood exceeds that of a constant by this.
 const MOVES: f64 = 5.0;
-/// Places with log-likelihoods within this distance of the best are not distinguished.
-pub(crate) const SAME_PLACE: f64 = 10.0;
+/// Places of the missing term with restricted log-likelihoods within this distance of the best are not distinguished.
+pub const SAME_PLACE: f64 = 10.0;
 /// A variable is named if it predicts clearly more than this share of the missing term on unseen data: a function of this variable alone is
 /// predicted nearly in full, and in a record with few values of the command each value belongs to a certain time ...
 const NAMED: f64 = 0.8;

@@ -1,13 +1,14 @@
 //! The unexplained error, if no effect of the catalogue explains it.
 
 use ct_signals::Clock;
+use missing_effect::{SAME_PLACE, Unknown};
 use plants::Domain;
 
 use super::list;
-use crate::{Unknown, diagnostics::unknown::SAME_PLACE, numbers::significant};
+use crate::numbers::significant;
 
 /// Place, variable and shape of the unexplained error.
-pub(crate) fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> String {
+pub(super) fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> String {
     let place = |name: &str| match name {
         "actuator" => "at the actuator".to_string(),
         "sensor" => "at the sensor".to_string(),

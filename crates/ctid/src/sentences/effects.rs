@@ -1,12 +1,12 @@
 //! The accepted effects: group, place, size, acceptance.
 
+use missing_effect::{Acceptance, Diagnosis, Step, Verdict};
 use plants::{Domain, EffectInfo};
 
 use super::{list, with_error};
-use crate::{Acceptance, Diagnosis, Step, Verdict};
 
 /// Description of an effect outside hydraulics; `None` in hydraulics, where the name is sufficient, and for a user's own term.
-pub(super) fn in_general(effect: &str, domain: Domain) -> Option<&'static str> {
+fn in_general(effect: &str, domain: Domain) -> Option<&'static str> {
     let effect = EffectInfo::find(effect).filter(|_| domain == Domain::General)?;
     effect.general
 }
@@ -66,10 +66,10 @@ pub(super) fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
 }
 
 /// Another place is reported as possible from this relative likelihood on.
-pub(super) const SAME_PLACE_LIKELIHOOD: f64 = 0.05;
+const SAME_PLACE_LIKELIHOOD: f64 = 0.05;
 
 /// The parameters of an effect with their standard errors, in brackets.
-pub(super) fn size_of(effect: &str, step: &Step) -> String {
+fn size_of(effect: &str, step: &Step) -> String {
     let prefix = format!("{effect}.");
     let sizes: Vec<String> = step
         .parameters
@@ -102,7 +102,7 @@ pub(super) fn of_acceptance(acceptance: &Acceptance) -> Option<String> {
 }
 
 /// The command that designs an experiment to distinguish the first two effects of a group.
-pub(super) fn next_experiment(group: &[String], added: usize) -> String {
+fn next_experiment(group: &[String], added: usize) -> String {
     let [a, b, ..] = group else {
         return String::new();
     };

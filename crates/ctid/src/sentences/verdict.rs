@@ -1,26 +1,20 @@
 //! The verdict of a comparison and of a diagnosis, and the errors that it is based on.
 
-use super::{
-    effects::{of_acceptance, of_effects},
-    list,
-    residual::left_over,
-    rms,
-    unknown::of_unknown,
-    with_unit,
-};
-use crate::{
-    Diagnosis, PerOutput, Step, Verdict,
-    diagnostics::residual_tests::{NotNoise, Pattern},
-    numbers::significant,
-};
+use missing_effect::{Diagnosis, NotNoise, PerOutput, Step, Verdict};
+
+use super::effects::{of_acceptance, of_effects};
+use super::residual::left_over;
+use super::unknown::of_unknown;
+use super::{list, rms, with_unit};
+use crate::numbers::significant;
 
 /// Verdict of a comparison alone.
-pub(crate) fn of_comparison(diagnosis: &Diagnosis, left: Option<NotNoise>) -> Vec<String> {
+pub(super) fn of_comparison(diagnosis: &Diagnosis) -> Vec<String> {
     let Some(step) = diagnosis.steps.first() else {
         return Vec::new();
     };
     let unit = &diagnosis.output_unit;
-    vec![match (diagnosis.verdict, left) {
+    vec![match (diagnosis.verdict, &diagnosis.not_noise) {
         (Verdict::Adequate, _) => format!(
             "The model explains the data: its simulation error of {} looks like noise.",
             rms(&step.rmse_per_output, unit)
@@ -55,12 +49,13 @@ fn visible(diagnosis: &Diagnosis) -> String {
     sizes.join(", ")
 }
 
-/// All sentences, the verdict first.
-pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<NotNoise>) -> Vec<String> {
+/// Verdict of a search of the catalogue, the accepted effects first.
+pub(super) fn of_search(diagnosis: &Diagnosis) -> Vec<String> {
     let unit = &diagnosis.output_unit;
     let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) else {
         return Vec::new();
     };
+    let left = diagnosis.not_noise.as_ref();
     let mut said = Vec::new();
     let unknown = diagnosis.unknown.as_ref();
     let shaped = unknown.map(|unknown| of_unknown(unknown, &diagnosis.clock, diagnosis.domain()));
@@ -86,7 +81,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis, left: Option<NotNoise>) -> Vec
         }
         Verdict::Unexplained => match left {
             // A correct model under a slow disturbance has such a residual too.
-            Some(left) if matches!(left.what, Pattern::Slow(..)) => {
+            Some(left @ NotNoise::Slow { .. }) => {
                 said.push(format!(
                     "No effect of the catalogue is significant, but the residual is not noise: {}.",
                     left_over(left, first, diagnosis)

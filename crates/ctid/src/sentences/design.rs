@@ -1,14 +1,12 @@
-//! The design in words.
+//! Sentences from a design: what the records say so far, and the next experiment.
 
 use effect_search::design::{Kind, Power, Prospect};
+use missing_effect::GROUP_MARGIN;
+use missing_effect::design::{Alternative, Candidate, Design};
 use plants::Domain;
 
-use super::plan::{Alternative, Candidate, Design};
-use crate::{
-    fit::criterion::GROUP_MARGIN,
-    numbers::significant,
-    sentences::{with_error, with_unit},
-};
+use super::{with_error, with_unit};
+use crate::numbers::significant;
 
 /// Criteria with a smaller difference are called equal.
 const TWIN: f64 = 0.01;
@@ -23,7 +21,7 @@ fn sized(alternative: &Alternative, domain: Domain) -> String {
 }
 
 /// An effect, with its tank if there are two.
-pub(super) fn named(alternative: &Alternative, domain: Domain) -> String {
+fn named(alternative: &Alternative, domain: Domain) -> String {
     match &alternative.place {
         Some(place) => {
             format!(
@@ -70,8 +68,7 @@ fn reservation(candidate: &Candidate) -> &'static str {
 }
 
 /// A kind of sequence with its settings.
-#[must_use]
-pub(super) fn described(candidate: &Candidate, unit: &str) -> String {
+fn described(candidate: &Candidate, unit: &str) -> String {
     let range = format!(
         "between {} and {}",
         significant(candidate.low, 3),
@@ -156,8 +153,9 @@ fn so_far(design: &Design) -> Vec<String> {
     said
 }
 
-/// All sentences, the experiment first.
-pub(super) fn of(design: &Design) -> Vec<String> {
+/// The design in sentences: what the existing records say, the next experiment, and alternatives to it.
+#[must_use]
+pub fn of_design(design: &Design) -> Vec<String> {
     let mut said = so_far(design);
     let unit = &design.experiment.unit;
     let domain = design.domain();

@@ -1,0 +1,54 @@
+//! Whether the control loop is simulated, and why not.
+
+use missing_effect::{ControlLoop, NotSimulated};
+
+/// Consequence of running a model on the measured command of a loop.
+const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and scores are biased; the standard errors are enlarged for this.";
+
+/// Description of the loop; `input_unit`: unit of the command.
+pub(super) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
+    let mismatch = known.mismatch.unwrap_or(f64::NAN);
+    let Some(why) = &known.not_simulated else {
+        return format!(
+            "The loop is simulated from its reference: so noise fed back through the command does not enter the model. The measured command agrees with the controller's to {mismatch:.4} {input_unit} rms."
+        );
+    };
+    let why = match why {
+        NotSimulated::UnknownController { lags } => {
+            return format!(
+                "Feedback detected: the command depends on the last {lags} residuals (F test beside the command's own past, p {}), and no [controller] is in the model file; give it, and the reference, and the loop is simulated. {MEASURED}",
+                chance(known.feedback_p.unwrap_or(f64::NAN))
+            );
+        }
+        NotSimulated::AsRequested => "as was asked for".to_string(),
+        NotSimulated::MissingReadings { record } => format!(
+            "readings are missing in {record}, so the controller cannot be checked against its commands"
+        ),
+        NotSimulated::NoReference { record } => greybox::Error::NoReference {
+            record: record.clone(),
+        }
+        .to_string(),
+        NotSimulated::ConstantReference { record, value } => greybox::Error::ConstantReference {
+            record: record.clone(),
+            value: *value,
+        }
+        .to_string(),
+        NotSimulated::CommandNotHeld { record } => greybox::Error::CommandNotHeld {
+            record: record.clone(),
+        }
+        .to_string(),
+        NotSimulated::OtherController { share } => format!(
+            "the measured command disagrees with the controller of the model file, R/S (r - y), by {mismatch:.3} {input_unit} rms, {:.0} % of what it moves: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
+            100.0 * share
+        ),
+    };
+    format!("The loop is not simulated: {why}. {MEASURED}")
+}
+
+fn chance(p: f64) -> String {
+    if p < 1e-9 {
+        "< 1e-9".to_string()
+    } else {
+        format!("= {p:.0e}")
+    }
+}

@@ -1,0 +1,92 @@
+//! Sentences from the findings of a plant: the verdict, the effects, the residual, remarks, and the next experiment.
+//!
+//! Every sentence is a function of the typed result alone.
+
+mod control_loop;
+mod design;
+mod effects;
+mod remarks;
+mod residual;
+#[cfg(test)]
+mod tests;
+mod unknown;
+mod verdict;
+
+use missing_effect::numbers::value_and_error;
+use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
+
+use self::control_loop::of_the_loop;
+pub use self::design::of_design;
+
+/// The findings of a comparison or a diagnosis in sentences: first one for each accepted effect, or the verdict; then the rest of the
+/// verdict, the unexplained error, and remarks. Empty if nothing was fitted.
+#[must_use]
+pub fn of_diagnosis(diagnosis: &Diagnosis) -> Vec<String> {
+    if diagnosis.steps.is_empty() {
+        return Vec::new();
+    }
+    let mut said = if diagnosis.searched() {
+        verdict::of_search(diagnosis)
+    } else {
+        verdict::of_comparison(diagnosis)
+    };
+    // What was found and not accepted belongs to the verdict; the other remarks follow the errors of the last model.
+    let (refused, other): (Vec<&Remark>, Vec<&Remark>) =
+        diagnosis.remarks.iter().partition(|remark| {
+            matches!(
+                remark,
+                Remark::ReplacedByTime { .. } | Remark::BestPart { .. }
+            )
+        });
+    said.extend(remarks::of_quantisation(diagnosis));
+    said.extend(
+        refused
+            .into_iter()
+            .filter_map(|remark| remarks::of(remark, diagnosis)),
+    );
+    said.extend(remarks::of_held_out(diagnosis));
+    said.extend(remarks::of_a_minimum(diagnosis));
+    said.extend(
+        other
+            .into_iter()
+            .filter_map(|remark| remarks::of(remark, diagnosis)),
+    );
+    said.extend(remarks::of_rankings(&diagnosis.rankings));
+    let control_loop = diagnosis.control_loop.iter();
+    said.extend(control_loop.map(|known| of_the_loop(known, &diagnosis.input_unit)));
+    said.extend(diagnosis.gaps.and_then(|gaps| gaps.sentence()));
+    said
+}
+
+/// A value with its standard error to two significant digits of the latter.
+fn with_error(parameter: &Parameter) -> String {
+    let (value, error) = value_and_error(parameter.value, parameter.std_error);
+    let error = error.map_or(String::new(), |error| format!(" ± {error}"));
+    with_unit(&format!("{value}{error}"), &parameter.unit)
+}
+
+pub(crate) fn with_unit(number: &str, unit: &str) -> String {
+    format!("{number} {unit}").trim_end().to_string()
+}
+
+/// Root mean squares in words: `0.300 cm rms`, of several outputs `0.300 cm rms (upper) and 0.100 cm rms (lower)`.
+fn rms(per_output: &PerOutput, unit: &str) -> String {
+    let words = |(name, rms): &(String, f64)| {
+        let of = if per_output.0.len() > 1 {
+            format!(" ({name})")
+        } else {
+            String::new()
+        };
+        format!("{rms:.3} {unit} rms{of}")
+    };
+    let all: Vec<String> = per_output.0.iter().map(words).collect();
+    list(&all, "and")
+}
+
+fn list(names: &[String], last_word: &str) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} {last_word} {last}", most.join(", ")),
+    }
+}

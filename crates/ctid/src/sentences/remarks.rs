@@ -1,0 +1,106 @@
+//! Remarks in addition to the verdict.
+
+use missing_effect::{Diagnosis, Rankings, Remark};
+
+use super::{list, rms};
+use crate::numbers::significant;
+
+/// A remark in a sentence; `None` for quantisation, whose remarks make one text ([`of_quantisation`]).
+pub(super) fn of(remark: &Remark, diagnosis: &Diagnosis) -> Option<String> {
+    Some(match remark {
+        Remark::Quantisation { .. } => return None,
+        Remark::ReplacedByTime { effects } => format!(
+            "{} would explain more, but so would a function of time, and the residual is not noise: not accepted.",
+            list(effects, "and")
+        ),
+        Remark::BestPart {
+            effects,
+            rmse_per_output,
+        } => format!(
+            "The best significant effect, apart from functions of time, is {}, with a residual of {}: this residual is not noise, so the effect is not accepted.",
+            list(effects, "and"),
+            rms(rmse_per_output, &diagnosis.output_unit)
+        ),
+        Remark::EffectLimit { most, needed } => format!(
+            "The search was stopped at {most} {}: the data call for {needed}.",
+            if *most == 1 { "effect" } else { "effects" }
+        ),
+        Remark::Terms { names } => format!(
+            "Beside {} the standard errors are too small: the shape of a term is taken as known, and may hold a part of what the plant's own parameters explain.",
+            list(names, "and")
+        ),
+        Remark::ColouredNoise { ratio } => format!(
+            "The noise is coloured: an effect has to be about {} times larger to be detected than in white noise of the same variance. Effects smaller than the sizes under \"detectable\" may be present.",
+            significant(*ratio, 2)
+        ),
+    })
+}
+
+/// One text on quantisation, a sentence for each output with rounded readings; `None` without such an output.
+pub(super) fn of_quantisation(diagnosis: &Diagnosis) -> Option<String> {
+    let unit = &diagnosis.output_unit;
+    let remarks = diagnosis.remarks.iter();
+    let all = remarks.filter_map(|remark| match remark {
+        Remark::Quantisation {
+            output,
+            step,
+            share,
+        } => {
+            let of = if diagnosis.outputs.len() > 1 {
+                format!(" of {output}")
+            } else {
+                String::new()
+            };
+            Some(format!(
+                "Nearly all readings{of} are multiples of {} {unit}: rounding alone makes an error of {} {unit} rms, {:.0} % of the mean squared error of the model without it.",
+                significant(*step, 3),
+                significant(*step / 12.0_f64.sqrt(), 2),
+                100.0 * share.min(1.0)
+            ))
+        }
+        _ => None,
+    });
+    let all: Vec<String> = all.collect();
+    (!all.is_empty()).then(|| all.join(" "))
+}
+
+/// Remark: the two weightings of the residual rank different effects first.
+pub(super) fn of_rankings(rankings: &Rankings) -> Option<String> {
+    let (white, prewhitened) = (rankings.white.first()?, rankings.prewhitened.first()?);
+    rankings.disagree.then(|| {
+        format!(
+            "The weightings disagree: by the simulation error {white} is the best single effect, prewhitened by the noise model {prewhitened}; the prewhitened fit gives more weight to fast changes."
+        )
+    })
+}
+
+/// Remark: the minimum of the last model was not found twice.
+pub(super) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
+    let step = diagnosis.steps.last()?;
+    (step.starts_agree < 2 && step.starts > 0).then(|| {
+        format!(
+            "Of {} starts {} the minimum that is shown: there may be a better one, and other values of the parameters.",
+            step.starts,
+            if step.starts_agree == 0 {
+                "no start around it came as low as"
+            } else {
+                "one alone ended in"
+            }
+        )
+    })
+}
+
+/// Ratio of the held-out error to the fitted one above which the fitted model does not hold for another record.
+const CARRIES_OVER: f64 = 2.0;
+
+/// Remark: whether the fitted model holds for another record.
+pub(super) fn of_held_out(diagnosis: &Diagnosis) -> Option<String> {
+    let step = diagnosis.steps.last()?;
+    let times = step.weighted_rmse_test? / step.weighted_rmse;
+    (times > CARRIES_OVER).then(|| {
+        format!(
+            "On held-out data the simulation error is {} times as large: the fitted model does not hold for that record.",
+            significant(times, 2)
+        )
+    })
+}

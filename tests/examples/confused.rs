@@ -1,5 +1,4 @@
-//! Which effects are confused on the standard experiments: `cargo run --release -p ctid-tests --example confused` prints the table of
-//! `docs/gallery.md`.
+//! Which effects are confused on the standard experiments: `cargo run --release -p ctid-tests --example confused` prints a table.
 //!
 //! Every effect, as the search would try it first (the middle of its starts), is built into a single tank with white noise, in open loop
 //! and under a controller, and the record is diagnosed. An argument chooses the effects whose name holds it.

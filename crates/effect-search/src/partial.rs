@@ -6,7 +6,7 @@
 //! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an
 //!   effect that follows time alone, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and
 //!   without others beside it, as those then bend to any disturbance;
-//! - several effects are called for where each model has a noise model of its own, of limited memory;
+//! - several effects are significant if each model has a noise model of its own, of limited memory;
 //! - it predicts the next sample as well as the model without it, each beside a noise model of its own;
 //! - what is fitted to three quarters of the records predicts the fourth (cross-validation);
 //! - no size of its effects is at a bound.

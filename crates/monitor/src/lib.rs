@@ -18,8 +18,8 @@
 //! noise of its own, independent of the others, and may lack readings for itself. One model runs beside all of them: scores, tracker and
 //! isolation take each innovation in units of its own standard deviation, and an alarm that speaks of a sensor says of which.
 //!
-//! **Users' own models** have any number of inputs, outputs and states. For these models no effect is named: an alarm gives the
-//! time since when the model does not fit.
+//! **Users' own models** have any number of inputs, outputs and states. An alarm gives the time since when
+//! the model does not fit; with [`OwnModel::candidates`] it also names the candidate that explains it.
 //!
 //! # Example
 //! A tank loses water from the 3000th row on.

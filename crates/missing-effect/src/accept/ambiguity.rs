@@ -106,8 +106,8 @@ pub(crate) fn remove_ambiguous<'a>(
     })
 }
 
-/// The best smaller set without effects that follow time alone all of which are called for, and which leaves noise, nearly as little of
-/// it; `None` where there is none.
+/// The best smaller set without effects that follow time alone, if all its effects are significant, its residual is noise, and its error is
+/// nearly as small; `None` if there is none.
 ///
 /// In a loop the command depends on every disturbance, and the likelihood of a model that runs on the measured command is biased by as much
 /// as a few effects gain. A sticking valve can then be replaced by a saturating pump and an outlet that changes at the instant of a slip:

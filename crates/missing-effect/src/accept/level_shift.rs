@@ -71,7 +71,7 @@ pub(crate) fn level_shift(node: &Node, noise: &Noise) -> Result<Option<LevelShif
         let size = mean(&residual[k..k + AROUND]) - mean(&residual[k - AROUND..k]);
         let time = &record.time;
         let structure = node.setup.structure.with_term(Term {
-            name: "jump_of_the_reading".to_string(),
+            name: "level_shift_of_the_reading".to_string(),
             place: Place::Sensor,
             vessel: output,
             variable: Variable::Time,
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_found_where_it_is_and_pays_only_there() {
+    fn a_level_shift_is_found_where_it_is_and_is_significant_only_there() {
         let noise = Noise::white(1);
         for by in [0.3, -0.3, 3.0] {
             let problem = problem(by, 1, 1);

@@ -5,11 +5,11 @@
 //! - it explains [`PART`](crate::accept::acceptance::PART) of the excess error, the mean squared simulation error above the noise floor; one
 //!   with an effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::accept::acceptance::WHOLE) of it, alone and
 //!   beyond what a random walk explains;
-//! - of several effects: they are called for where each model has a noise model of its own, of limited memory;
+//! - of several effects: they are significant if each model has a noise model of its own, of limited memory;
 //! - it predicts the next sample as well as the model without it does, each beside a noise model of its own;
 //! - what is fitted to one half of the record predicts the other (two-fold cross-validation);
 //! - sizes are inside their bounds, and states are physical;
-//! - a single jump of the reading does not explain more.
+//! - a single level shift of the reading does not explain more.
 //!
 //! A larger set is taken where it explains half of what each smaller one of its effects leaves.
 
@@ -44,12 +44,12 @@ const LEFT: f64 = 0.5;
 /// Least share of the mean squared error that a set explains on a half of the record that was not fitted.
 const CARRIED_OVER: f64 = 0.3;
 
-/// Largest ratio of the innovation variance with a set to that with the base: a set that compensates for a slow course by its own fast
-/// changes is rougher than the record.
+/// Largest ratio of the innovations' standard deviation with a set to that of the base model: a set that describes a slow error by fast
+/// changes has larger innovations.
 const ROUGHER: f64 = 1.05;
 
 /// Least difference between the logarithms of the mean square for a level shift and for a set.
-const JUMP_CLEARLY: f64 = 0.1;
+const SHIFT_CLEARLY: f64 = 0.1;
 
 /// Stiction that the shape of the record confirms is a partial explanation from this share on.
 const PART_BY_SHAPE: f64 = 0.15;
@@ -83,7 +83,7 @@ pub(crate) fn largest_part<'a>(
 ) -> Result<Option<Tested<'a>>, Error> {
     let white = base.setup.white_noise();
     let own_base = in_own_noise(base)?;
-    let jump = level_shift(base, &white)?.map_or(f64::INFINITY, |shift| shift.bic);
+    let shift_bic = level_shift(base, &white)?.map_or(f64::INFINITY, |shift| shift.bic);
     let sticks = in_loop && sticks(base.setup.records);
     let mut best: Option<Tested<'a>> = None;
     let mut smaller: Vec<(Vec<Placed>, f64)> = Vec::new();
@@ -118,7 +118,7 @@ pub(crate) fn largest_part<'a>(
             .into_par_iter()
             .filter_map(|set| refine(&set, &white, &[]).ok())
             .map(|node| {
-                let mut tested = test(base, &own_base, node, floor, jump)?;
+                let mut tested = test(base, &own_base, node, floor, shift_bic)?;
                 if in_loop && tested.node.narrow_stiction().is_some() {
                     tested.reasons.push(NARROW_BAND.to_string());
                 }
@@ -237,7 +237,7 @@ fn test<'a>(
     own_base: &Node<'a>,
     node: Node<'a>,
     floor: &[f64],
-    jump: f64,
+    shift_bic: f64,
 ) -> Result<Tested<'a>, Error> {
     let share = explained(base, &node, floor)?;
     let required = if node.added.iter().any(|placed| placed.effect.by_clock) {
@@ -292,8 +292,8 @@ fn test<'a>(
         reasons.push("a size is at a bound, or a state is not physical".to_string());
     }
     // A level shift at a free instant explains much if set points change in steps: it has to explain clearly more.
-    let clearly = JUMP_CLEARLY * node.setup.samples() as f64;
-    if jump + clearly < node.fit.bic() {
+    let clearly = SHIFT_CLEARLY * node.setup.samples() as f64;
+    if shift_bic + clearly < node.fit.bic() {
         reasons.push("a single level shift of the reading explains more".to_string());
     }
     Ok(Tested {

@@ -139,7 +139,7 @@ pub(crate) fn find<'a>(
             pays,
             // The search with this noise model (that of the set's own residual) has converged, including its pairs.
             |node| {
-                if grown.exhausted_by(node) {
+                if grown.converged_at(node) {
                     Ok(ResidualKind::Noise)
                 } else {
                     residual_kind(node)

@@ -93,21 +93,21 @@ pub(crate) struct Grown<'a> {
     refitted: Vec<Node<'a>>,
     unpromising: Vec<Proposal<'a>>,
     /// The set at which the search converged, if it ended so.
-    exhausted: Option<Vec<Placed>>,
+    converged: Option<Vec<Placed>>,
     /// Whether the last size lowered the criterion enough.
     paid: bool,
 }
 
 impl<'a> Grown<'a> {
     /// Whether the growth ended because the search converged at this set.
-    pub fn exhausted_by(&self, node: &Node) -> bool {
+    pub fn converged_at(&self, node: &Node) -> bool {
         let same = |set: &Vec<Placed>| key(set) == key(&node.added);
-        self.exhausted.as_ref().is_some_and(same)
+        self.converged.as_ref().is_some_and(same)
     }
 
     /// Whether sets of this number of effects were grown, and still lowered the criterion enough.
     pub fn goes_on(&self, size: usize) -> bool {
-        self.sizes.len() > size && self.exhausted.is_none() && self.paid
+        self.sizes.len() > size && self.converged.is_none() && self.paid
     }
 
     /// Adds a set from another search.
@@ -149,7 +149,7 @@ pub(crate) fn grow<'a>(
         sizes: vec![vec![base.clone()]],
         refitted: Vec::new(),
         unpromising: Vec::new(),
-        exhausted: None,
+        converged: None,
         paid: false,
     };
     let mut idle = 0;
@@ -173,7 +173,7 @@ pub(crate) fn grow<'a>(
             let rest = residual_kind(best_before)?;
             may_end = (rest != ResidualKind::Structure).then(|| best_before.added.clone());
             if may_end.is_some() && (size > PAIR || rest == ResidualKind::Noise) {
-                grown.exhausted = may_end;
+                grown.converged = may_end;
                 break;
             }
         }
@@ -215,7 +215,7 @@ pub(crate) fn grow<'a>(
         });
         let pays = !nodes.is_empty() && worth(best_before, &nodes);
         if nodes.is_empty() || !pays && may_end.is_some() {
-            grown.exhausted = may_end;
+            grown.converged = may_end;
             break;
         }
         // Pairs are tried even if no single effect lowers the criterion enough; after two sizes without success the search ends.

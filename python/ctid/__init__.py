@@ -32,9 +32,9 @@ __all__ = [
     "Model",
     "ModelError",
     "Monitor",
+    "RowResult",
     "StabilizedOe",
     "StateSpace",
-    "RowResult",
     "identify",
     "tables",
 ]

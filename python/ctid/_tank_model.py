@@ -15,7 +15,7 @@ from ._frames import Records, as_list, index_of, row_count, series, to_frames
 from ._linear import StateSpace, _guess
 from ._model import Model
 from ._monitor import Monitor
-from ._options import SEED, Hold, Progress, clear_line, phase_printer
+from ._options import NOISE_ORDER, SEED, STARTS, Hold, Progress, clear_line, phase_printer
 from ._tank_plant import linearized, monitored
 
 if TYPE_CHECKING:
@@ -116,9 +116,9 @@ class TankModel(Model):
         priors: Mapping[str, tuple[float, float]] | None = None,
         *,
         hold: Hold | None = None,
-        starts: int = 12,
+        starts: int = STARTS,
         seed: int = SEED,
-        noise_order: int = 6,
+        noise_order: int = NOISE_ORDER,
         progress: Progress = False,
     ) -> Fit:
         """Fits the plant to records by simulation error, as `ctid compare` does.
@@ -131,7 +131,7 @@ class TankModel(Model):
         """
         if isinstance(inputs, Mapping) or isinstance(outputs, Mapping):
             raise ModelError(f"{self.name} has no signals of its own names: give lists of columns")
-        if (starts, seed, noise_order) != (12, SEED, 6):
+        if (starts, seed, noise_order) != (STARTS, SEED, NOISE_ORDER):
             raise ModelError(f"starts, seed and noise_order of {self.name} are the program's: leave them out")
         records = as_list(data)
         if not records:

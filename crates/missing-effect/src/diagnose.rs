@@ -121,7 +121,7 @@ fn diagnose_whole(
         searched: &searched,
     };
     let (accepted, (scores, loss)) = rayon::join(
-        || test.accept(confirmed),
+        || test.run(confirmed),
         || {
             rayon::join(
                 || scores(believed, &single, metric, &innovations(&found.noise)),

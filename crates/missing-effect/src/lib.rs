@@ -22,7 +22,7 @@ pub use compare::compare;
 pub use diagnose::diagnose;
 pub use diagnostics::{
     locate::{Located, Series, locate},
-    unknown::SAME_PLACE,
+    unknown::PLACE_MARGIN,
 };
 pub use error::Error;
 pub use fit::criterion::GROUP_MARGIN;

@@ -191,8 +191,8 @@ pub(super) fn shares(unknown: &Unknown) -> String {
 }
 
 const SCORED: &str = "Simulation error: root mean square on the fitted data after the refit.";
-const SIGNATURES: &str = " Visible part: share of the effect's signature that the fitted parameters cannot compensate for. Visible \
-     from: minimum detectable size; a smaller effect would not be detected in these data.";
+const SIGNATURES: &str = " Visible part: share of the effect's signature that the fitted parameters cannot compensate for. Detectable: \
+     minimum detectable size; a smaller effect would not be detected in these data.";
 
 /// The catalogue, best effect first.
 pub(super) fn scores(diagnosis: &Diagnosis) -> String {
@@ -248,7 +248,7 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
              {}\
              <th scope=\"col\" class=\"number\">Size ± standard error</th>{}</tr>",
             of_signature("<th scope=\"col\" class=\"number\">Visible part</th>".to_owned()),
-            of_signature("<th scope=\"col\" class=\"number\">Visible from</th>".to_owned()),
+            of_signature("<th scope=\"col\" class=\"number\">Detectable</th>".to_owned()),
         ),
         &rows,
         &(SCORED.to_owned() + &of_signature(SIGNATURES.to_owned())),

@@ -8,10 +8,14 @@ const MEASURED: &str = "The model runs on the measured command, which contains f
 /// Description of the loop; `input_unit`: unit of the command.
 pub(super) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
     let mismatch = known.mismatch.unwrap_or(f64::NAN);
-    let Some(why) = &known.not_simulated else {
+    if known.simulated {
         return format!(
             "The loop is simulated from its reference: so noise fed back through the command does not enter the model. The measured command agrees with the controller's to {mismatch:.4} {input_unit} rms."
         );
+    }
+    // A result of an earlier version does not say why.
+    let Some(why) = &known.not_simulated else {
+        return format!("The loop is not simulated. {MEASURED}");
     };
     let why = match why {
         NotSimulated::UnknownController { lags } => {

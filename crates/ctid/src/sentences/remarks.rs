@@ -38,7 +38,6 @@ pub(super) fn of(remark: &Remark, diagnosis: &Diagnosis) -> Option<String> {
 
 /// One text on quantisation, a sentence for each output with rounded readings; `None` without such an output.
 pub(super) fn of_quantisation(diagnosis: &Diagnosis) -> Option<String> {
-    let unit = &diagnosis.output_unit;
     let remarks = diagnosis.remarks.iter();
     let all = remarks.filter_map(|remark| match remark {
         Remark::Quantisation {
@@ -46,6 +45,8 @@ pub(super) fn of_quantisation(diagnosis: &Diagnosis) -> Option<String> {
             step,
             share,
         } => {
+            let names = &mut diagnosis.outputs.iter();
+            let unit = diagnosis.unit_of(names.position(|name| name == output).unwrap_or(0));
             let of = if diagnosis.outputs.len() > 1 {
                 format!(" of {output}")
             } else {

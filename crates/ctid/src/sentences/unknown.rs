@@ -1,7 +1,7 @@
 //! The unexplained error, if no effect of the catalogue explains it.
 
 use ct_signals::Clock;
-use missing_effect::{SAME_PLACE, Unknown};
+use missing_effect::{PLACE_MARGIN, Unknown};
 use plants::Domain;
 
 use super::list;
@@ -26,7 +26,7 @@ pub(super) fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> St
     let others: Vec<String> = unknown
         .places
         .iter()
-        .filter(|other| other.below_best < SAME_PLACE && other.place != unknown.place)
+        .filter(|other| other.below_best < PLACE_MARGIN && other.place != unknown.place)
         .map(|other| place(&other.place))
         .collect();
     if !others.is_empty() && unknown.variable == "time" {

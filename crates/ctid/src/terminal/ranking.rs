@@ -18,23 +18,23 @@ enum Ranked {
     Error,
     Size,
     SizeAlone,
-    Visible,
+    Detectable,
 }
 
 /// The single effects at the first step, best first.
 pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
-    use Ranked::{Effect, Error, Gain, Place, Size, SizeAlone, Visible};
+    use Ranked::{Effect, Error, Gain, Place, Size, SizeAlone, Detectable};
     if diagnosis.scores.is_empty() {
         return String::new();
     }
     // As many columns as the width allows. The minimum detectable sizes come first, because the verdict refers to them. The change of the
     // error comes last.
     let variants: [&[Ranked]; 7] = [
-        &[Place, Effect, Gain, Error, Size, Visible],
-        &[Place, Effect, Gain, Error, SizeAlone, Visible],
-        &[Place, Effect, Error, SizeAlone, Visible],
-        &[Place, Effect, Gain, Error, Visible],
-        &[Place, Effect, Error, Visible],
+        &[Place, Effect, Gain, Error, Size, Detectable],
+        &[Place, Effect, Gain, Error, SizeAlone, Detectable],
+        &[Place, Effect, Error, SizeAlone, Detectable],
+        &[Place, Effect, Gain, Error, Detectable],
+        &[Place, Effect, Error, Detectable],
         &[Place, Effect, Error],
         &[Effect, Error],
     ];
@@ -82,7 +82,7 @@ fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<S
         Ranked::Gain => look.faint("BIC falls"),
         Ranked::Error => look.faint(error_heading),
         Ranked::Size | Ranked::SizeAlone => look.faint("size found"),
-        Ranked::Visible => look.faint("detectable"),
+        Ranked::Detectable => look.faint("detectable"),
     };
     let mut rows = vec![columns.iter().map(heading).collect::<Vec<_>>()];
     for (index, score) in scores.iter().enumerate() {
@@ -106,7 +106,7 @@ fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<S
             Ranked::Error => with_unit(&errors[index], unit),
             Ranked::Size => size(true),
             Ranked::SizeAlone => size(false),
-            Ranked::Visible => detectable_from(score),
+            Ranked::Detectable => detectable_from(score),
         };
         rows.push(columns.iter().map(cell).collect());
     }

@@ -209,10 +209,17 @@ impl Setup<'_> {
         }
         // The simulator cuts steps that are long against a time constant by itself. While these cuts are finer than the substeps, more
         // substeps change nothing, which is no evidence of accuracy.
-        let limits: Vec<(f64, f64)> = ranges
+        let mut limits: Vec<(f64, f64)> = ranges
             .iter()
             .map(|(low, high)| (1e-6 * (high - low), 1e-13 * low.abs().max(high.abs())))
             .collect();
+        // The range of a constant output, or of one without samples, is no scale.
+        let scaled = |limits: &(f64, f64)| limits.0 > 0.0 && limits.0.is_finite();
+        let largest = limits.iter().copied().filter(scaled);
+        let largest = largest.fold((0.0_f64, 0.0_f64), |a, b| (a.0.max(b.0), a.1.max(b.1)));
+        for limits in limits.iter_mut().filter(|limits| !scaled(limits)) {
+            *limits = largest;
+        }
         let mut enough = None;
         self.substeps = 1;
         let mut coarse = self.simulate(x)?;

@@ -263,6 +263,9 @@ fn the_step_is_short_enough_for_the_smallest_output() {
         *value *= 1e3;
     }
     assert_eq!(chosen(&records), own);
+    // The range of a constant output is no scale.
+    records[0].outputs[0].values.fill(1.0);
+    assert_eq!(chosen(&records), own);
 }
 
 #[test]

@@ -64,7 +64,7 @@ pub(crate) struct AcceptanceTest<'s, 'a> {
 }
 
 /// Result of the acceptance test of a set.
-pub(crate) struct Accepted<'a> {
+pub(crate) struct AcceptanceResult<'a> {
     pub course: Course<'a>,
     pub grade: Grade,
     /// The share of the excess error that the set explains.
@@ -81,7 +81,7 @@ impl<'a> AcceptanceTest<'_, 'a> {
     /// If the residual is not noise, an effect that a function of time can replace is not accepted: an unknown disturbance may have caused
     /// both. This applies to that effect alone. The other effects stay if they are significant without it, and are accepted if they explain
     /// enough without it: effects that only compensated a rejected one are dropped too.
-    pub fn accept(&self, mut set: Node<'a>) -> Result<Accepted<'a>, Error> {
+    pub fn run(&self, mut set: Node<'a>) -> Result<AcceptanceResult<'a>, Error> {
         let mut accepted = self.tested(&set, None)?;
         loop {
             let courses = accepted.courses_of_time();
@@ -101,11 +101,11 @@ impl<'a> AcceptanceTest<'_, 'a> {
                 Some(others) if others.grade == Grade::Whole => {
                     let mut dropped = accepted.dropped;
                     dropped.extend(courses);
-                    accepted = Accepted { dropped, ..others };
+                    accepted = AcceptanceResult { dropped, ..others };
                 }
                 // A function of time can be a part of the explanation only.
                 _ => {
-                    return Ok(Accepted {
+                    return Ok(AcceptanceResult {
                         grade: Grade::Part,
                         ..accepted
                     });
@@ -116,7 +116,11 @@ impl<'a> AcceptanceTest<'_, 'a> {
 
     /// `beside`: structure in the residual of a larger set. A noise model that absorbs this structure, and the part that the larger set
     /// explained, does not make it noise.
-    fn tested(&self, set: &Node<'a>, beside: Option<&NotNoise>) -> Result<Accepted<'a>, Error> {
+    fn tested(
+        &self,
+        set: &Node<'a>,
+        beside: Option<&NotNoise>,
+    ) -> Result<AcceptanceResult<'a>, Error> {
         let mut course = self.course(set)?;
         course.left = course.left.or_else(|| beside.cloned());
         let (share, grade) = match &course.left {
@@ -139,7 +143,7 @@ impl<'a> AcceptanceTest<'_, 'a> {
         } else {
             Vec::new()
         };
-        Ok(Accepted {
+        Ok(AcceptanceResult {
             course,
             grade,
             share,
@@ -215,7 +219,7 @@ impl<'a> AcceptanceTest<'_, 'a> {
     }
 }
 
-impl Accepted<'_> {
+impl AcceptanceResult<'_> {
     /// Effects of a set that a function of time can replace, if the residual is not noise.
     fn courses_of_time(&self) -> Vec<Placed> {
         if self.grade != Grade::Whole || self.course.left.is_none() {
@@ -329,7 +333,7 @@ mod tests {
             singles: &singles(&base, &white),
             searched: &[],
         }
-        .accept(set)
+        .run(set)
         .unwrap();
         assert!(accepted.course.left.is_some());
         let ids = |set: &[Placed]| set.iter().map(|placed| placed.effect.id).collect();

@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// Result of the comparison with alternatives.
-pub(crate) struct Unambiguous<'a> {
+pub(crate) struct AmbiguityResult<'a> {
     pub confirmed: Node<'a>,
     /// The believed model with a noise model fitted to its own residual.
     pub own_base: Fit,
@@ -33,7 +33,7 @@ pub(crate) fn remove_ambiguous<'a>(
     base: &Node<'a>,
     found: &Found<'a>,
     in_loop: bool,
-) -> Result<Unambiguous<'a>, Error> {
+) -> Result<AmbiguityResult<'a>, Error> {
     let noise = &found.noise;
     let mut confirmed = found.confirmed.clone();
     // Each model has a noise model of its own residual: an error that coloured noise explains needs no effect. The largest model explains a
@@ -99,7 +99,7 @@ pub(crate) fn remove_ambiguous<'a>(
     if !beyond_small_walk(&confirmed)? {
         confirmed = found.base.clone();
     }
-    Ok(Unambiguous {
+    Ok(AmbiguityResult {
         confirmed,
         own_base,
         shifted,

@@ -14,7 +14,7 @@ use crate::fit::{
 };
 
 /// Damping of the step for the predicted reduction, against directions that the data do not determine.
-const PROMISE_DAMPING: f64 = 1e-6;
+const PREDICTION_DAMPING: f64 = 1e-6;
 /// Number of starts of a new effect that are fitted, those with the largest predicted reduction.
 const FOLLOWED: usize = 2;
 
@@ -32,7 +32,7 @@ const BY_CLOCK: usize = 1;
 fn predicted(setup: &Setup, x: &[f64], triangle: &Triangle) -> f64 {
     let free: Vec<usize> = (0..setup.free().len()).collect();
     let scale: Vec<f64> = free.iter().map(|&j| triangle.column_norm(j)).collect();
-    let mut step = triangle.solve(&free, &scale, PROMISE_DAMPING);
+    let mut step = triangle.solve(&free, &scale, PREDICTION_DAMPING);
     for (d, &i) in step.iter_mut().zip(setup.free()) {
         let (lower, upper) = setup.bounds()[i];
         let lower = if lower > 0.0 {

@@ -42,6 +42,7 @@ pub enum NotSimulated {
         /// The record, by its name.
         record: String,
         /// Value of the reference \[output unit\].
+        #[serde(deserialize_with = "crate::result::number")]
         value: f64,
     },
     /// The record says that the command is interpolated, but a controller holds it.
@@ -51,7 +52,8 @@ pub enum NotSimulated {
     },
     /// The measured command disagrees with the controller's output by `mismatch`.
     OtherController {
-        /// `mismatch` over the standard deviation of the command, above 0.05.
+        /// `mismatch` over the standard deviation of the command, above 0.05; not finite for a command that hardly changes.
+        #[serde(deserialize_with = "crate::result::number")]
         share: f64,
     },
 }

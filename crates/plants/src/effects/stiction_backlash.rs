@@ -62,7 +62,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
 }
 
 /// Perturbation for the derivatives by finite differences: of the width, relative; of `begin`, absolute.
-const START_CHANGE: f64 = 0.05;
+const PERTURBATION: f64 = 0.05;
 
 /// One element with stiction or backlash.
 #[derive(Clone, Copy)]
@@ -124,10 +124,10 @@ pub(super) fn bind<T: Scalar>(site: &Site, parameters: &[T]) -> impl Law<T> + us
     let (low, high) = site.input();
     let element = Element { width, jump, begin, position: T::constant(0.0) };
     // At a width of zero the difference is one-sided, with a small perturbation.
-    let reach = (START_CHANGE * width).max(1e-6 * (high - low).abs());
+    let reach = (PERTURBATION * width).max(1e-6 * (high - low).abs());
     let (narrower, wider) = ((width - reach).max(0.0), width + reach);
     // At an end of the band the difference is one-sided.
-    let (lower, upper) = ((begin - START_CHANGE).max(-1.0), (begin + START_CHANGE).min(1.0));
+    let (lower, upper) = ((begin - PERTURBATION).max(-1.0), (begin + PERTURBATION).min(1.0));
     StictionBacklash {
         width: parameters[0],
         begin: parameters[2],

@@ -66,7 +66,7 @@ function row(state, one, k, widest, fail) {
         make("p", {}, one.physics), make("p", {}, make("code", {}, one.equation)), one.confirm ? make("p", { className: "caption" }, `To confirm it: ${one.confirm}`) : null),
       toggle(state, one.effect, one.place, fail, `add-ranked-${k}`)),
     make("p", { className: "figures" }, make("span", {}, "error then ", make("b", {}, units(one.rmse))), make("span", { title: "fall of the Bayesian information criterion; below 6 is not significant" }, `BIC falls by ${one.evidence}`),
-      one.size ? make("span", {}, units(one.size)) : null, one.visible ? make("span", {}, "detectable from ", units(one.visible)) : null),
+      one.size ? make("span", {}, units(one.size)) : null, one.visible ? make("span", {}, "detectable ", units(one.visible)) : null),
     make("div", { className: "track" }, bar));
 }
 

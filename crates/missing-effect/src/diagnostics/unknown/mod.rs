@@ -27,7 +27,7 @@ const BAND: f64 = 1.96;
 /// A path is shown if its log-likelihood exceeds that of a constant by this.
 const MOVES: f64 = 5.0;
 /// Places of the missing term with restricted log-likelihoods within this distance of the best are not distinguished.
-pub const SAME_PLACE: f64 = 10.0;
+pub const PLACE_MARGIN: f64 = 10.0;
 /// A variable is named if it predicts clearly more than this share of the missing term on unseen data: a function of this variable alone is
 /// predicted nearly in full, and in a record with few values of the command each value belongs to a certain time ...
 const NAMED: f64 = 0.8;
@@ -124,7 +124,7 @@ pub(crate) fn unknown(node: &Node) -> Result<Option<Unknown>, Error> {
         .next()
         .filter(|s| s.share - CLEARLY * s.share_error > NAMED);
     // If the likelihood does not distinguish the pump and the first vessel, the vessel is reported.
-    let equal = |s: &&Smoothed| most - s.log_likelihood < SAME_PLACE;
+    let equal = |s: &&Smoothed| most - s.log_likelihood < PLACE_MARGIN;
     let Some(chosen) = (match &named {
         Some(shape) => smoothed.iter().find(|s| s.spot == shape.spot),
         None => smoothed

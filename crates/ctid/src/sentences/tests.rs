@@ -1,6 +1,6 @@
 //! Sentences of a few typical results.
 
-use missing_effect::{ControlLoop, NotNoise, NotSimulated, Remark, Verdict};
+use missing_effect::{ControlLoop, NotNoise, NotSimulated, PerOutput, Remark, Verdict};
 
 use super::of_diagnosis;
 use crate::report::sample;
@@ -90,6 +90,74 @@ fn remarks_follow_the_verdict_in_their_order() {
     );
 }
 
+/// All kinds of remarks at once: what was refused precedes the held-out error, the loop is last.
+#[test]
+fn the_order_of_remarks_does_not_depend_on_that_of_the_values() {
+    let mut found = sample::two_tanks();
+    let name = found.outputs[0].clone();
+    found.remarks = vec![
+        Remark::ColouredNoise { ratio: 2.34 },
+        Remark::Terms {
+            names: vec!["spill".to_string()],
+        },
+        Remark::EffectLimit { most: 2, needed: 3 },
+        Remark::ReplacedByTime {
+            effects: vec!["pump_gain_drift".to_string()],
+        },
+        Remark::BestPart {
+            effects: vec!["overflow".to_string()],
+            rmse_per_output: PerOutput(vec![(name.clone(), 0.2)]),
+        },
+        Remark::Quantisation {
+            output: name,
+            step: 0.3,
+            share: 0.5,
+        },
+    ];
+    if let Some(last) = found.steps.last_mut() {
+        last.weighted_rmse_test = Some(3.0 * last.weighted_rmse);
+    }
+    found.control_loop = Some(ControlLoop {
+        simulated: true,
+        feedback_p: None,
+        mismatch: Some(0.0123),
+        not_simulated: None,
+    });
+    let said = of_diagnosis(&found);
+    let position = |part: &str| {
+        let at = said.iter().position(|said| said.contains(part));
+        at.unwrap_or_else(|| panic!("{part}: {said:#?}"))
+    };
+    let order = [
+        position("multiples of 0.300 V"),
+        position("pump_gain_drift would explain more, but so would a function of time"),
+        position(
+            "The best significant effect, apart from functions of time, is overflow, with a residual of 0.200 V rms",
+        ),
+        position("On held-out data the simulation error is 3.0 times as large"),
+        position("The noise is coloured"),
+        position("Beside spill the standard errors are too small"),
+        position("The search was stopped at 2 effects"),
+        position("The loop is simulated from its reference"),
+    ];
+    assert!(order.is_sorted(), "{order:?}: {said:#?}");
+    assert!(said[order[7]].contains("to 0.0123 V rms"));
+}
+
+/// A result that an earlier version wrote has no reason.
+#[test]
+fn a_loop_without_a_reason_is_not_called_simulated() {
+    let mut found = sample::comparison();
+    found.control_loop = Some(ControlLoop {
+        simulated: false,
+        feedback_p: None,
+        mismatch: None,
+        not_simulated: None,
+    });
+    let said = of_diagnosis(&found).pop().unwrap_or_default();
+    assert!(said.starts_with("The loop is not simulated."), "{said}");
+}
+
 #[test]
 fn a_loop_that_is_not_simulated_says_why() {
     let mut found = sample::comparison();
@@ -108,6 +176,28 @@ fn a_loop_that_is_not_simulated_says_why() {
             NotSimulated::AsRequested,
             None,
             ["as was asked for", "The model runs on the measured command"],
+        ),
+        (
+            NotSimulated::MissingReadings {
+                record: record.clone(),
+            },
+            None,
+            ["readings are missing in rig", "cannot be checked"],
+        ),
+        (
+            NotSimulated::UnknownController { lags: 3 },
+            None,
+            [
+                "the command depends on the last 3 residuals",
+                "no [controller]",
+            ],
+        ),
+        (
+            NotSimulated::CommandNotHeld {
+                record: record.clone(),
+            },
+            None,
+            ["The loop is not simulated: rig", "straight line"],
         ),
         (
             NotSimulated::NoReference {

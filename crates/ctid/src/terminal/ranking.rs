@@ -23,7 +23,7 @@ enum Ranked {
 
 /// The single effects at the first step, best first.
 pub(crate) fn ranking(diagnosis: &Diagnosis, look: Look) -> String {
-    use Ranked::{Effect, Error, Gain, Place, Size, SizeAlone, Detectable};
+    use Ranked::{Detectable, Effect, Error, Gain, Place, Size, SizeAlone};
     if diagnosis.scores.is_empty() {
         return String::new();
     }

@@ -2,7 +2,8 @@
 
 use ct_signals::{Channel, Record, excitation, noise};
 use missing_effect::{
-    Diagnosis, Error, Fitted, Options, Problem, ProblemBuilder, design, diagnose,
+    Diagnosis, Error, Fitted, NotNoise, NotSimulated, Options, Problem, ProblemBuilder, Remark,
+    design, diagnose,
 };
 use plants::{Known, Plant};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -41,6 +42,47 @@ fn a_diagnosis_is_read_again() {
         serde_json::from_str::<Diagnosis>(&broken).is_err(),
         broken != text
     );
+}
+
+/// Numbers that JSON cannot hold are read as NaN, and do not make a result unreadable.
+#[test]
+fn findings_are_read_again() {
+    let read = |value: &serde_json::Value| serde_json::from_value::<NotNoise>(value.clone());
+    let drift = NotNoise::Slow {
+        output: "y".to_string(),
+        correlation_time: f64::INFINITY,
+        time_constant: 140.0,
+    };
+    let again = read(&serde_json::to_value(&drift).unwrap()).unwrap();
+    assert!(
+        matches!(again, NotNoise::Slow { correlation_time, time_constant, .. } if correlation_time.is_nan() && time_constant == 140.0)
+    );
+    let noisy = Remark::ColouredNoise {
+        ratio: f64::INFINITY,
+    };
+    let again: Remark = serde_json::from_value(serde_json::to_value(&noisy).unwrap()).unwrap();
+    assert!(matches!(again, Remark::ColouredNoise { ratio } if ratio.is_nan()));
+    let other = NotSimulated::OtherController {
+        share: f64::INFINITY,
+    };
+    let again: NotSimulated =
+        serde_json::from_value(serde_json::to_value(&other).unwrap()).unwrap();
+    assert!(matches!(again, NotSimulated::OtherController { share } if share.is_nan()));
+    // Finite values come back as they are.
+    for remark in [
+        Remark::EffectLimit { most: 1, needed: 2 },
+        Remark::Quantisation {
+            output: "y".to_string(),
+            step: 0.1,
+            share: 0.5,
+        },
+        Remark::ReplacedByTime {
+            effects: vec!["pump_gain_drift".to_string()],
+        },
+    ] {
+        let value = serde_json::to_value(&remark).unwrap();
+        assert_eq!(serde_json::from_value::<Remark>(value).unwrap(), remark);
+    }
 }
 
 #[test]

@@ -13,7 +13,7 @@ from . import _ctid
 from ._design import Design
 from ._frames import Array, table
 from ._model import Model
-from ._options import SEED, Effort, Progress, clear_line, phase_printer
+from ._options import SEED, Effort, Progress, phases
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,7 +145,7 @@ class Diagnosis:
         seed: int = SEED,
         progress: Progress = True,
     ) -> Design:
-        """Proposes the next experiment, which tells two effects apart, as `ctid design` does.
+        """Proposes the next experiment, which distinguishes two effects, as `ctid design` does.
 
         `ranges`: smallest and largest value of inputs, in their units; without them what the records visited. `slews`: the largest change in a second.
         `inputs`: those that are applied; without them all that have a range or moved. `duration` in s; without it that of the longest record.
@@ -154,7 +154,7 @@ class Diagnosis:
         """
         first, second = between
         applied = list(inputs) if inputs is not None else list(ranges or {})
-        try:
+        with phases(progress) as on_phase:
             found, time_unit = self._native.design(
                 (str(first), str(second)),
                 ranges={name: (float(low), float(high)) for name, (low, high) in (ranges or {}).items()},
@@ -164,10 +164,8 @@ class Diagnosis:
                 seed=seed,
                 effort=effort,
                 time_limit=time_limit,
-                progress=phase_printer(progress),
+                progress=on_phase,
             )
-        finally:
-            clear_line(progress)
         return Design(json.loads(found), time_unit)
 
     def plot(self, ax: Any = None) -> Any:

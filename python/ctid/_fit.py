@@ -16,7 +16,7 @@ from ._frames import (
     Array,
     Data,
     Records,
-    index_of,
+    band_table,
     need_pandas,
     series,
     table,
@@ -24,7 +24,7 @@ from ._frames import (
     to_frames,
 )
 from ._model import Model
-from ._options import SEED, Effort, Progress, clear_line, phase_printer
+from ._options import SEED, Effort, Progress, phases
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -189,14 +189,8 @@ class Fit:
         present = [c for _, c in model.outputs if any(str(n) == c or str(n).split(" [")[0] == c for n in names)]
         frame = to_frame(data, "test", signals + present)
         found = self._native.simulate(frame, first, 0.95 if interval is None else interval)
-        columns: dict[Any, Array] = {}
-        for (output, _), found_series in zip(model.outputs, found["outputs"].values(), strict=True):
-            for name, values in found_series.items():
-                if interval is not None or name == "mean":
-                    columns[output, name] = values
-        rows = next(iter(columns.values())).size
-        result: pd.DataFrame = table(columns, index_of(data, rows))
-        return result
+        outputs = [name for name, _ in model.outputs]
+        return band_table(zip(outputs, found["outputs"].values(), strict=True), data, interval)
 
     def failures(self) -> pd.DataFrame:
         """Where the model fails on its records: windows of time, levels, inputs, directions and frequencies whose error is above the noise.
@@ -274,17 +268,15 @@ class Fit:
         frames = to_frames(test, "test", self._wanted) if test is not None else []
         if max_effects is not None and max_effects < 1:
             raise ModelError("max_effects is a whole number above zero")
-        try:
+        with phases(progress) as on_phase:
             found = self._native.diagnose(
                 frames,
                 effort=effort,
                 time_limit=time_limit,
                 max_effects=max_effects,
                 seed=seed,
-                progress=phase_printer(progress),
+                progress=on_phase,
             )
-        finally:
-            clear_line(progress)
         return Diagnosis(found)
 
     def to_dict(self) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
@@ -218,3 +218,15 @@ def row_count(data: Data) -> int:
     if isinstance(data, Mapping):
         return max((np.asarray(values).size for values in data.values()), default=0)
     return len(data)
+
+
+def band_table(outputs: Iterable[tuple[str, Mapping[str, Array]]], data: Data, interval: float | None) -> pd.DataFrame:
+    """A simulation as a table: `mean`, and with an interval `lower` and `upper`, of each output; the index is that of the data."""
+    columns: dict[Any, Array] = {}
+    for output, band in outputs:
+        for name, values in band.items():
+            if interval is not None or name == "mean":
+                columns[output, name] = values
+    rows = next(iter(columns.values())).size
+    result: pd.DataFrame = table(columns, index_of(data, rows))
+    return result

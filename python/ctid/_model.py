@@ -17,8 +17,7 @@ from ._options import (
     STARTS,
     Hold,
     Progress,
-    clear_line,
-    phase_printer,
+    phases,
 )
 
 if TYPE_CHECKING:
@@ -159,10 +158,8 @@ class Model:
         wanted = [column for _, column in native.inputs + native.outputs]
         records = as_list(data)
         frames = to_frames(records, "data", wanted)
-        try:
-            fitted = native.fit(frames, starts=starts, seed=seed, noise_order=noise_order, progress=phase_printer(progress))
-        finally:
-            clear_line(progress)
+        with phases(progress) as on_phase:
+            fitted = native.fit(frames, starts=starts, seed=seed, noise_order=noise_order, progress=on_phase)
         from ._fit import Fit
 
         return Fit(fitted, [index_of(record, row_count(record)) for record in records])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Literal
 
 #: How much time a search may take: 5 s, 40 s, 10 min.
@@ -17,16 +18,17 @@ Progress = bool | Callable[[str], object]
 STARTS, SEED, NOISE_ORDER = 12, 1, 6
 
 
-def phase_printer(progress: Progress) -> Callable[[str], object] | None:
-    """What is called with every phase that begins; None prints nothing."""
-    if callable(progress):
-        return progress
-    if progress and sys.stderr.isatty():
-        return lambda phase: print(f"\r\x1b[K{phase} ...", end="", file=sys.stderr, flush=True)
-    return None
-
-
-def clear_line(progress: Progress) -> None:
-    """Clears the line of the last phase from the terminal."""
-    if progress is True and sys.stderr.isatty():
-        print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+@contextmanager
+def phases(progress: Progress) -> Iterator[Callable[[str], object] | None]:
+    """What is called with every phase that begins, None to print nothing; at the end the line of the last phase is cleared."""
+    printed = progress is True and sys.stderr.isatty()
+    try:
+        if callable(progress):
+            yield progress
+        elif printed:
+            yield lambda phase: print(f"\r\x1b[K{phase} ...", end="", file=sys.stderr, flush=True)
+        else:
+            yield None
+    finally:
+        if printed:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)

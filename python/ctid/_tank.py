@@ -13,9 +13,17 @@ from ._ctid import ModelError
 from ._design import Design
 from ._diagnosis import Diagnosis
 from ._fit import Fit
-from ._frames import Array, Data, Records, index_of, table, to_frame, to_frames
+from ._frames import (
+    Array,
+    Data,
+    Records,
+    band_table,
+    table,
+    to_frame,
+    to_frames,
+)
 from ._model import Model
-from ._options import SEED, Effort, Progress, clear_line, phase_printer
+from ._options import SEED, Effort, Progress, phases
 from ._tank_model import TankModel
 from ._tank_plant import designed
 
@@ -85,14 +93,7 @@ class TankFit(Fit):
         present = [c for c in model.outputs if any(n == c or n.split(" [")[0] == c for n in names)]
         frame = to_frame(data, "test", model.inputs + present)
         found = self._native.simulate(frame, first, 0.95 if interval is None else interval)
-        columns: dict[Any, Array] = {}
-        for output, values in found["outputs"].items():
-            for name, column in values.items():
-                if interval is not None or name == "mean":
-                    columns[output, name] = column
-        rows = next(iter(columns.values())).size
-        result: pd.DataFrame = table(columns, index_of(data, rows))
-        return result
+        return band_table(found["outputs"].items(), data, interval)
 
     def diagnose(
         self,
@@ -108,12 +109,10 @@ class TankFit(Fit):
         frames = to_frames(test, "test", self._wanted) if test is not None else []
         if max_effects is not None and max_effects < 1:
             raise ModelError("max_effects is a whole number above zero")
-        try:
+        with phases(progress) as on_phase:
             found = self._tank.diagnose(
-                frames, effort=effort, time_limit=time_limit, max_effects=max_effects, seed=seed, progress=phase_printer(progress)
+                frames, effort=effort, time_limit=time_limit, max_effects=max_effects, seed=seed, progress=on_phase
             )
-        finally:
-            clear_line(progress)
         kept = (self._tank.to_bytes(), self._tank.units)
         return TankDiagnosis(found.json(), found.sentences, found.html(), (found.series, found.output_units), self._parts, kept)
 
@@ -212,7 +211,7 @@ class TankDiagnosis(Diagnosis):
         seed: int = SEED,
         progress: Progress = True,
     ) -> Design:
-        """Proposes the next experiment, which tells two effects apart, as `ctid design` does; see `Diagnosis.design`.
+        """Proposes the next experiment, which distinguishes two effects, as `ctid design` does; see `Diagnosis.design`.
 
         Effects are those of `ctid effects`; of several tanks `overflow:upper` says which. The only input has a range and a slew.
         """

@@ -15,7 +15,7 @@ from ._frames import Records, as_list, index_of, row_count, series, to_frames
 from ._linear import StateSpace, _guess
 from ._model import Model
 from ._monitor import Monitor
-from ._options import NOISE_ORDER, SEED, STARTS, Hold, Progress, clear_line, phase_printer
+from ._options import NOISE_ORDER, SEED, STARTS, Hold, Progress, phases
 from ._tank_plant import linearized, monitored
 
 if TYPE_CHECKING:
@@ -149,10 +149,8 @@ class TankModel(Model):
 
         model = TankModel(parts)
         frames = to_frames(records, "data", [*u, *y])
-        try:
-            fitted = model._native.fit(frames, progress=phase_printer(progress))
-        finally:
-            clear_line(progress)
+        with phases(progress) as on_phase:
+            fitted = model._native.fit(frames, progress=on_phase)
         return TankFit(fitted, [index_of(record, row_count(record)) for record in records], parts)
 
     def to_modelica(self) -> str:

@@ -12,7 +12,7 @@ from ._design import Design
 from ._frames import table
 from ._linear import StateSpace, state_space
 from ._monitor import Monitor
-from ._options import Progress, clear_line, phase_printer
+from ._options import Progress, phases
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,13 +56,13 @@ def designed(
     seed: int,
     progress: Progress,
 ) -> TankDesign:
-    """The experiment that tells two effects apart; `content`: the plant and its records as a fit of it is pickled."""
+    """The experiment that distinguishes two effects; `content`: the plant and its records as a fit of it is pickled."""
     first, second = between
     for name in inputs:
         _of_the_only("inputs", {name: None}, applied, plant)
     found = _of_the_only("ranges", ranges, applied, plant)
     slew = _of_the_only("slews", slews, applied, plant)
-    try:
+    with phases(progress) as on_phase:
         text = _ctid.tank_design(
             content,
             (str(first), str(second)),
@@ -72,10 +72,8 @@ def designed(
             seed=seed,
             effort=effort,
             time_limit=time_limit,
-            progress=phase_printer(progress),
+            progress=on_phase,
         )
-    finally:
-        clear_line(progress)
     return TankDesign(json.loads(text), 1.0)
 
 

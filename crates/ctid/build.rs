@@ -1,5 +1,5 @@
 //! Packs the plotting script of the report: plotly.js as the `plotly` crate carries it (without
-//! MathJax), gzipped and in base64, so that a report can hold it and unpack it without a network.
+//! MathJax), gzipped, so that a report can hold it and unpack it without a network.
 //!
 //! For the tests it sets `cfg(strace)` where strace can make calls of the system fail; where it cannot those tests are ignored.
 
@@ -8,7 +8,6 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use base64::Engine;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
@@ -22,9 +21,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         plotting_script(&sources).ok_or("the plotly crate no longer leads with plotly.js")?;
     let mut packed = GzEncoder::new(Vec::new(), Compression::best());
     packed.write_all(script.as_bytes())?;
-    let text = base64::engine::general_purpose::STANDARD.encode(packed.finish()?);
     let folder = std::env::var("OUT_DIR")?;
-    std::fs::write(Path::new(&folder).join("plotly.js.gz.base64"), text)?;
+    std::fs::write(Path::new(&folder).join("plotly.js.gz"), packed.finish()?)?;
     println!("cargo:rerun-if-env-changed=PATH");
     println!("cargo:rustc-check-cfg=cfg(strace)");
     if calls_can_fail() {

@@ -13,9 +13,9 @@ use crate::look::Look;
 use crate::progress::Bar;
 use crate::{Error, edit, output, terminal};
 
-const DATA: (&str, &str) = ("tour.csv", include_str!("../records/tour.csv"));
-const TEST: (&str, &str) = ("tour-test.csv", include_str!("../records/tour-test.csv"));
-const MODEL: (&str, &str) = ("tour.toml", include_str!("../records/tour.toml"));
+static DATA: (&str, &str) = ("tour.csv", include_str!("../records/tour.csv"));
+static TEST: (&str, &str) = ("tour-test.csv", include_str!("../records/tour-test.csv"));
+static MODEL: (&str, &str) = ("tour.toml", include_str!("../records/tour.toml"));
 
 /// Files of the tour.
 #[derive(Debug)]

@@ -1,14 +1,17 @@
 //! Parts that every page shares: the frame that contains style, data and scripts, and the places for its content.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
 use super::text::escape;
 
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
                       img-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'";
-pub(crate) const STYLE: &str = include_str!("report.css");
+pub(crate) static STYLE: &str = include_str!("report.css");
 /// Colours, axes and the unpacking of plotly.js: included before the page's own script.
-pub(crate) const PLOTS: &str = include_str!("plots.js");
-/// plotly.js, gzipped, in base64.
-pub(crate) const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js.gz.base64"));
+pub(crate) static PLOTS: &str = include_str!("plots.js");
+/// plotly.js, gzipped. A `static`: the program contains a constant once for each place that uses it.
+pub(crate) static PLOTLY: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/plotly.js.gz"));
 
 /// Message on a page whose scripts do not run.
 pub(super) const NOTICES: &str = "<noscript><p class=\"notice\">The plots need a browser that runs scripts; \
@@ -45,6 +48,7 @@ pub(super) fn html(page: &Page) -> String {
         data,
         script,
     } = page;
+    let plotly = STANDARD.encode(PLOTLY);
     format!(
         "{}\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
@@ -52,7 +56,7 @@ pub(super) fn html(page: &Page) -> String {
          <link rel=\"icon\" href=\"data:,\">\n\
          <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}\n\
          <script type=\"application/json\" id=\"data\">{data}</script>\n\
-         <script type=\"text/plain\" id=\"plotly\">{PLOTLY}</script>\n\
+         <script type=\"text/plain\" id=\"plotly\">{plotly}</script>\n\
          <script>\n{PLOTS}{script}</script>\n</body>\n</html>\n",
         head()
     )

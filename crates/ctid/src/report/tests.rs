@@ -335,7 +335,7 @@ fn long_records_with_gaps_make_a_page_of_sensible_size() {
     let started = std::time::Instant::now();
     let page = html(&sample::awkward());
     assert!(
-        page.len() < page::PLOTLY.len() + 4_000_000,
+        page.len() < page::PLOTLY.len() * 4 / 3 + 4_000_000,
         "{} bytes",
         page.len()
     );

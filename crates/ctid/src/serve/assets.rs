@@ -1,12 +1,11 @@
 //! Files of the page. All are built into the program; the script of the plots is that of the report.
 
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
 use axum::Router;
 use axum::http::header;
 use axum::response::IntoResponse;
 use axum::routing::get;
-use base64::Engine;
 
 use super::App;
 use crate::report;
@@ -16,7 +15,7 @@ const STYLE: &str = "text/css; charset=utf-8";
 const PAGE: &str = "text/html; charset=utf-8";
 
 /// Path, kind and content of constant files.
-const FILES: [(&str, &str, &str); 18] = [
+static FILES: [(&str, &str, &str); 18] = [
     ("/", PAGE, include_str!("page/index.html")),
     ("/report.css", STYLE, report::STYLE),
     ("/page.css", STYLE, include_str!("page/page.css")),
@@ -45,13 +44,6 @@ const FILES: [(&str, &str, &str); 18] = [
     ("/experiment.js", SCRIPT, include_str!("page/experiment.js")),
 ];
 
-/// plotly.js, gzipped.
-static PLOTLY: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    // The build script has written it, so it can be read.
-    let packed = base64::engine::general_purpose::STANDARD.decode(report::PLOTLY);
-    packed.unwrap_or_default()
-});
-
 pub(super) fn routes() -> Router<Arc<App>> {
     let mut router = Router::new().route("/plotly.js", get(plotly));
     for (path, kind, content) in FILES {
@@ -66,5 +58,5 @@ async fn plotly() -> impl IntoResponse {
         (header::CONTENT_TYPE, SCRIPT),
         (header::CONTENT_ENCODING, "gzip"),
     ];
-    (headers, PLOTLY.as_slice())
+    (headers, report::PLOTLY)
 }

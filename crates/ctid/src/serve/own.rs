@@ -31,7 +31,7 @@ const DRAWN: usize = 2000;
 /// Name of the model file in messages and downloads.
 pub(super) const FILE: &str = "model.toml";
 /// Initial text of the page.
-const TEMPLATE: &str = include_str!("page/template.mo");
+static TEMPLATE: &str = include_str!("page/template.mo");
 
 /// An example: name, text, model file, record.
 type Example = (&'static str, &'static str, &'static str, &'static str);
@@ -47,7 +47,7 @@ macro_rules! examples {
     };
 }
 
-const EXAMPLES: [Example; 8] = examples!(
+static EXAMPLES: [Example; 8] = examples!(
     "heated-block",
     "coupled-heaters",
     "quadruple-tank",

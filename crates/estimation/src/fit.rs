@@ -1,15 +1,17 @@
 //! Fits from many starts with a noise model as weighting, estimation of the noise model, and the uncertainty of the parameters.
 
+mod end;
 mod prewhitened;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use self::end::End;
 pub use self::prewhitened::{coloured, noise_of, prewhitened};
 use crate::{
-    Error, Noise, Residuals, Squares, Stop, Stopping, Triangle, costs_more,
-    levenberg_marquardt::held, levenberg_marquardt::minimise, levenberg_marquardt::within,
-    linearise_below, prior::begin_near_priors, prior::free_priors, squares,
+    Error, Noise, Residuals, Stop, Stopping, Triangle, costs_more, levenberg_marquardt::held,
+    levenberg_marquardt::minimise, levenberg_marquardt::within, linearise_below,
+    prior::begin_near_priors, prior::free_priors, squares,
 };
 
 /// Two results are the same minimum if twice the logarithm of their likelihood ratio is below this.
@@ -50,8 +52,10 @@ pub struct Fit {
     pub stop: Stop,
     /// The R factor at the minimum.
     pub triangle: Triangle,
-    /// Positions (among the fitted entries) of the parameters that are not held at a bound.
+    /// Positions (among the fitted entries) of the parameters that are not held at a bound and whose columns are independent.
     interior: Vec<usize>,
+    /// Positions of the parameters that can be changed together without a change of the residual.
+    undetermined: Vec<usize>,
     free: Vec<usize>,
     /// Degrees of freedom of the variance of every interior entry.
     freedom: Vec<f64>,
@@ -144,17 +148,34 @@ impl Fit {
         self.spread((0..self.interior.len()).map(|i| (covariance[i][i] * variance).sqrt()))
     }
 
-    /// Values of the entries that are not at a bound, in their places of the vector; `None` for the others.
+    /// Values of the columns of [`Self::interior`] in the places of their entries of the vector; `None` for the entries that are fixed, held at
+    /// a bound, or not determined.
     #[must_use]
     pub fn spread(&self, values: impl Iterator<Item = f64>) -> Vec<Option<f64>> {
         let mut all = vec![None; self.x.len()];
-        for (&column, value) in self.interior.iter().zip(values) {
-            all[self.free[column]] = Some(value);
+        let values: Vec<f64> = values.collect();
+        for i in self.determined() {
+            all[self.free[self.interior[i]]] = values.get(i).copied();
         }
         all
     }
 
-    /// Columns of the R factor whose parameters are not at a bound.
+    /// Whether the rows determine every parameter that is not held at a bound and has an influence on them. If not, some parameters may be
+    /// changed together without a change of the residual, and a prediction outside the fitted rows has no standard error.
+    #[must_use]
+    pub fn is_determined(&self) -> bool {
+        self.undetermined.is_empty()
+    }
+
+    /// Positions in [`Self::interior`] of the parameters that the rows determine.
+    #[must_use]
+    pub fn determined(&self) -> Vec<usize> {
+        (0..self.interior.len())
+            .filter(|&i| !self.undetermined.contains(&self.interior[i]))
+            .collect()
+    }
+
+    /// Columns of the R factor that are independent and whose parameters are not at a bound.
     #[must_use]
     pub fn interior(&self) -> &[usize] {
         &self.interior
@@ -181,22 +202,14 @@ impl Fit {
     #[must_use]
     pub fn correlations(&self) -> Option<(Vec<usize>, Vec<Vec<f64>>)> {
         let covariance = self.triangle.covariance(&self.interior)?;
-        let matrix = covariance
-            .iter()
-            .enumerate()
-            .map(|(i, row)| {
-                row.iter()
-                    .enumerate()
-                    .map(|(j, c)| c / (covariance[i][i] * covariance[j][j]).sqrt())
-                    .collect()
-            })
-            .collect();
+        let determined = self.determined();
+        let correlation =
+            |i: usize, j: usize| covariance[i][j] / (covariance[i][i] * covariance[j][j]).sqrt();
+        let of_row = |&i: &usize| determined.iter().map(|&j| correlation(i, j)).collect();
+        let entry = |&i: &usize| self.free[self.interior[i]];
         Some((
-            self.interior
-                .iter()
-                .map(|&column| self.free[column])
-                .collect(),
-            matrix,
+            determined.iter().map(entry).collect(),
+            determined.iter().map(of_row).collect(),
         ))
     }
 }
@@ -309,7 +322,7 @@ pub fn fit_from(
         .into_iter()
         .find(|(_, minimum)| minimum.triangle.cost() <= best)
         .ok_or(Error::NoFiniteStart { starts: count })?;
-    let interior: Vec<usize> = (0..free.len())
+    let inside: Vec<usize> = (0..free.len())
         .filter(|&j| {
             // A parameter without influence on any sample has no standard error, such as the initial state of a lag with time constant
             // zero.
@@ -317,6 +330,7 @@ pub fn fit_from(
                 && !held(minimum.x[j], bounds[j], minimum.triangle.descent(j))
         })
         .collect();
+    let (interior, undetermined) = minimum.triangle.independent_among(&inside);
     let cost = minimum.triangle.cost();
     let n = samples as f64;
     let end = End::of(model, &x, noise).ok_or(Error::NoFiniteStart { starts: count })?;
@@ -340,6 +354,7 @@ pub fn fit_from(
         stop: minimum.stop,
         triangle: minimum.triangle,
         freedom: Vec::new(),
+        undetermined,
         interior,
         free: free.to_vec(),
     };
@@ -348,50 +363,4 @@ pub fn fit_from(
     let sigma = fit.variance().sqrt();
     fit.triangle = fit.triangle.with_prior_weight(sigma);
     Ok(fit)
-}
-
-/// Results of one pass over the residuals at the end of a fit.
-struct End {
-    rmse: Vec<f64>,
-    weights: Vec<f64>,
-    prior_weight: f64,
-    of_samples: f64,
-    /// Logarithm of the determinant of the noise's covariance, for innovations of variance 1.
-    log_det: f64,
-}
-
-impl End {
-    fn of(model: &impl Residuals, x: &[f64], noise: &Noise) -> Option<Self> {
-        let samples = model.samples();
-        let mut sums = vec![0.0; samples.len()];
-        let mut whiteners = noise.whiteners(1);
-        let mut squares = Squares::of(model, x);
-        let mut log_det = 0.0;
-        model.each_residual(x, |sample, row| {
-            let whitener = &mut whiteners[sample.output];
-            if sample.first {
-                whitener.reset();
-            }
-            if sample.missing {
-                whitener.skip();
-                return true;
-            }
-            sums[sample.output] += row[0] * row[0];
-            let variance = whitener.push_with_variance(row);
-            // Late rows hardly change with the memory.
-            if variance != 1.0 {
-                log_det += variance.ln();
-            }
-            squares.sums[sample.output] += row[0] * row[0];
-            true
-        })?;
-        let of_output = |(sum, &count): (&f64, &usize)| (sum / count.max(1) as f64).sqrt();
-        Some(Self {
-            rmse: sums.iter().zip(samples).map(of_output).collect(),
-            weights: squares.weights(),
-            prior_weight: squares.prior_weight(),
-            of_samples: squares.of_samples(),
-            log_det,
-        })
-    }
 }

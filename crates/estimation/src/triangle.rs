@@ -1,5 +1,6 @@
 //! Recursive least squares by QR factorisation: an upper triangle R that is updated with rows, in `O(p^2)` memory.
 
+mod determined;
 mod outputs;
 
 use serde::{Deserialize, Serialize};
@@ -253,17 +254,6 @@ impl Triangle {
         self.r.iter().all(|value| value.is_finite())
     }
 
-    /// Whether no column of J is a combination of earlier columns to within `1e-10` of its length: the rows determine all parameters.
-    #[must_use]
-    pub fn determined(&self) -> bool {
-        (0..self.columns - 1).all(|j| self.independent(j))
-    }
-
-    fn independent(&self, j: usize) -> bool {
-        let own = self.at(j, j);
-        own.abs() > 1e-10 * self.column_norm(j) && own.is_finite()
-    }
-
     /// The R factor of the same rows plus damping: `J'J + damping diag(scale_j^2)` instead of `J'J`.
     #[must_use]
     pub fn damped(&self, scale: &[f64], damping: f64) -> Self {
@@ -294,40 +284,6 @@ impl Triangle {
             self.push(&row);
         }
         self.rows = rows;
-    }
-
-    /// The inverse of `J'J` over the `free` parameters, row by row; `None` where a column is a combination of the
-    /// others to within `1e-10` of its length.
-    #[must_use]
-    pub fn covariance(&self, free: &[usize]) -> Option<Vec<Vec<f64>>> {
-        let p = free.len();
-        let system = self.select(free);
-        let mut inverse = vec![vec![0.0; p]; p];
-        for i in (0..p).rev() {
-            if !system.independent(i) {
-                return None;
-            }
-            let diagonal = system.at(i, i);
-            inverse[i][i] = 1.0 / diagonal;
-            let (above, below) = inverse.split_at_mut(i + 1);
-            for (j, entry) in above[i].iter_mut().enumerate().skip(i + 1) {
-                let sum: f64 = below
-                    .iter()
-                    .zip(i + 1..=j)
-                    .map(|(row, k)| system.at(i, k) * row[j])
-                    .sum();
-                *entry = -sum / diagonal;
-            }
-        }
-        Some(
-            (0..p)
-                .map(|i| {
-                    (0..p)
-                        .map(|j| (i.max(j)..p).map(|k| inverse[i][k] * inverse[j][k]).sum())
-                        .collect()
-                })
-                .collect(),
-        )
     }
 }
 

@@ -48,6 +48,9 @@ impl FitUncertainty {
         parameters: usize,
         order: usize,
     ) -> Result<Option<Self>, Error> {
+        if !fit.is_determined() {
+            return Ok(None);
+        }
         let (covariance, freedom, noise) = if fit.noise.order() > 0 {
             let variance = fit.variance();
             let scaled = |mut rows: Vec<Vec<f64>>| {
@@ -216,7 +219,7 @@ impl InitialStates {
         };
         // A state without influence on any reading is neither at a bound nor known.
         let silent = |c: usize| fit.triangle.column_norm(c) <= 0.0;
-        if (0..free_states).any(silent) {
+        if !fit.is_determined() || (0..free_states).any(silent) {
             return Ok(None);
         }
         let of_parameters: Vec<Option<usize>> =

@@ -125,9 +125,15 @@ impl Fit {
         let Some(matrix) = robust.and_then(|robust| robust.covariance) else {
             return Ok(None);
         };
-        let free = setup.free();
-        let interior = self.fitted.estimate().interior();
-        let names = interior.iter().map(|&i| setup.names()[free[i]].clone());
+        let fit = self.fitted.estimate();
+        let (free, interior, determined) = (setup.free(), fit.interior(), fit.determined());
+        let names = determined
+            .iter()
+            .map(|&i| setup.names()[free[interior[i]]].clone());
+        let matrix: Vec<Vec<f64>> = determined
+            .iter()
+            .map(|&i| determined.iter().map(|&j| matrix[i][j]).collect())
+            .collect();
         let matrix = PyArray2::from_vec2(py, &matrix);
         let matrix = matrix.map_err(|error| error::of_data(error.to_string()))?;
         Ok(Some((names.collect(), matrix)))

@@ -183,3 +183,44 @@ fn a_combination_of_columns_has_no_covariance() {
     assert!(triangle.covariance(&[0, 1, 2]).is_none() && !triangle.determined());
     assert!(triangle.covariance(&[0, 1]).is_some());
 }
+
+/// A column that is a combination of two others: the three have no variance, and the fourth has that of all rows without the combination.
+#[test]
+fn a_combination_of_columns_leaves_the_others_determined() {
+    let rows = rows(200, 4);
+    let combined = |row: &Vec<f64>| {
+        let mut row = row.clone();
+        row[3] = 0.5 * row[0] - 40.0 * row[2];
+        row
+    };
+    let of = |rows: &[Vec<f64>]| {
+        let mut triangle = Triangle::new(rows[0].len());
+        rows.iter().for_each(|row| triangle.push(row));
+        triangle.finish();
+        triangle
+    };
+    let all = of(&rows);
+    assert_eq!(
+        all.independent_among(&[3, 0, 1, 2]),
+        (vec![3, 0, 1, 2], vec![])
+    );
+    let dependent = of(&rows.iter().map(combined).collect::<Vec<_>>());
+    assert!(!dependent.determined());
+    assert!(dependent.covariance(&[0, 1, 2, 3]).is_none());
+    for order in [[0, 1, 2, 3], [3, 1, 0, 2], [2, 3, 1, 0]] {
+        let (independent, mut combined) = dependent.independent_among(&order);
+        combined.sort_unstable();
+        assert_eq!(combined, [0, 2, 3]);
+        assert_eq!(independent.len(), 3);
+        let at = independent.iter().position(|&column| column == 1).unwrap();
+        assert_relative_eq!(
+            dependent.covariance(&independent).unwrap()[at][at],
+            all.covariance(&[0, 1, 2]).unwrap()[1][1],
+            max_relative = 1e-9
+        );
+    }
+    assert_eq!(
+        dependent.independent_among(&[0, 1, 3]),
+        (vec![0, 1, 3], vec![])
+    );
+}

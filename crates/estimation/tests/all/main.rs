@@ -3,3 +3,4 @@
 
 mod priors;
 mod results;
+mod undetermined;

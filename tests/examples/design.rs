@@ -19,8 +19,8 @@ use ctid_tests::{Drive, Rig};
 use missing_effect::design::Design;
 use rayon::prelude::*;
 
-/// Records that are diagnosed side by side, and the most that are drawn.
-const BATCH: u64 = 24;
+/// Most records that are diagnosed side by side, and that are drawn.
+const BATCH: usize = 24;
 const MOST: u64 = 960;
 
 #[derive(Parser)]
@@ -49,14 +49,15 @@ fn found(rig: Rig, seed: u64) -> Option<Found> {
     Some(Found { case, plan, answer })
 }
 
-/// The records in their order, batch by batch.
-fn batches(seed: Option<u64>) -> Box<dyn Iterator<Item = Vec<Option<Found>>>> {
+/// The records in their order, in batches of so many.
+fn batches(seed: Option<u64>, batch: usize) -> Box<dyn Iterator<Item = Vec<Option<Found>>>> {
     match seed {
-        None => {
-            Box::new(SEEDS.map(|seed| ROWS.par_iter().map(|row| found(rig(row), seed)).collect()))
-        }
-        Some(seed) => Box::new((0..MOST / BATCH).map(move |batch| {
-            (batch * BATCH..(batch + 1) * BATCH)
+        None => Box::new(SEEDS.flat_map(move |seed| {
+            let rows = ROWS.chunks(batch);
+            rows.map(move |rows| rows.par_iter().map(|row| found(rig(row), seed)).collect())
+        })),
+        Some(seed) => Box::new((0..MOST).step_by(batch).map(move |first| {
+            (first..(first + batch as u64).min(MOST))
                 .into_par_iter()
                 .map(|k| {
                     let number = seed * 1_000_000 + k;
@@ -74,7 +75,8 @@ fn main() {
     println!(
         "case  plant                 loop  truth                 against               group  experiment               power  decides  times  pair  alone  then"
     );
-    for found in batches(arguments.seed).flatten() {
+    let batch = arguments.cases.clamp(2, BATCH);
+    for found in batches(arguments.seed, batch).flatten() {
         if cases == arguments.cases {
             break;
         }

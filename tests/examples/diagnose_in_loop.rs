@@ -1,7 +1,7 @@
 //! Diagnoses in closed loop, on the measured command and in the simulated loop: effects, groups, false claims, seconds.
 //!
 //! `cargo run --release -p ctid-tests --example diagnose_in_loop -- 12`; the records of a cell, then the correlation of the
-//! coloured noise (0.9) and one plant (all).
+//! coloured noise (0.9) and only cells whose plant, effect and correlation contain this, as `single-tank/overflow/` (all).
 
 use ctid_tests::{Drive, Rig};
 use missing_effect::{Diagnosis, Options, Verdict, diagnose};
@@ -64,13 +64,18 @@ fn main() {
         "plant", "hidden", "colour", "way"
     );
     for (rig, effects) in &rigs {
-        if only.as_ref().is_some_and(|plant| plant != rig.plant.id()) {
-            continue;
-        }
         for hidden in effects.iter() {
             for colour in [0.0, slow, 0.98] {
                 // The slowest noise is the trap for false claims.
                 if hidden.is_some() && colour > 0.95 {
+                    continue;
+                }
+                let effect = hidden.map_or("nothing".to_string(), |(effect, size)| {
+                    format!("{effect} {size}")
+                });
+                let name = hidden.map_or("nothing", |(effect, _)| effect);
+                let cell = format!("{}/{name}/{colour}/", rig.plant.id());
+                if only.as_ref().is_some_and(|only| !cell.contains(only)) {
                     continue;
                 }
                 for simulate_loop in [false, true] {
@@ -104,9 +109,7 @@ fn main() {
                     println!(
                         "{:<20} {:<16} {:<7} {:<9} {:>2}/{:<2}  {:>14}  {:>5}  {:>4.1}  {:>7.2}",
                         rig.plant.id(),
-                        hidden.map_or("nothing".to_string(), |(effect, size)| format!(
-                            "{effect} {size}"
-                        )),
+                        effect,
                         colour,
                         if simulate_loop { "loop" } else { "measured" },
                         count(|a| a.claimed),

@@ -7,7 +7,7 @@ use ctid::output::Written;
 use ctid_tests::{Drive, Rig};
 use missing_effect::{
     Acceptance, Diagnosis, Effort, HeldOutError, Options, PerOutput, PlaceScore, Primitive,
-    Problem, Verdict, diagnose,
+    Problem, Rejection, Verdict, diagnose,
 };
 use plants::{Fitted, Place, Term, Variable};
 use rand::SeedableRng;
@@ -185,7 +185,14 @@ fn partial(mut found: Diagnosis) -> Diagnosis {
         floor: PerOutput(vec![(found.outputs[0].clone(), 0.1)]),
         bic_fall: Some(100.0),
         required_bic_fall: 6.0,
-        reasons: vec!["the residual is not noise".to_string()],
+        rejections: vec![
+            Rejection::Share {
+                share: 0.6,
+                required: 0.9,
+                of_time: true,
+            },
+            Rejection::RandomWalk,
+        ],
     });
     found.effort = Effort {
         limit: Some(20.0),

@@ -7,7 +7,7 @@ use plants::Domain;
 
 use crate::effort::{EffortLevel, limit_text};
 use crate::numbers;
-use crate::sentences::with_unit;
+use crate::sentences::{of_failures, with_unit};
 
 /// Number of effects of each ranking that are shown if two rankings differ.
 const COMPARED: usize = 5;
@@ -97,13 +97,13 @@ pub(crate) fn held_out_step_error(diagnosis: &Diagnosis, step: &Step) -> Option<
 pub(crate) fn sentences(diagnosis: &Diagnosis, step: &Step) -> Vec<String> {
     let several = several(diagnosis);
     let outputs = step.outputs.iter();
-    let sentences = outputs.flat_map(|output| {
-        let of_output = output.failures.sentences.iter();
+    let sentences = outputs.enumerate().flat_map(|(at, output)| {
+        let of_output = of_failures(diagnosis, output, at).into_iter();
         of_output.map(move |sentence| {
             if several {
                 format!("{}: {sentence}", output.name)
             } else {
-                sentence.clone()
+                sentence
             }
         })
     });

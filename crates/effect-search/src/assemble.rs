@@ -6,7 +6,7 @@ use ct_model::Given;
 use ct_model::effects::Candidate;
 use ct_signals::ArModel;
 use estimation::{Fit, Noise};
-use greybox::{Robust, weighted_rms};
+use greybox::{Robust, not_determined, weighted_rms};
 
 use crate::node::{Context, FINE, Node};
 use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
@@ -122,7 +122,7 @@ pub(crate) fn assemble(
         .map(|candidate| (candidate.id.clone(), candidate.numbers_of_record()))
         .collect();
     Ok(Diagnosis {
-        schema: 2,
+        schema: 3,
         model: problem.spec.name.clone(),
         verdict,
         effects: context.ids(order),
@@ -248,6 +248,7 @@ fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<S
         rmse_test_per_output: test.map(|test| named(&test.rmse)),
         weighted_rmse: weighted_rms(&node.fit.rmse, floors, &node.fit.samples_per_output),
         bic: node.fit.bic(),
+        not_determined: not_determined(&setup, &node.fit),
         starts: node.fit.starts,
         starts_agree: node.fit.agree,
         simulated,

@@ -63,6 +63,9 @@ pub struct Step {
     pub bic: f64,
     /// All parameters, followed by the initial states.
     pub parameters: Vec<Estimate>,
+    /// Fitted entries that the records do not determine, alone or together ([`greybox::not_determined`]).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_determined: Vec<Vec<String>>,
     /// Starts of the fit.
     pub starts: usize,
     /// Number of starts that ended in the best minimum.

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use crate::Error;
 use crate::joined::Joined;
 use crate::node::{Context, Node};
-use crate::spectral_line::strongest_line;
+use crate::residual_tests::strongest_line;
 
 /// Damping of the predicted step, for directions that the data do not determine.
 pub(crate) const DAMPING: f64 = 1e-9;

@@ -108,8 +108,8 @@ impl Context<'_> {
         max_effects: usize,
     ) -> Result<Grown, Error> {
         let trials = self.trials_among(&base, of, noise);
-        let promising = &trials[..trials.len().min(self.thresholds.first_refits)];
-        let mut singles = self.refits(&base, promising, noise);
+        let best = &trials[..trials.len().min(self.thresholds.first_refits)];
+        let mut singles = self.refits(&base, best, noise);
         if self.is_open(&base) {
             self.refit_from_own_starts(&mut singles, known, noise);
         }
@@ -197,12 +197,12 @@ impl Context<'_> {
                     break;
                 }
                 let trials = self.trials_among(parent, &among, noise);
-                let promising: Vec<Trial> = trials
+                let best: Vec<Trial> = trials
                     .into_iter()
                     .filter(|trial| self.may_lower_the_criterion(trial))
                     .take(self.thresholds.refits)
                     .collect();
-                for child in self.refits(parent, &promising, noise) {
+                for child in self.refits(parent, &best, noise) {
                     let same = |known: &Node| same_set(known, &child);
                     if !beam.iter().any(same) {
                         fitted.push(child.clone());

@@ -54,8 +54,8 @@ pub struct Fit {
     pub triangle: Triangle,
     /// Positions (among the fitted entries) of the parameters that are not held at a bound and whose columns are independent.
     interior: Vec<usize>,
-    /// Positions of the parameters that can be changed together without a change of the residual.
-    undetermined: Vec<usize>,
+    /// Groups of positions of parameters that can be changed together without a change of the residual.
+    undetermined: Vec<Vec<usize>>,
     free: Vec<usize>,
     /// Degrees of freedom of the variance of every interior entry.
     freedom: Vec<f64>,
@@ -167,11 +167,24 @@ impl Fit {
         self.undetermined.is_empty()
     }
 
+    /// Groups of entries of the vector that can be changed together without a change of the residual.
+    #[must_use]
+    pub fn undetermined(&self) -> Vec<Vec<usize>> {
+        let entries = |group: &Vec<usize>| group.iter().map(|&column| self.free[column]).collect();
+        self.undetermined.iter().map(entries).collect()
+    }
+
     /// Positions in [`Self::interior`] of the parameters that the rows determine.
     #[must_use]
     pub fn determined(&self) -> Vec<usize> {
         (0..self.interior.len())
-            .filter(|&i| !self.undetermined.contains(&self.interior[i]))
+            .filter(|&i| {
+                !self
+                    .undetermined
+                    .iter()
+                    .flatten()
+                    .any(|&column| column == self.interior[i])
+            })
             .collect()
     }
 
@@ -330,7 +343,6 @@ pub fn fit_from(
                 && !held(minimum.x[j], bounds[j], minimum.triangle.descent(j))
         })
         .collect();
-    let (interior, undetermined) = minimum.triangle.independent_among(&inside);
     let cost = minimum.triangle.cost();
     let n = samples as f64;
     let end = End::of(model, &x, noise).ok_or(Error::NoFiniteStart { starts: count })?;
@@ -354,13 +366,14 @@ pub fn fit_from(
         stop: minimum.stop,
         triangle: minimum.triangle,
         freedom: Vec::new(),
-        undetermined,
-        interior,
+        undetermined: Vec::new(),
+        interior: Vec::new(),
         free: free.to_vec(),
     };
-    fit.freedom = vec![fit.degrees_left(); fit.interior.len()];
     // Covariances are multiplied by this variance: weighting the priors by its root preserves their standard errors.
     let sigma = fit.variance().sqrt();
     fit.triangle = fit.triangle.with_prior_weight(sigma);
+    (fit.interior, fit.undetermined) = fit.triangle.independent_among(&inside);
+    fit.freedom = vec![fit.degrees_left(); fit.interior.len()];
     Ok(fit)
 }

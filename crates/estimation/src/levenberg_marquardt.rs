@@ -84,12 +84,12 @@ pub(crate) fn minimise(
         };
     };
     // The predicted reduction of an undamped step shows whether this is a minimum; a small step alone can be caused by the damping.
-    let promised = |at: &Triangle, free: &[usize]| {
+    let reduction = |at: &Triangle, free: &[usize]| {
         let step = at.solve(free, &vec![1.0; p], 0.0);
         (at.cost() - at.predicted(&step)) / at.cost()
     };
-    let end = |promised: f64| {
-        if promised <= 1e3 * stopping.cost {
+    let end = |reduction: f64| {
+        if reduction <= 1e3 * stopping.cost {
             Stop::Converged
         } else {
             Stop::Stuck
@@ -103,7 +103,7 @@ pub(crate) fn minimise(
         let free: Vec<usize> = (0..p)
             .filter(|&j| !held(x[j], bounds[j], at.descent(j)))
             .collect();
-        let here = promised(&at, &free);
+        let here = reduction(&at, &free);
         if free.is_empty() || cost == 0.0 || here <= stopping.cost {
             return Minimum {
                 x,
@@ -158,7 +158,7 @@ pub(crate) fn minimise(
             } else {
                 0
             };
-            if small_steps >= 2 && end(promised(&at, &free)) == Stop::Converged {
+            if small_steps >= 2 && end(reduction(&at, &free)) == Stop::Converged {
                 return Minimum {
                     x,
                     triangle: at,

@@ -337,8 +337,8 @@ impl Run {
                     .enumerate()
                     .map(|(i, d)| d * at.descent(i))
                     .sum();
-                let promised = 2.0 * slope - at.squared_length(step);
-                if promised <= 1e-13 * at.cost() && at_minimum(at, AT_ROUNDING) {
+                let predicted = 2.0 * slope - at.squared_length(step);
+                if predicted <= 1e-13 * at.cost() && at_minimum(at, AT_ROUNDING) {
                     Tried::Level
                 } else {
                     Tried::Higher

@@ -8,6 +8,7 @@ mod many_starts;
 mod model_observer;
 mod model_setup;
 mod model_starts;
+mod not_determined;
 mod output_noise;
 mod prediction;
 mod reading_grid;
@@ -27,6 +28,7 @@ pub use fit::{
 };
 pub use many_starts::{keep_best_simulated, with_other_speeds};
 pub use model_setup::ModelSetup;
+pub use not_determined::not_determined;
 pub use prediction::{FitUncertainty, InitialStates, output_errors};
 pub use reading_grid::{ReadingGrid, reading_grid};
 pub use reading_step::exact_reading_step;

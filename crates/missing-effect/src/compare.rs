@@ -20,7 +20,7 @@ use crate::{
     fit::{
         criterion::{BIC_MARGIN, beyond_chance},
         node::{Node, STOPPING},
-        noise_model::{NOISE_ORDER, wanders},
+        noise_model::{NOISE_ORDER, is_slow},
         proposal::singles,
     },
     result::Floors,
@@ -92,7 +92,7 @@ pub(crate) fn believed<'a>(
     let lacking = tempted || left.is_some();
     let floor = floors(problem, &own.noise, "the residual of the believed model");
     // With a noise model that drifts, the simulation of the prewhitened fit may drift.
-    let shown = if lacking || wanders(&base, &own.noise) {
+    let shown = if lacking || is_slow(&base, &own.noise) {
         base
     } else {
         Node {

@@ -32,7 +32,7 @@ use crate::{
     search::{
         find::{find, shortened},
         rankings::{ranked, rankings},
-        scores::{loss_by_coloured_noise, scores},
+        scores::{detectable_size_ratio, scores},
     },
 };
 
@@ -85,7 +85,7 @@ fn diagnose_whole(
     // The weighting for the ranking of single effects: white if the residual drifts, because a noise model absorbs slow effects.
     let white = base.setup.white_noise();
     let (metric, believed, grown) = match &found.prewhitened {
-        Some(grown) if !found.by_simulation && !found.wandering => {
+        Some(grown) if !found.by_simulation && !found.slow_noise => {
             (&found.noise, &found.base, grown)
         }
         _ => (&white, &base, &found.grown),
@@ -112,7 +112,7 @@ fn diagnose_whole(
     let test = AcceptanceTest {
         base: &base,
         noise: &found.noise,
-        wandering: found.wandering,
+        slow_noise: found.slow_noise,
         in_loop: widen,
         by_simulation: found.by_simulation,
         stopped,
@@ -125,7 +125,7 @@ fn diagnose_whole(
         || {
             rayon::join(
                 || scores(believed, &single, metric, &innovations(&found.noise)),
-                || loss_by_coloured_noise(&found.base, &single, &found.noise),
+                || detectable_size_ratio(&found.base, &single, &found.noise),
             )
         },
     );
@@ -144,7 +144,7 @@ fn diagnose_whole(
         floor: PerOutput::of(&problem.records[0].outputs, &innovations(&found.noise)),
         bic_fall: None,
         required_bic_fall: BIC_MARGIN,
-        reasons: Vec::new(),
+        rejections: Vec::new(),
     };
     let mut partial = false;
     // Noise whose memory had to be limited may contain slow physics; a sticking valve in a loop causes a limit cycle, which noise with a
@@ -152,20 +152,20 @@ fn diagnose_whole(
     let sticking = widen && sticks(&problem.records);
     let unexplained = course.left.is_some() || found.limited || sticking;
     if accepted.grade != Grade::Whole || (course.last().added.is_empty() && unexplained) {
-        let by_error = found.grown.promising_singles();
+        let by_error = found.grown.best_singles();
         let tested = largest_part(&base, &found, &by_error, &innovations(&found.noise), widen)?;
         if let Some(tested) = &tested {
             acceptance.effects = ids(&tested.node.added);
             acceptance.share = Some(tested.share);
             acceptance.bic_fall = Some(tested.bic_fall);
-            acceptance.reasons.clone_from(&tested.reasons);
+            acceptance.rejections.clone_from(&tested.rejections);
         }
         match tested.filter(|tested| {
-            tested.reasons.is_empty() && tested.node.added.len() <= options.max_effects
+            tested.rejections.is_empty() && tested.node.added.len() <= options.max_effects
         }) {
             Some(tested) => {
                 let test = AcceptanceTest {
-                    wandering: true,
+                    slow_noise: true,
                     by_simulation: true,
                     singles: &by_error,
                     ..test
@@ -217,7 +217,7 @@ fn diagnose_whole(
             groups.push(rounded.group);
             acceptance.effects = ids(&course.last().added);
             (acceptance.share, acceptance.bic_fall) = (None, None);
-            acceptance.reasons.clear();
+            acceptance.rejections.clear();
             refused = refused.filter(|_| course.left.is_some());
         }
     }

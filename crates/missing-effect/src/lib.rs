@@ -21,15 +21,15 @@ pub use base::{Options, Problem, ProblemBuilder, Progress, TIME_LIMIT};
 pub use compare::compare;
 pub use diagnose::diagnose;
 pub use diagnostics::{
-    locate::{Located, Series, locate},
+    locate::{Series, locate},
     unknown::PLACE_MARGIN,
 };
 pub use error::Error;
 pub use fit::criterion::GROUP_MARGIN;
 pub use fitted::{Fitted, fitted};
 pub use result::{
-    Acceptance, Bin, ControlLoop, Diagnosis, Effort, Failures, HeldOutError, LONGEST_HOLD,
-    MendedGaps, NoiseFloor, NotNoise, NotSimulated, OutputStep, Parameter, PerOutput,
-    PlaceLikelihood, PlaceScore, Primitive, Rankings, Remark, ResidualTests, Score, Share, Shown,
-    ShownInput, Step, Unknown, Verdict, Window,
+    Acceptance, Bin, ControlLoop, Diagnosis, Effort, Failure, FailureKind, Failures, HeldOutError,
+    LONGEST_HOLD, MendedGaps, NoiseFloor, NotNoise, NotSimulated, OutputStep, Parameter, PerOutput,
+    PlaceLikelihood, PlaceScore, Primitive, Rankings, Rejection, Remark, ResidualTests, Score,
+    Share, Shown, ShownInput, Step, Unknown, Verdict, Window,
 };

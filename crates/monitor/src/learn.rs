@@ -202,7 +202,8 @@ pub(crate) fn learn(
 pub(crate) fn covariance(fit: &Fit, n: usize, widened: f64) -> Result<Vec<f64>, String> {
     let errors = fit.std_errors();
     let mut covariance = vec![0.0; n * n];
-    let Some((positions, correlations)) = fit.correlations() else {
+    let determined = fit.correlations().filter(|_| fit.is_determined());
+    let Some((positions, correlations)) = determined else {
         return Err(
             "the rows do not determine the parameters: the command has not moved enough".into(),
         );

@@ -220,12 +220,15 @@ impl Fit {
         Vec<(&'static str, crate::diagnosis::Bin)>,
         Vec<String>,
     )> {
-        let steps = &self.page().diagnosis.steps;
-        let outputs = steps.first().map_or(&[][..], |step| &step.outputs);
-        let all = outputs.iter().map(|output| {
+        let diagnosis = &self.page().diagnosis;
+        let outputs = diagnosis
+            .steps
+            .first()
+            .map_or(&[][..], |step| &step.outputs);
+        let all = outputs.iter().enumerate().map(|(at, output)| {
             let tests = (output.tests.whiteness_p, output.tests.input_p);
             let bins = crate::diagnosis::bins(&output.failures);
-            let sentences = output.failures.sentences.clone();
+            let sentences = ctid::sentences::of_failures(diagnosis, output, at);
             (output.name.clone(), tests, bins, sentences)
         });
         all.collect()
@@ -244,7 +247,7 @@ impl Fit {
     /// Entries that the records do not determine, alone or together.
     #[getter]
     fn not_determined(&self) -> Vec<Vec<String>> {
-        self.comparison.not_determined.clone()
+        self.step().not_determined.clone()
     }
 
     /// The result as `ctid compare --json` writes it, without its mark.

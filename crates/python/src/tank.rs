@@ -193,17 +193,18 @@ impl TankFit {
     fn outputs(&self) -> Vec<(String, (f64, f64), Vec<(&'static str, Bin)>, Vec<String>)> {
         let last = self.found.steps.last();
         let all = last.into_iter().flat_map(|step| &step.outputs);
-        all.map(|output| {
-            let tests = (output.tests.whiteness_p, output.tests.input_p);
-            let sentences = output.failures.sentences.clone();
-            (
-                output.name.clone(),
-                tests,
-                bins(&output.failures),
-                sentences,
-            )
-        })
-        .collect()
+        all.enumerate()
+            .map(|(at, output)| {
+                let tests = (output.tests.whiteness_p, output.tests.input_p);
+                let sentences = ctid::sentences::of_failures(&self.found, output, at);
+                (
+                    output.name.clone(),
+                    tests,
+                    bins(&output.failures),
+                    sentences,
+                )
+            })
+            .collect()
     }
 
     /// The units of the input and of the outputs; empty where no record says them.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use effect_search::{Estimate, NoiseFloor, Options, Step, held_out};
-use greybox::{Fit, FitOptions, ModelSetup, TimeLimit, weighted_rms};
+use greybox::{FitOptions, TimeLimit, not_determined, weighted_rms};
 use missing_effect::Effort;
 use serde::Serialize;
 
@@ -14,8 +14,6 @@ use super::fitted::{FitLimit, FittedModel, blame};
 use super::problem::RecordNumbers;
 use crate::Error;
 
-/// Two estimates with a correlation above this are determined only in combination.
-const TOGETHER: f64 = 0.999;
 /// The initial states of held-out records are fitted within this share of the time, whatever the fit took.
 const OF_HELD_OUT: f64 = 0.25;
 
@@ -51,8 +49,6 @@ pub struct Comparison {
     pub steps: [Step; 1],
     /// Innovation variance of each output's residual: the part that its past does not predict.
     pub noise: Vec<NoiseFloor>,
-    /// Fitted entries that these records do not determine, alone or together with another one.
-    pub not_determined: Vec<Vec<String>>,
     /// The time limit, and the steps that were cut short.
     pub effort: Effort,
     /// Computing time \[s\].
@@ -175,6 +171,7 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
         parameters: estimates.collect(),
         starts: fit.starts,
         starts_agree: fit.agree,
+        not_determined: not_determined(&setup, fit),
         simulated: simulated
             .iter()
             .cloned()
@@ -196,45 +193,16 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
             model,
         });
     Ok(Comparison {
-        schema: 2,
+        schema: 3,
         model: spec.name.clone(),
         effects: file.effects.on.clone(),
         record_numbers: file.record_numbers.clone(),
-        not_determined: not_determined(&setup, fit),
         curves: curves.collect(),
         steps: [step],
         noise: noise_floors,
         effort,
         seconds: 0.0,
     })
-}
-
-/// Parameters that the records do not determine: single ones, or pairs of which only a combination is determined.
-fn not_determined(setup: &ModelSetup, fit: &Fit) -> Vec<Vec<String>> {
-    let names = setup.names();
-    let mut found = Vec::new();
-    match fit.correlations() {
-        Some((entries, matrix)) => {
-            for (i, row) in matrix.iter().enumerate() {
-                for (j, c) in row.iter().enumerate().take(i) {
-                    if c.abs() > TOGETHER {
-                        found.push(vec![names[entries[j]].clone(), names[entries[i]].clone()]);
-                    }
-                }
-            }
-        }
-        // If the parameters are not all determined: names those that do not affect the outputs.
-        None => {
-            let free = setup.free();
-            let length = |column: usize| fit.triangle.column_norm(column);
-            let silent = (0..free.len()).filter(|&column| length(column) <= f64::MIN_POSITIVE);
-            found.extend(silent.map(|column| vec![names[free[column]].clone()]));
-            if found.is_empty() {
-                found.push(free.iter().map(|&i| names[i].clone()).collect());
-            }
-        }
-    }
-    found
 }
 
 #[cfg(test)]

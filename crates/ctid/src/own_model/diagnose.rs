@@ -4,6 +4,7 @@ use effect_search::{Diagnosis, NotNoise, Options, Step, Thresholds, Verdict};
 
 use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
+use super::text::undetermined;
 use super::unknown;
 use super::words::{EffectWords, shown_unit};
 use crate::Error;
@@ -35,6 +36,7 @@ pub(crate) fn said(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> St
     text += &errors(diagnosis, look);
     if let Some(last) = diagnosis.steps.last() {
         text += &estimates(last, look);
+        text += &undetermined(&last.not_determined, look);
     }
     text += &format!("\n{}\n", look.heading(&heading(diagnosis)));
     for sentence in sentences(diagnosis, &words) {
@@ -160,6 +162,16 @@ fn said_of(left: &NotNoise) -> String {
             ct_signals::duration(*from),
             ct_signals::duration(*to)
         ),
+        NotNoise::Disturbance {
+            output,
+            record,
+            from,
+            to,
+        } => format!(
+            "the residual of {output} in {record} from {} to {} is larger than noise with its correlation would be: a disturbance for a while",
+            ct_signals::duration(*from),
+            ct_signals::duration(*to)
+        ),
         NotNoise::Level { output } => {
             format!("the residual of {output} depends on the model's output")
         }
@@ -169,6 +181,10 @@ fn said_of(left: &NotNoise) -> String {
         NotNoise::Function { effect, variable } => {
             format!("a function of {variable} lowers the error by more than noise would: {effect}")
         }
+        NotNoise::Correlation { output } => format!(
+            "first-order noise does not describe the correlation of the residual of {output}: \
+             for example a disturbance in a band of frequencies, or an effect that is not among the candidates"
+        ),
         NotNoise::Slow { output } => format!(
             "the residual of {output} drifts too slowly to be noise in records of this length"
         ),

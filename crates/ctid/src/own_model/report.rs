@@ -5,10 +5,9 @@ use std::collections::BTreeMap;
 use ct_signals::{ArModel, Channel, Clock, Record, residual_tests};
 use effect_search::{Estimate, NoiseFloor, Step, Unknown};
 use missing_effect::{
-    Diagnosis, Effort, Located, OutputStep, Parameter, PerOutput, Rankings, ResidualTests, Score,
-    Series, Shown, ShownInput, Verdict, locate,
+    Diagnosis, Effort, OutputStep, Parameter, PerOutput, Rankings, ResidualTests, Score, Series,
+    Shown, ShownInput, Verdict, locate,
 };
-use plants::Domain;
 use serde::Serialize;
 
 use super::compare::Comparison;
@@ -219,7 +218,7 @@ fn document(
     let floors: Vec<f64> = noise.iter().map(|noise| noise.level).collect();
     let steps: Vec<missing_effect::Step> = steps
         .iter()
-        .map(|step| of_step(step, fitted, &outputs, &units, noise))
+        .map(|step| of_step(step, fitted, &outputs, noise))
         .map(|mut step| {
             if let Some(test) = &step.rmse_test_per_output {
                 let errors = test.0.iter().cloned().collect();
@@ -238,7 +237,7 @@ fn document(
     let noise: Vec<_> = noise.collect();
     let unit = units.first().cloned().unwrap_or_default();
     Diagnosis {
-        schema: 2,
+        schema: 3,
         verdict: Verdict::Adequate,
         clock: Clock::of(fitted),
         gaps: None,
@@ -281,7 +280,6 @@ fn of_step(
     step: &Step,
     fitted: &[Record],
     outputs: &[String],
-    units: &[String],
     noise: &[NoiseFloor],
 ) -> missing_effect::Step {
     let count = outputs.len();
@@ -298,10 +296,8 @@ fn of_step(
         .zip(&step.simulated)
         .map(|(y, model)| y.values.iter().zip(model).map(|(y, m)| y - m).collect())
         .collect();
-    let clock = Clock::of(fitted);
     let of_output = |o: usize| {
         let series = fitted.iter().enumerate().map(|(r, record)| Series {
-            name: &record.name,
             time: &record.time,
             input: record.inputs.first().map_or(&[][..], |input| &input.values),
             model: &step.simulated[r * count + o],
@@ -315,15 +311,7 @@ fn of_step(
                     .unwrap_or_else(|_| ArModel::white(floor.level))
             },
         );
-        let input = fitted[0].inputs.first();
-        let failures = locate(&Located {
-            series: &series,
-            noise: &noise,
-            output_unit: &units[o],
-            input_unit: input.map_or("", |input| &input.unit),
-            clock: &clock,
-            domain: Domain::General,
-        });
+        let failures = locate(&series, &noise);
         let test = step.rmse_test_per_output.as_ref();
         OutputStep {
             name: outputs[o].clone(),

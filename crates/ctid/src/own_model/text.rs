@@ -78,7 +78,14 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
         step.starts_agree, step.starts
     );
     text += &format!("  {}\n", look.faint(agree));
-    for together in &comparison.not_determined {
+    text += &undetermined(&step.not_determined, look);
+    text
+}
+
+/// Warnings of the parameters that the records do not determine ([`greybox::not_determined`]).
+pub(super) fn undetermined(found: &[Vec<String>], look: Look) -> String {
+    let mut text = String::new();
+    for together in found {
         let what = match together.as_slice() {
             [one] => format!(
                 "{one} has no effect on the readings of these records: fix it under [known], or measure more"

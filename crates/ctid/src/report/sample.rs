@@ -5,8 +5,8 @@ mod signals;
 mod variants;
 
 use missing_effect::{
-    Bin, Diagnosis, Effort, Failures, NoiseFloor, OutputStep, Parameter, PerOutput, Rankings,
-    ResidualTests, Score, Shown, ShownInput, Step, Verdict,
+    Bin, Diagnosis, Effort, Failure, FailureKind, Failures, NoiseFloor, OutputStep, Parameter,
+    PerOutput, Rankings, ResidualTests, Score, Shown, ShownInput, Step, Verdict,
 };
 
 use self::signals::{NOISE, PERIOD, input, noise, simulate};
@@ -82,18 +82,13 @@ fn failures(record: &Shown, simulated: &[f64], residual: &[f64]) -> Failures {
             }
         })
         .collect();
-    let sentences = by_time
-        .iter()
-        .filter(|bin| bin.fails)
-        .take(3)
-        .map(|bin| {
-            format!(
-                "from {:.0} to {:.0} s: {:.2} V rms, {:.1} times the noise floor",
-                bin.from,
-                bin.to,
-                bin.rms,
-                bin.rms / NOISE
-            )
+    let worst = by_time.iter().filter(|bin| bin.fails).take(3);
+    let worst = worst
+        .map(|bin| Failure {
+            by: FailureKind::Time,
+            bin: bin.clone(),
+            error_share: 0.3,
+            sample_share: 1.0 / 24.0,
         })
         .collect();
     Failures {
@@ -106,7 +101,7 @@ fn failures(record: &Shown, simulated: &[f64], residual: &[f64]) -> Failures {
         ),
         by_direction: bins(&rate, residual, &[-1.0, -0.003, 0.003, 1.0]),
         by_frequency,
-        sentences,
+        worst,
     }
 }
 
@@ -279,7 +274,7 @@ fn diagnosis(outputs: &[&str]) -> Diagnosis {
     Diagnosis {
         gaps: None,
         clock: ct_signals::Clock::of([]),
-        schema: 2,
+        schema: 3,
         verdict: Verdict::Undecided,
         effects: vec!["overflow".into(), "pump_deadzone".into()],
         groups: vec![

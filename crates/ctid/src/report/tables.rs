@@ -8,6 +8,7 @@ pub(super) use self::steps::parameters;
 use super::text::{code, escape, significant, unit, with_error};
 use crate::findings;
 use crate::numbers::duration;
+use crate::sentences::of_rejections;
 
 /// Analysed plant and records, and noise floor.
 pub(super) fn facts(diagnosis: &Diagnosis) -> String {
@@ -97,7 +98,7 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
     format!("<p>Added to the model, in this order:</p>\n<ol class=\"groups\">\n{items}</ol>\n")
 }
 
-/// The acceptance test in numbers, and the reasons for a partial explanation.
+/// The acceptance test in numbers, and the conditions that the effects do not meet.
 pub(super) fn acceptance(diagnosis: &Diagnosis) -> String {
     let Some(test) = &diagnosis.acceptance else {
         return String::new();
@@ -112,16 +113,11 @@ pub(super) fn acceptance(diagnosis: &Diagnosis) -> String {
             )
         })
         .collect();
-    let reasons = super::items(&test.reasons);
+    let reasons = super::items(of_rejections(test));
     let reasons = if reasons.is_empty() {
         reasons
     } else {
-        let why = if diagnosis.effects.is_empty() {
-            "Why they were refused:"
-        } else {
-            "Why they explain the error only in part:"
-        };
-        format!("<p>{why}</p>\n<ul>{reasons}</ul>\n")
+        format!("<p>Why they were refused:</p>\n<ul>{reasons}</ul>\n")
     };
     table(
         &escape(&findings::acceptance_title(diagnosis, test)),

@@ -5,6 +5,9 @@
 mod control_loop;
 mod design;
 mod effects;
+mod failures;
+mod prior;
+mod rejections;
 mod remarks;
 mod residual;
 #[cfg(test)]
@@ -17,6 +20,9 @@ use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
 
 use self::control_loop::of_the_loop;
 pub use self::design::of_design;
+pub use self::failures::of_failures;
+pub use self::prior::of_prior;
+pub use self::rejections::of_rejections;
 
 /// The findings of a comparison or a diagnosis in sentences: first one for each accepted effect, or the verdict; then the rest of the
 /// verdict, the unexplained error, and remarks. Empty if nothing was fitted.

@@ -106,7 +106,7 @@ pub(super) fn diagnosis(found: &Found<Diagnosis>) -> Value {
         json!({
             "title": findings::acceptance_title(diagnosis, test),
             "rows": findings::acceptance_rows(test, unit),
-            "reasons": test.reasons,
+            "reasons": sentences::of_rejections(test),
         })
     });
     let rankings = findings::rankings(diagnosis);

@@ -162,11 +162,17 @@ fn placed(effect: &str, place: Option<&str>) -> String {
 pub(crate) fn failures(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
     let outputs = step.outputs.iter();
     outputs
-        .map(|output| failures_of(diagnosis, step, output, look))
+        .enumerate()
+        .map(|(at, output)| failures_of(diagnosis, step, (at, output), look))
         .collect()
 }
 
-fn failures_of(diagnosis: &Diagnosis, step: &Step, output: &OutputStep, look: Look) -> String {
+fn failures_of(
+    diagnosis: &Diagnosis,
+    step: &Step,
+    (at, output): (usize, &OutputStep),
+    look: Look,
+) -> String {
     let name = step_name(diagnosis, step);
     let title = match diagnosis.verdict {
         Verdict::Adequate if !compared(diagnosis) => {
@@ -180,11 +186,9 @@ fn failures_of(diagnosis: &Diagnosis, step: &Step, output: &OutputStep, look: Lo
         title
     };
     let mut text = format!("{}\n", look.heading(&title));
-    for sentence in output.failures.sentences.iter().take(FAILURES) {
+    let said = sentences::of_failures(diagnosis, output, at);
+    for sentence in said.iter().take(FAILURES) {
         text += &look.paragraph("  - ", sentence);
-    }
-    if output.failures.sentences.is_empty() {
-        text += "  - nowhere in particular\n";
     }
     text += &look.paragraph("  - ", &residual_tests(&output.tests));
     text.push('\n');
@@ -228,7 +232,7 @@ pub(crate) fn parameters(diagnosis: &Diagnosis, step: &Step, look: Look) -> Stri
                 "(no error: at a bound, fixed, or not determined)".to_string(),
                 |error| format!("± {error}"),
             ),
-            match parameter.prior_words() {
+            match sentences::of_prior(parameter) {
                 Some(words) => format!("{} ({words})", parameter.unit),
                 None => parameter.unit.clone(),
             },

@@ -1,7 +1,7 @@
 //! Design of the next experiment, which distinguishes two effects that the records do not distinguish.
 //!
 //! Each of the two is fitted to the records. Either is then simulated with sequences within the user's limits, at one input or at several
-//! at once, and it is computed how far the other stays behind what they show ([`least`]). The most promising are confirmed by refits: the
+//! at once, and it is computed how far the other stays behind what they show ([`least`]). Those of the largest predicted power are confirmed by refits: the
 //! other one is fitted to what the first gives on the existing records and in the experiment, both free of noise, and its misfit to the
 //! existing records alone is taken off.
 //!

@@ -65,7 +65,7 @@ fn supply() -> BTreeMap<String, OwnCandidate> {
 }
 
 #[test]
-fn a_coupling_a_supply_and_two_lags_are_found_beside_noise_that_wanders() {
+fn a_coupling_a_supply_and_two_lags_are_found_beside_slow_noise() {
     let spec = ModelSpec::parse(BOARD).unwrap();
     let record = record(TRUE_BOARD, 0.99, 0.3, 5);
     let mut problem = Problem::builder(spec, [record]).build().unwrap();

@@ -13,16 +13,16 @@ impl Triangle {
         (0..self.columns - 1).all(|j| self.independent(j))
     }
 
-    /// Of these columns the independent ones, in the same order, and those that take part in a combination of columns that is zero to within
-    /// `1e-10` of their length. Changed together, the parameters of the latter leave all rows as they are: the rows do not determine them.
+    /// Of these columns the independent ones, in the same order, and groups of columns with a combination that is zero to within `1e-10` of
+    /// their length. Changed together, the parameters of a group leave all rows as they are: the rows do not determine them.
     #[must_use]
-    pub fn independent_among(&self, columns: &[usize]) -> (Vec<usize>, Vec<usize>) {
+    pub fn independent_among(&self, columns: &[usize]) -> (Vec<usize>, Vec<Vec<usize>>) {
         let mut independent = columns.to_vec();
-        let mut combined: Vec<usize> = Vec::new();
+        let mut groups: Vec<Vec<usize>> = Vec::new();
         loop {
             let system = self.select(&independent);
             let Some(dependent) = (0..independent.len()).find(|&i| !system.independent(i)) else {
-                return (independent, combined);
+                return (independent, groups);
             };
             // The combination of the columns before it that equals it.
             let mut shares = vec![0.0; dependent];
@@ -33,12 +33,20 @@ impl Triangle {
                 shares[i] = (system.at(i, dependent) - sum) / system.at(i, i);
             }
             let least = COMBINED * system.column_norm(dependent);
-            combined.extend(
-                (0..dependent)
-                    .filter(|&i| shares[i].abs() * system.column_norm(i) > least)
-                    .map(|i| independent[i]),
-            );
-            combined.push(independent.remove(dependent));
+            let mut group: Vec<usize> = (0..dependent)
+                .filter(|&i| shares[i].abs() * system.column_norm(i) > least)
+                .map(|i| independent[i])
+                .collect();
+            group.push(independent.remove(dependent));
+            // Groups with a common column are one.
+            let (joined, others): (Vec<_>, Vec<_>) = groups
+                .into_iter()
+                .partition(|known| known.iter().any(|column| group.contains(column)));
+            group.extend(joined.into_iter().flatten());
+            group.sort_unstable();
+            group.dedup();
+            groups = others;
+            groups.push(group);
         }
     }
 

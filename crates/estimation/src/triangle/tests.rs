@@ -208,9 +208,8 @@ fn a_combination_of_columns_leaves_the_others_determined() {
     assert!(!dependent.determined());
     assert!(dependent.covariance(&[0, 1, 2, 3]).is_none());
     for order in [[0, 1, 2, 3], [3, 1, 0, 2], [2, 3, 1, 0]] {
-        let (independent, mut combined) = dependent.independent_among(&order);
-        combined.sort_unstable();
-        assert_eq!(combined, [0, 2, 3]);
+        let (independent, groups) = dependent.independent_among(&order);
+        assert_eq!(groups, [vec![0, 2, 3]]);
         assert_eq!(independent.len(), 3);
         let at = independent.iter().position(|&column| column == 1).unwrap();
         assert_relative_eq!(
@@ -223,4 +222,30 @@ fn a_combination_of_columns_leaves_the_others_determined() {
         dependent.independent_among(&[0, 1, 3]),
         (vec![0, 1, 3], vec![])
     );
+}
+
+/// Two combinations without a common column are two groups; with one they are one.
+#[test]
+fn combinations_are_groups() {
+    let groups = |combine: fn(&mut Vec<f64>)| {
+        let mut triangle = Triangle::new(7);
+        for mut row in rows(100, 6) {
+            combine(&mut row);
+            triangle.push(&row);
+        }
+        triangle.finish();
+        let (independent, mut groups) = triangle.independent_among(&[0, 1, 2, 3, 4, 5]);
+        groups.sort();
+        (independent.len(), groups)
+    };
+    let apart = groups(|row| {
+        row[1] = 3.0 * row[0];
+        row[4] = row[2] - row[3];
+    });
+    assert_eq!(apart, (4, vec![vec![0, 1], vec![2, 3, 4]]));
+    let joined = groups(|row| {
+        row[1] = 3.0 * row[0];
+        row[4] = row[2] - row[0];
+    });
+    assert_eq!(joined, (4, vec![vec![0, 1, 2, 4]]));
 }

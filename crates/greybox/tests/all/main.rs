@@ -9,6 +9,7 @@ mod lag_states;
 mod linearise;
 mod minima;
 mod minimise;
+mod not_determined;
 mod outputs;
 mod parts;
 mod prediction;

@@ -14,7 +14,7 @@ use crate::{
     diagnostics::{residual_tests::not_noise, step},
     fit::{
         node::{FINE, Node, STOPPING, refine, without},
-        noise_model::{NOISE_ORDER, longest_memory, residual_colour, slowness},
+        noise_model::{NOISE_ORDER, longest_memory, residual_noise, slowness},
     },
     result::Floors,
     search::confirm::confirm,
@@ -48,7 +48,7 @@ pub(crate) enum Grade {
 pub(crate) struct AcceptanceTest<'s, 'a> {
     pub base: &'s Node<'a>,
     pub noise: &'s Noise,
-    pub wandering: bool,
+    pub slow_noise: bool,
     /// The records come from a loop that is not simulated.
     pub in_loop: bool,
     /// Whether models are compared and shown by their simulation error.
@@ -157,7 +157,7 @@ impl<'a> AcceptanceTest<'_, 'a> {
         let white = last.setup.white_noise();
         let (metric, per_sample) = if self.by_simulation || self.stopped {
             let residuals = last.setup.disturbance(&last.fit.x)?;
-            let noise = residual_colour(&last.setup, &residuals)?;
+            let noise = residual_noise(&last.setup, &residuals)?;
             let limited = noise.with_memory_at_most(longest_memory(&last.setup));
             (&white, slowness(&limited, last.setup.samples_per_output()))
         } else {
@@ -211,7 +211,7 @@ impl<'a> AcceptanceTest<'_, 'a> {
         };
         // The last model is shown with the noise weighting, in which its parameters are most accurate. An incomplete model is not: a
         // weighting that treats the missing effect as noise would let its simulation drift.
-        if !self.wandering && !self.stopped && left.is_none() {
+        if !self.slow_noise && !self.stopped && left.is_none() {
             last.fit = own.clone().continuing(&last.fit);
         }
         nodes.push(last);
@@ -300,7 +300,7 @@ mod tests {
         Options,
         base::believed::base,
         fit::{
-            noise_model::colour,
+            noise_model::noise_of,
             proposal::{Parent, propose, realise, singles},
         },
         simulated,
@@ -324,8 +324,8 @@ mod tests {
         }
         let accepted = AcceptanceTest {
             base: &base,
-            noise: &colour(&set).unwrap(),
-            wandering: true,
+            noise: &noise_of(&set).unwrap(),
+            slow_noise: true,
             in_loop: false,
             by_simulation: true,
             stopped: false,

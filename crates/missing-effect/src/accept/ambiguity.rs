@@ -46,8 +46,8 @@ pub(crate) fn remove_ambiguous<'a>(
         ..node.clone()
     };
     let (bare, rich) = (in_own(base, &own_base), in_own(&confirmed, &own_last));
-    let needed_in_colour = rich.gain_over(&bare) >= BIC_MARGIN && beyond_chance(&rich, &bare);
-    if !confirmed.added.is_empty() && !needed_in_colour {
+    let needed_in_own_noise = rich.gain_over(&bare) >= BIC_MARGIN && beyond_chance(&rich, &bare);
+    if !confirmed.added.is_empty() && !needed_in_own_noise {
         confirmed = found.base.clone();
     }
     // A set of effects has to be better than the simplest course that no effect causes.

@@ -13,7 +13,7 @@ use crate::{
     Error, NotNoise,
     fit::{
         node::{FINE, Node},
-        noise_model::residual_colour,
+        noise_model::residual_noise,
     },
 };
 
@@ -56,7 +56,7 @@ pub(crate) fn level_shift(node: &Node, noise: &Noise) -> Result<Option<LevelShif
     };
     let residuals = node.setup.disturbance(&node.fit.x)?;
     // In the presence of other model errors, an instant is abrupt only if the residual's own noise model does not predict it.
-    let noise_of_residual = residual_colour(&node.setup, &residuals)?;
+    let noise_of_residual = residual_noise(&node.setup, &residuals)?;
     let whitened = noise_of_residual.whiten(&residuals);
     let mut instants: Vec<(f64, usize, usize)> = Vec::new();
     for (output, whitened) in whitened.iter().enumerate() {

@@ -18,7 +18,7 @@ use plants::Placed;
 use rayon::prelude::*;
 
 use crate::{
-    Error,
+    Error, Rejection,
     accept::{
         acceptance::{PART, WHOLE, explained},
         level_shift::level_shift,
@@ -54,9 +54,6 @@ const SHIFT_CLEARLY: f64 = 0.1;
 /// Stiction that the shape of the record confirms is a partial explanation from this share on.
 const PART_BY_SHAPE: f64 = 0.15;
 
-/// Reason for rejecting a narrow band of stiction.
-const NARROW_BAND: &str = "in a loop that is not simulated, a disturbance fed back through the command looks like a periodic effect";
-
 /// A tested set with its result.
 pub(crate) struct Tested<'a> {
     /// The set, fitted to the simulation error.
@@ -67,8 +64,8 @@ pub(crate) struct Tested<'a> {
     pub bic_fall: f64,
     /// The record has the signature of valve stiction, and the set is stiction.
     pub shape: bool,
-    /// Reasons for the rejection; empty if the set is accepted.
-    pub reasons: Vec<String>,
+    /// Conditions that the set does not meet; empty if it is accepted.
+    pub rejections: Vec<Rejection>,
 }
 
 /// The set that explains the largest part of the excess error: an accepted one or, if there is none, the best rejected one.
@@ -120,7 +117,7 @@ pub(crate) fn largest_part<'a>(
             .map(|node| {
                 let mut tested = test(base, &own_base, node, floor, shift_bic)?;
                 if in_loop && tested.node.narrow_stiction().is_some() {
-                    tested.reasons.push(NARROW_BAND.to_string());
+                    tested.rejections.push(Rejection::NarrowBand);
                 }
                 // The characteristic shape is stronger evidence than the limited fall of the error.
                 let alone = tested
@@ -130,7 +127,7 @@ pub(crate) fn largest_part<'a>(
                     .all(|placed| placed.effect.id == STICTION);
                 tested.shape = sticks && alone && tested.share >= PART_BY_SHAPE;
                 if tested.shape {
-                    tested.reasons.clear();
+                    tested.rejections.clear();
                 }
                 Ok::<_, Error>(tested)
             })
@@ -158,7 +155,7 @@ pub(crate) fn largest_part<'a>(
             (None, found) => found,
             (Some(best), Some(larger))
                 if (key(&larger).0, key(&larger).1) > (key(&best).0, key(&best).1)
-                    || (larger.reasons.is_empty()
+                    || (larger.rejections.is_empty()
                         && !best.shape
                         && 1.0 - larger.share <= LEFT * (1.0 - best.share)) =>
             {
@@ -229,7 +226,7 @@ fn says_more(one: &Tested, smaller: &[(Vec<Placed>, f64)]) -> bool {
 
 /// Sort key: accepted sets before rejected ones, those with the characteristic shape before others, then by the explained part.
 fn key(tested: &Tested) -> (bool, bool, f64) {
-    (tested.reasons.is_empty(), tested.shape, tested.share)
+    (tested.rejections.is_empty(), tested.shape, tested.share)
 }
 
 fn test<'a>(
@@ -245,62 +242,50 @@ fn test<'a>(
     } else {
         PART
     };
-    let mut reasons = Vec::new();
+    let mut rejections = Vec::new();
     let mut bic_fall = node.gain_over(base);
     if share < required {
-        reasons.push(format!(
-            "explains {:.0} % of the excess error, {:.0} % required{}",
-            100.0 * share,
-            100.0 * required,
-            if required > PART {
-                " of an effect that follows time alone"
-            } else {
-                ""
-            }
-        ));
+        rejections.push(Rejection::Share {
+            share,
+            required,
+            of_time: required > PART,
+        });
     } else {
         let own = in_own_noise(&node)?;
         bic_fall = own.gain_over(own_base);
         if node.added.len() > 1 && bic_fall <= BIC_MARGIN {
-            reasons.push(
-                "several effects together are very flexible, and with a separate noise model the model without them is as probable"
-                    .to_string(),
-            );
+            rejections.push(Rejection::NotSignificant);
         }
         let outputs = own.fit.noise.iter().zip(own_base.fit.noise.iter());
         let mut rougher = outputs.map(|(own, base)| own.sigma() > ROUGHER * base.sigma());
         if rougher.any(|rougher| rougher) {
-            reasons.push("the changes from sample to sample contradict it".to_string());
+            rejections.push(Rejection::Innovations);
         }
         // A share that is NaN counts as zero.
         if carried_over(base, &node)?.max(0.0) < CARRIED_OVER {
-            reasons.push(
-                "what is fitted to one half of the record does not predict the other".to_string(),
-            );
+            rejections.push(Rejection::NotPredictive);
         }
     }
     let timeless = without_clock(&node, &node.setup.white_noise())?;
     if required > PART && node.added.len() > 1 {
-        reasons.push(
-            "with an effect that is a function of time, the set fits any disturbance".to_string(),
-        );
+        rejections.push(Rejection::FunctionOfTime);
     }
     if required > PART && !beyond_random_walk(&node, &timeless, Walk::ANY)? {
-        reasons.push("a random walk explains as much".to_string());
+        rejections.push(Rejection::RandomWalk);
     }
     if !node.plausible() {
-        reasons.push("a size is at a bound, or a state is not physical".to_string());
+        rejections.push(Rejection::NotPhysical);
     }
     // A level shift at a free instant explains much if set points change in steps: it has to explain clearly more.
     let clearly = SHIFT_CLEARLY * node.setup.samples() as f64;
     if shift_bic + clearly < node.fit.bic() {
-        reasons.push("a single level shift of the reading explains more".to_string());
+        rejections.push(Rejection::LevelShift);
     }
     Ok(Tested {
         node,
         share,
         bic_fall,
         shape: false,
-        reasons,
+        rejections,
     })
 }

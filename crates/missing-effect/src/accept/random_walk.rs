@@ -25,7 +25,7 @@ use crate::{
     fit::{
         criterion::{BIC_MARGIN, chance_of},
         node::Node,
-        noise_model::colour,
+        noise_model::noise_of,
     },
 };
 
@@ -183,7 +183,7 @@ impl Whitened {
 /// Whether a set lowers the deviance significantly compared with a set that lacks some of its effects, if either residual may contain a
 /// random walk.
 pub(crate) fn beyond_random_walk(gained: &Node, lacking: &Node, walk: Walk) -> Result<bool, Error> {
-    let noise = colour(gained)?;
+    let noise = noise_of(gained)?;
     // A model that cannot be simulated any more is not significant.
     let (Some(with), Some(without)) = (
         of_node(gained, &noise, walk),

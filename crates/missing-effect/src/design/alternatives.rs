@@ -39,9 +39,9 @@ impl Search<'_, '_> {
         let Some(wider) = bounds.wider(self.problem, in_loop) else {
             return Ok(None);
         };
-        let (mut promised, _) = self.promises(&wider, seed, before)?;
-        promised.sort_by(|(a, _), (b, _)| b.power.power.total_cmp(&a.power.power));
-        let best = promised
+        let (mut predicted, _) = self.predictions(&wider, seed, before)?;
+        predicted.sort_by(|(a, _), (b, _)| b.power.power.total_cmp(&a.power.power));
+        let best = predicted
             .first()
             .and_then(|best| self.confirmed(best, &wider, before));
         // The best of a few random experiments does not represent the range.

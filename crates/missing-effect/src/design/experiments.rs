@@ -230,7 +230,7 @@ impl Search<'_, '_> {
 
     /// Predicted power of all sequences within limits, linearised, the best first; and the number that would overfill a tank, or drive the
     /// controller to a limit.
-    pub fn promises(
+    pub fn predictions(
         &self,
         bounds: &Bounds,
         seed: u64,
@@ -316,7 +316,7 @@ impl Search<'_, '_> {
         if self.nodes[0].setup.out_of_time() {
             return Err(NoExperiment::OutOfTime.into());
         }
-        let (mut tried, [overfull, limited]) = self.promises(bounds, seed, &before)?;
+        let (mut tried, [overfull, limited]) = self.predictions(bounds, seed, &before)?;
         let all_tried = !self.nodes[0].setup.out_of_time();
         allow(&self.nodes[0], REFITS);
         self.refit(&mut tried, bounds, &before);

@@ -1,7 +1,7 @@
 //! Design of the next experiment, which distinguishes two effects that the records do not distinguish.
 //!
 //! Each of the two is fitted to the records. Sequences within the user's limits are then applied to either fit, and it is
-//! reckoned how far the other stays behind what they show (`separation.rs`). The most promising are confirmed by refits.
+//! reckoned how far the other stays behind what they show (`separation.rs`). Those of the largest predicted power are confirmed by refits.
 
 mod alternatives;
 mod experiments;
@@ -34,7 +34,7 @@ use crate::{
     fit::{
         criterion::GROUP_MARGIN,
         node::{FINE, Node, in_time, refine},
-        noise_model::colour,
+        noise_model::noise_of,
         proposal::place,
     },
 };
@@ -223,7 +223,7 @@ fn fitted<'a>(
         .min_by(|pair, other| apart(*pair).total_cmp(&apart(*other)))
         .ok_or_else(|| no_fit(between[0]))?;
     let better = usize::from(rough[1].fit.bic() < rough[0].fit.bic());
-    let noise = colour(rough[better])?;
+    let noise = noise_of(rough[better])?;
     let refined = |i: usize| -> Result<Node<'a>, Error> {
         place(&base, rough[i].added[0], rough[i], &noise, FINE)
             .ok_or_else(|| no_fit(between[i]).into())

@@ -30,7 +30,7 @@ pub(crate) fn assemble(
     let noise = noise.0;
     let outputs = &problem.records[0].outputs;
     Diagnosis {
-        schema: 2,
+        schema: 3,
         verdict,
         effects: Vec::new(),
         groups: Vec::new(),

@@ -18,7 +18,7 @@
 //! Correlation based model validity tests for non-linear models, Int. J. Control 44 (1986) 235-244.
 
 use ct_signals::{ArModel, residual_tests::prewhitened_input_test};
-use effect_search::residual::{instant, level_p, of_command, period, standardised};
+use effect_search::residual_tests::white::{instant, level_p, of_command, period, standardised};
 use greybox::{Fit, Noise};
 use rayon::prelude::*;
 

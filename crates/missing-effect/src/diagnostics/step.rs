@@ -1,6 +1,6 @@
 //! Report of a fitted model.
 
-use ct_signals::{ArModel, Clock, Record, residual_tests};
+use ct_signals::{ArModel, Record, residual_tests};
 use greybox::{Fit, Noise, Setup, robust, weighted_rms};
 
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
     base::closed_loop::widened,
     diagnostics::{
         held_out::hold_out,
-        locate::{Located, Series, locate},
+        locate::{Series, locate},
         residual_tests::input_p,
     },
     fit::{node::Node, noise_model::NOISE_ORDER},
@@ -119,21 +119,13 @@ pub(crate) fn report(
             .iter()
             .zip(own)
             .map(|(record, (model, residual))| Series {
-                name: &record.name,
                 time: &record.time,
                 input: &record.inputs[0].values,
                 model,
                 residual,
             })
             .collect();
-        let failures = locate(&Located {
-            series: &series,
-            noise: noise_floor.output(output),
-            output_unit: &first.outputs[output].unit,
-            input_unit: &first.inputs[0].unit,
-            clock: &Clock::of(setup.records),
-            domain: setup.structure.domain,
-        });
+        let failures = locate(&series, noise_floor.output(output));
         let held_out = held_out.as_ref().map(|held_out| held_out.outputs[output]);
         Ok(OutputStep {
             name: first.outputs[output].name.clone(),

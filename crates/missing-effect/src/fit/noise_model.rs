@@ -1,7 +1,7 @@
 //! The noise floor: the noise model of the residual of the largest accepted model.
 
 use ct_signals::ArModel;
-use greybox::{Noise, Setup, noise_of, prewhitened};
+use greybox::{Noise, Setup, prewhitened};
 
 use crate::{
     Error,
@@ -12,8 +12,8 @@ use crate::{
 pub(crate) const NOISE_ORDER: usize = 6;
 
 /// The noise model of a model's residual, corrected for the bias that fitting causes.
-pub(crate) fn colour(node: &Node) -> Result<Noise, Error> {
-    Ok(noise_of(&node.setup, &node.fit, NOISE_ORDER)?)
+pub(crate) fn noise_of(node: &Node) -> Result<Noise, Error> {
+    Ok(greybox::noise_of(&node.setup, &node.fit, NOISE_ORDER)?)
 }
 
 /// The memory of a noise model in whose weighting effects are searched is at most this part of the longest record.
@@ -38,16 +38,16 @@ pub(crate) fn in_own_noise<'a>(node: &Node<'a>) -> Result<Node<'a>, Error> {
 }
 
 /// The noise model of residuals without correction for the part of the noise that the fit has absorbed.
-pub(crate) fn residual_colour(setup: &Setup, residuals: &[Vec<f64>]) -> Result<Noise, Error> {
+pub(crate) fn residual_noise(setup: &Setup, residuals: &[Vec<f64>]) -> Result<Noise, Error> {
     let noise = Noise::fit(residuals, setup.outputs(), NOISE_ORDER);
     Ok(noise.map_err(greybox::Error::from)?)
 }
 
 /// The criterion of a model with its present parameters, with its residual whitened by an AR model: a fit with this weighting would give a
 /// slightly lower value.
-pub(crate) fn bic_in_colour(node: &Node) -> Result<f64, Error> {
+pub(crate) fn bic_in_residual_noise(node: &Node) -> Result<f64, Error> {
     let residuals = node.setup.disturbance(&node.fit.x)?;
-    let noise = residual_colour(&node.setup, &residuals)?;
+    let noise = residual_noise(&node.setup, &residuals)?;
     let mut costs = vec![0.0; noise.outputs()];
     let mut log_det = 0.0;
     for (i, (segment, whitened)) in residuals.iter().zip(noise.whiten(&residuals)).enumerate() {
@@ -89,12 +89,12 @@ pub(crate) fn slowness(noise: &Noise, samples: &[usize]) -> f64 {
 /// Least number of independent samples per parameter for a prewhitened fit.
 const SAMPLES_PER_PARAMETER: f64 = 10.0;
 
-/// Whether the residual of the largest model drifts so slowly that hardly any independent samples are left.
+/// Whether the noise of the largest model's residual is so slow that the records contain few independent samples of it.
 ///
-/// A fit in the metric of such a "noise" looks at fast changes alone and lets the simulation drift off; more often than
-/// not it is structure that the catalogue does not hold. Then effects are still confirmed in that metric, which is the
-/// careful one, but the models that are shown are fitted to the simulation error.
-pub(crate) fn wanders(node: &Node, noise: &Noise) -> bool {
+/// A prewhitened fit with such a noise model uses changes from sample to sample only, and its simulation drifts; the residual usually contains
+/// physics that the catalogue does not describe. Effects are still tested with this noise model, which accepts fewer of them; the reported
+/// models are fitted to the simulation error.
+pub(crate) fn is_slow(node: &Node, noise: &Noise) -> bool {
     let independent =
         node.setup.samples() as f64 / slowness(noise, node.setup.samples_per_output());
     noise.order() > 0 && independent < SAMPLES_PER_PARAMETER * node.setup.free().len() as f64

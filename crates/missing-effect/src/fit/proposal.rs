@@ -100,7 +100,7 @@ pub(crate) fn propose<'a>(
         return None;
     }
     let setup = parent.with(placed)?;
-    let (predicted, starts) = promising(parent.node, &setup, placed, noise)?;
+    let (predicted, starts) = predicted_fall(parent.node, &setup, placed, noise)?;
     let mut added = parent.node.added.clone();
     added.push(placed);
     Some(Proposal {
@@ -112,7 +112,7 @@ pub(crate) fn propose<'a>(
 }
 
 /// The best starts of a new effect by predicted reduction, with the other parameters from `from`, and the largest predicted reduction.
-pub(crate) fn promising(
+pub(crate) fn predicted_fall(
     from: &Node,
     setup: &Setup,
     placed: Placed,

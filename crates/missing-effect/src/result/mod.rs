@@ -27,8 +27,8 @@ pub use self::{
     per_output::PerOutput,
     record::{Shown, ShownInput},
     remark::Remark,
-    scores::{Acceptance, PlaceScore, Rankings, Score},
-    step::{Bin, Failures, HeldOutError, OutputStep, ResidualTests, Step},
+    scores::{Acceptance, PlaceScore, Rankings, Rejection, Score},
+    step::{Bin, Failure, FailureKind, Failures, HeldOutError, OutputStep, ResidualTests, Step},
     unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window},
 };
 pub(crate) use self::{
@@ -148,8 +148,8 @@ impl Diagnosis {
     }
 }
 
-/// The domain of a plant by its name and of its output's unit.
+/// The domain of a plant by its name and of its output's unit; that of any other model is general.
 pub(crate) fn domain_of(plant: &str, output_unit: &str) -> Domain {
     let plant: Result<Plant, _> = plant.parse();
-    plant.map_or(Domain::Hydraulic, |plant| Domain::of(plant, output_unit))
+    plant.map_or(Domain::General, |plant| Domain::of(plant, output_unit))
 }

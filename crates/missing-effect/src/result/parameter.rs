@@ -3,8 +3,6 @@
 use greybox::PriorValue;
 use serde::{Deserialize, Serialize};
 
-use crate::numbers::value_and_error;
-
 /// A fitted parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
@@ -22,16 +20,12 @@ pub struct Parameter {
     pub prior: Option<PriorValue>,
 }
 
-/// A record disagrees with a prior if their distance exceeds this number of standard errors of both together.
-const DISAGREES: f64 = 3.0;
-
 impl Parameter {
-    /// The prior in words, and the distance of the estimate if the two disagree.
+    /// Distance of the estimate from its prior \[standard errors of their difference\]; `None` without a prior. The estimate includes the prior:
+    /// the more precise the prior relative to the records, the less uncertain is their difference.
     #[must_use]
-    pub fn prior_words(&self) -> Option<String> {
+    pub fn prior_distance(&self) -> Option<f64> {
         let prior = self.prior?;
-        let (value, error) = value_and_error(prior.value, Some(prior.std_error));
-        // The estimate includes the prior: the more precise the prior relative to the records, the less uncertain is their difference.
         let own = self.std_error.map_or(0.0, |error| error * error);
         let variance = prior.std_error * prior.std_error - own;
         let scale = if variance > 0.0 {
@@ -39,11 +33,6 @@ impl Parameter {
         } else {
             prior.std_error
         };
-        let away = (self.value - prior.value).abs() / scale;
-        let mut words = format!("prior {value} ± {}", error.unwrap_or_default());
-        if away > DISAGREES {
-            words += &format!("; the records disagree with it by {away:.1} standard errors");
-        }
-        Some(words)
+        Some((self.value - prior.value).abs() / scale)
     }
 }

@@ -60,8 +60,39 @@ pub struct Acceptance {
     /// Least fall for acceptance.
     #[serde(deserialize_with = "crate::result::number")]
     pub required_bic_fall: f64,
-    /// Reasons why the effects were rejected, or explain the data only in part; empty if they are accepted.
-    pub reasons: Vec<String>,
+    /// Conditions that the effects do not meet; empty if they are accepted.
+    pub rejections: Vec<Rejection>,
+}
+
+/// A condition for a partial explanation that a set of effects does not meet.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Rejection {
+    /// It explains too small a share of the excess error.
+    Share {
+        /// Its share.
+        share: f64,
+        /// The least share.
+        required: f64,
+        /// Whether the least share is that of a set with an effect that depends on time only.
+        of_time: bool,
+    },
+    /// Each with the noise model of its own residual, the model without its several effects is as probable.
+    NotSignificant,
+    /// Its innovations are larger than those of the model without it.
+    Innovations,
+    /// Fitted to one half of the record, it does not predict the other.
+    NotPredictive,
+    /// One of its several effects is a function of time: the set fits any disturbance.
+    FunctionOfTime,
+    /// A random walk explains as much.
+    RandomWalk,
+    /// A size is at a bound, or a state is not physical.
+    NotPhysical,
+    /// A single level shift of the reading explains more.
+    LevelShift,
+    /// A narrow band of stiction in a loop that is not simulated.
+    NarrowBand,
 }
 
 /// A place where an effect may act, and its likelihood.

@@ -64,8 +64,40 @@ pub struct Failures {
     pub by_direction: Vec<Bin>,
     /// Bins by frequency \[Hz\]: the root mean square of the residual in octave bands.
     pub by_frequency: Vec<Bin>,
-    /// Sentences about the failures, the worst first.
-    pub sentences: Vec<String>,
+    /// The worst bin of each kind in which the model fails, if its share of the squared error exceeds its share of the samples by more than
+    /// 0.05; the largest excess first, the frequencies last.
+    pub worst: Vec<Failure>,
+}
+
+/// A region where a model fails.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Failure {
+    /// Kind of its bin.
+    pub by: FailureKind,
+    /// The bin.
+    pub bin: Bin,
+    /// Its share of the squared error (0 to 1).
+    #[serde(deserialize_with = "crate::result::number")]
+    pub error_share: f64,
+    /// Its share of the samples, of frequencies that of the spectral lines (0 to 1).
+    #[serde(deserialize_with = "crate::result::number")]
+    pub sample_share: f64,
+}
+
+/// Variable of the bins of a [`Failures`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FailureKind {
+    /// Time \[s\].
+    Time,
+    /// The model's level.
+    Level,
+    /// The command.
+    Flow,
+    /// Rate of the model's level.
+    Direction,
+    /// Frequency \[Hz\].
+    Frequency,
 }
 
 /// One of the reported models: the base, or the base and the effects added so far.

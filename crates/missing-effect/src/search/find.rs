@@ -9,7 +9,7 @@ use crate::{
         criterion::BIC_MARGIN,
         minima::begun_again,
         node::{Node, refine},
-        noise_model::{bic_in_colour, colour, longest_memory, wanders},
+        noise_model::{bic_in_residual_noise, is_slow, longest_memory, noise_of},
     },
     search::{
         confirm::{confirm, improve, least_useful},
@@ -45,7 +45,7 @@ pub(crate) struct Found<'a> {
     /// Sets that were grown with the noise model as weighting, if the noise is not white.
     pub prewhitened: Option<Grown<'a>>,
     /// Whether the noise drifts.
-    pub wandering: bool,
+    pub slow_noise: bool,
     /// Whether the noise is not white and effects are confirmed: then models are compared and shown by their simulation error.
     pub by_simulation: bool,
 }
@@ -77,13 +77,13 @@ pub(crate) fn find<'a>(
     // While the noise model is not known, coloured noise would justify one effect after the other. Therefore the gain is computed with a
     // noise model of each model's own residual. Any set of a size may show the gain: the set with the least simulation error may be rough
     // from sample to sample.
-    let pays_in_colour = |before: &Node, after: &[Node]| {
+    let lowers_bic = |before: &Node, after: &[Node]| {
         let least = || {
-            let all = after.par_iter().map(bic_in_colour);
+            let all = after.par_iter().map(bic_in_residual_noise);
             let all = all.collect::<Result<Vec<f64>, Error>>()?;
             Ok::<_, Error>(all.into_iter().fold(f64::INFINITY, f64::min))
         };
-        let fall = || Ok::<_, Error>(bic_in_colour(before)? - least()?);
+        let fall = || Ok::<_, Error>(bic_in_residual_noise(before)? - least()?);
         pays(before, after) && fall().is_ok_and(|fall| fall > BIC_MARGIN)
     };
     let white = base.setup.white_noise();
@@ -94,7 +94,7 @@ pub(crate) fn find<'a>(
             most: SIDE_BY_SIDE,
             ..breadth
         },
-        pays_in_colour,
+        lowers_bic,
         residual_kind,
         &|done, total| tell("searching sets of effects", done, total),
     )?;
@@ -106,7 +106,7 @@ pub(crate) fn find<'a>(
         let effects = richest.added.clone();
         begun_again(&mut richest, &effects, &white)?;
     }
-    let whole = colour(&richest)?;
+    let whole = noise_of(&richest)?;
     let noise = whole.with_memory_at_most(longest_memory(&base.setup));
     let limited = noise != whole;
 
@@ -117,8 +117,8 @@ pub(crate) fn find<'a>(
         || confirm(refine(&richest, &noise, &[])?, &noise),
     );
     let (base, mut confirmed) = (base?, confirmed?);
-    let wandering = wanders(&richest, &noise);
-    let by_simulation = wandering && !confirmed.added.is_empty();
+    let slow_noise = is_slow(&richest, &noise);
+    let by_simulation = slow_noise && !confirmed.added.is_empty();
     let mut prewhitened = None;
     if noise.order() > 0 && !base.setup.leaves_out("the prewhitened search") {
         // The noise model is known now: the search is repeated with this weighting. A drifting residual needs this too: for the simulation
@@ -167,7 +167,7 @@ pub(crate) fn find<'a>(
         confirmed,
         grown,
         prewhitened,
-        wandering,
+        slow_noise,
         by_simulation,
     })
 }

@@ -91,7 +91,7 @@ pub(crate) struct Grown<'a> {
     pub sizes: Vec<Vec<Node<'a>>>,
     /// All single effects that were refitted, and those whose predicted reduction was too small.
     refitted: Vec<Node<'a>>,
-    unpromising: Vec<Proposal<'a>>,
+    not_refitted: Vec<Proposal<'a>>,
     /// The set at which the search converged, if it ended so.
     converged: Option<Vec<Placed>>,
     /// Whether the last size lowered the criterion enough.
@@ -123,12 +123,12 @@ impl<'a> Grown<'a> {
     /// Result of [`singles`](crate::fit::proposal::singles) for the base, with the weighting of the search.
     pub fn singles(&self, noise: &Noise) -> Vec<Node<'a>> {
         let mut nodes = self.refitted.clone();
-        nodes.extend(realise_all(self.unpromising.clone(), noise, ROUGH));
+        nodes.extend(realise_all(self.not_refitted.clone(), noise, ROUGH));
         best_first(nodes)
     }
 
     /// The single effects that were refitted, best first.
-    pub fn promising_singles(&self) -> Vec<Node<'a>> {
+    pub fn best_singles(&self) -> Vec<Node<'a>> {
         best_first(self.refitted.clone())
     }
 }
@@ -148,7 +148,7 @@ pub(crate) fn grow<'a>(
     let mut grown = Grown {
         sizes: vec![vec![base.clone()]],
         refitted: Vec::new(),
-        unpromising: Vec::new(),
+        not_refitted: Vec::new(),
         converged: None,
         paid: false,
     };
@@ -184,13 +184,13 @@ pub(crate) fn grow<'a>(
         } else {
             extensions(base, &sizes[size - 1], factor * breadth.beam, noise)?
         };
-        let unpromising = proposals.split_off(proposals.len().min(factor * breadth.refits));
+        let not_refitted = proposals.split_off(proposals.len().min(factor * breadth.refits));
         if size == 2 && !base.setup.leaves_out("joint scores of all pairs") {
             let known: Vec<_> = proposals
                 .iter()
                 .map(|proposal| key(&proposal.added))
                 .collect();
-            let (singles, others) = (&grown.refitted, &grown.unpromising);
+            let (singles, others) = (&grown.refitted, &grown.not_refitted);
             let taken = |added: &[Placed]| known.contains(&key(added));
             proposals.extend(joint_pairs(
                 base,
@@ -203,7 +203,7 @@ pub(crate) fn grow<'a>(
         }
         let mut nodes = realise_all(proposals, noise, ROUGH);
         if size == 1 {
-            (grown.refitted, grown.unpromising) = (nodes.clone(), unpromising);
+            (grown.refitted, grown.not_refitted) = (nodes.clone(), not_refitted);
         }
         nodes.retain(Node::plausible);
         let mut nodes = best_first(nodes);

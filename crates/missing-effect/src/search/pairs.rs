@@ -1,7 +1,7 @@
 //! Joint scores of all pairs of effects, from the sensitivities of single ones.
 //!
 //! A pair may fit to the noise where neither of its effects does, and then neither is among the best single ones from which larger sets
-//! are grown. Each candidate is linearised once at its single refit and at the starts that were most promising; `d_i` is what it
+//! are grown. Each candidate is linearised once at its single refit and at the starts of the largest predicted fall; `d_i` is what it
 //! changes in the residual there, `E_i` its columns. A pair is then linear to first order,
 //! ```text
 //! r_ij = r_0 + d_i + d_j - [J_0, E_i, E_j] s,

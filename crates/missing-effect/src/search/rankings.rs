@@ -17,14 +17,14 @@ pub(crate) fn rankings(found: &Found, base: &Node) -> Rankings {
         }
         ranked
     };
-    let white = found.grown.promising_singles();
+    let white = found.grown.best_singles();
     let Some(grown) = &found.prewhitened else {
         return Rankings {
             white: first_of_each(&white),
             ..Rankings::default()
         };
     };
-    let prewhitened = grown.promising_singles();
+    let prewhitened = grown.best_singles();
     // A best effect of one weighting that is far from the best of the other weighting, or does not lower its criterion enough.
     let behind = |best: &[Node], others: &[Node], base: &Node| {
         let (Some(best), Some(first)) = (best.first(), others.first()) else {

@@ -45,7 +45,7 @@ pub(crate) fn scores(base: &Node, single: &[Node], noise: &Noise, floors: &[f64]
 
 /// Ratio of the minimum detectable sizes in this noise and in white noise of the same variance: the median over the effects that have a
 /// signature at their absent value. `None` for white noise.
-pub(crate) fn loss_by_coloured_noise(base: &Node, single: &[Node], noise: &Noise) -> Option<f64> {
+pub(crate) fn detectable_size_ratio(base: &Node, single: &[Node], noise: &Noise) -> Option<f64> {
     if noise.order() == 0 {
         return None;
     }

@@ -8,7 +8,7 @@ use crate::{
     Error,
     fit::{
         node::{FINE, Node, QUICK, ROUGH, best_first, fitted, refine, transfer, without},
-        proposal::{Parent, Proposal, candidates, promising, propose, realise},
+        proposal::{Parent, Proposal, candidates, predicted_fall, propose, realise},
     },
 };
 
@@ -107,7 +107,8 @@ fn begin_swaps<'a>(
             proposal.starts.truncate(1);
             // In the model without the effect, the other parameters have changed to compensate for it, and a fit from there may miss the
             // minimum. With an equivalent alternative, the parameters have nearly the values that they have with the effect.
-            if let Some((predicted, starts)) = promising(node, &proposal.setup, placed, noise) {
+            if let Some((predicted, starts)) = predicted_fall(node, &proposal.setup, placed, noise)
+            {
                 proposal.starts.extend(starts.into_iter().take(1));
                 proposal.predicted = proposal.predicted.min(predicted);
             }
@@ -126,13 +127,13 @@ fn begin_swaps<'a>(
     let mut begun: Vec<(usize, Node)> = proposals
         .into_par_iter()
         .enumerate()
-        .filter_map(|(promised, proposal)| Some((promised, realise(proposal, noise, QUICK)?)))
+        .filter_map(|(predicted, proposal)| Some((predicted, realise(proposal, noise, QUICK)?)))
         .collect();
     begun.sort_by(|a, b| a.1.fit.bic().total_cmp(&b.1.fit.bic()));
     begun
         .into_iter()
         .enumerate()
-        .filter(|(quick, (promised, _))| *quick < refitted || *promised < refitted)
+        .filter(|(quick, (predicted, _))| *quick < refitted || *predicted < refitted)
         .map(|(_, (_, begun))| begun)
         .collect()
 }

@@ -70,7 +70,7 @@ pub(super) fn learn(
     let fit = setup.fit(&options).map_err(|error| said(&error))?;
     let fit = estimation::coloured(&setup, fit, options.noise_order, options.stopping)
         .map_err(|error| said(&error))?;
-    if fit.correlations().is_none() {
+    if !fit.is_determined() || fit.correlations().is_none() {
         let free = setup.free();
         let silent = (0..free.len()).filter(|&i| fit.triangle.column_norm(i) <= f64::MIN_POSITIVE);
         let silent: Vec<&str> = silent.map(|i| setup.names()[free[i]].as_str()).collect();

@@ -2,7 +2,7 @@
 
 use missing_effect::{
     Acceptance, Diagnosis, Effort, HeldOutError, OutputStep, PerOutput, PlaceScore, Rankings,
-    Verdict,
+    Rejection, Verdict,
 };
 
 use super::{NOISE, PERIOD, named, two_tanks};
@@ -66,9 +66,7 @@ pub(crate) fn partial_of(mut diagnosis: Diagnosis) -> Diagnosis {
         floor: named(&diagnosis.outputs, diagnosis.outputs.iter().map(|_| NOISE)),
         bic_fall: Some(512.4),
         required_bic_fall: 6.0,
-        reasons: vec![
-            "The residual is not noise: it still depends on the command (p < 0.001).".into(),
-        ],
+        rejections: vec![Rejection::NotPredictive],
     });
     diagnosis.rankings = Rankings {
         white: ["overflow", "sensor_saturation", "pump_deadzone"]

@@ -6,6 +6,7 @@ use super::{one_decimal, table};
 use crate::findings;
 use crate::report::data::step_label;
 use crate::report::text::{code, escape, significant, unit, with_error};
+use crate::sentences::of_prior;
 
 /// The parameters of every step side by side, with the error of the fit.
 pub(crate) fn parameters(diagnosis: &Diagnosis) -> String {
@@ -156,7 +157,7 @@ fn estimate(parameter: &Parameter) -> String {
     if parameter.std_error.is_none() {
         value += " *";
     }
-    match parameter.prior_words() {
+    match of_prior(parameter) {
         Some(words) => format!("{value}<br><small>{}</small>", escape(&words)),
         None => value,
     }

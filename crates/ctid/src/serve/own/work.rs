@@ -254,7 +254,7 @@ impl Work {
             "parameters": parameters.collect::<Vec<_>>(),
             "starts": step.starts,
             "starts_agree": step.starts_agree,
-            "not_determined": found.not_determined.iter().map(|of| of.join(", ")).collect::<Vec<_>>(),
+            "not_determined": step.not_determined.iter().map(|of| of.join(", ")).collect::<Vec<_>>(),
             "curves": curves.collect::<Vec<_>>(),
         })
     }

@@ -95,9 +95,9 @@ fn what_there_is_no_time_for_is_not_claimed() {
     let bounds = Bounds::new(&problem, &Limits::default(), false, 4).unwrap();
     allow(&fitted.base, 1.0);
     let before = search.before().unwrap();
-    let (all, _) = search.promises(&bounds, 1, &before).unwrap();
+    let (all, _) = search.predictions(&bounds, 1, &before).unwrap();
     allow(&fitted.base, 0.0);
-    let (mut few, _) = search.promises(&bounds, 1, &before).unwrap();
+    let (mut few, _) = search.predictions(&bounds, 1, &before).unwrap();
     assert!(
         (1..=4).contains(&few.len()) && few.len() < all.len(),
         "{} of {}",

@@ -76,7 +76,7 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
     for truth in 0..2 {
         let (a, b) = (&fitted.nodes[truth], &fitted.nodes[1 - truth]);
         let simulated = simulate_experiment(a, &Loop::Open, &values, INTERVAL, 100.0).unwrap();
-        let promised = linear(&simulated, b, &information(b, metric), metric).unwrap();
+        let predicted = linear(&simulated, b, &information(b, metric), metric).unwrap();
         let existing = noise_free(a).unwrap();
         let before = misfit_before(&existing, a, b, metric).unwrap();
         let confirmed = refitted(&existing, &simulated, (a, b), before, metric).unwrap();
@@ -108,13 +108,13 @@ fn the_power_is_the_mean_of_the_likelihood_ratio() {
         let mean = ratios.iter().sum::<f64>() / n;
         let variance = ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n - 1.0);
         let error = (variance / n).sqrt();
-        println!("promised {promised:.1}, refitted {confirmed:.1}, mean {mean:.1} +- {error:.1}");
+        println!("predicted {predicted:.1}, refitted {confirmed:.1}, mean {mean:.1} +- {error:.1}");
         assert!(
-            promised > 5.0,
-            "an experiment that shows something: {promised}"
+            predicted > 5.0,
+            "an experiment that shows something: {predicted}"
         );
         assert!((mean - confirmed).abs() < 3.0 * error, "{mean} {confirmed}");
-        assert!((mean - promised).abs() < 3.0 * error, "{mean} {promised}");
+        assert!((mean - predicted).abs() < 3.0 * error, "{mean} {predicted}");
         // Twice the logarithm of a likelihood ratio of two fixed means: variance 4 lambda.
         assert!(
             (variance / (4.0 * confirmed) - 1.0).abs() < 0.4,

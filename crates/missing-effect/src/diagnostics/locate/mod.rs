@@ -1,13 +1,11 @@
 //! Location of model errors: the residual by time window, level, flow, direction of change and frequency.
 //!
-//!
 //! A bin fails where its mean square is clearly above what the noise would show there (`expected.rs`).
 
 mod expected;
-mod sentences;
+mod worst;
 
-use ct_signals::{ArModel, Clock};
-use plants::Domain;
+use ct_signals::ArModel;
 
 use self::expected::{Expected, FACTOR_OF_A_BAND, beyond_chance, transform};
 use crate::{Bin, Failures};
@@ -20,33 +18,14 @@ const FEWEST: usize = 8;
 /// One record with the signals of a model; all series are as long as `time`.
 #[derive(Debug, Clone, Copy)]
 pub struct Series<'a> {
-    /// The record's name.
-    pub name: &'a str,
     /// Sampling instants, rising \[s\].
     pub time: &'a [f64],
-    /// The input for the plots and bins of the residual \[`input_unit`\]; empty if the model has none.
+    /// The input for the plots and bins of the residual \[input unit\]; empty if the model has none.
     pub input: &'a [f64],
-    /// Output of the model \[`output_unit`\].
+    /// Output of the model \[output unit\].
     pub model: &'a [f64],
-    /// Measured minus model, NaN without a measurement \[`output_unit`\].
+    /// Measured minus model, NaN without a measurement \[output unit\].
     pub residual: &'a [f64],
-}
-
-/// The residual to locate, its noise model, and its units.
-#[derive(Debug, Clone, Copy)]
-pub struct Located<'a> {
-    /// At least one record.
-    pub series: &'a [Series<'a>],
-    /// The noise of the output.
-    pub noise: &'a ArModel,
-    /// Unit of the output.
-    pub output_unit: &'a str,
-    /// Unit of the input.
-    pub input_unit: &'a str,
-    /// Format of times.
-    pub clock: &'a Clock,
-    /// Physical domain, which determines the words.
-    pub domain: Domain,
 }
 
 fn bin(from: f64, to: f64, values: impl Iterator<Item = f64>, expected: &Expected) -> Bin {
@@ -187,10 +166,10 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
     bands
 }
 
-/// Regions where the model fails: windows record by record, the others over all records together.
+/// Regions where a model fails at one output: windows record by record, the others over all records together. `series`: at least one record;
+/// `noise`: the noise of the output.
 #[must_use]
-pub fn locate(located: &Located) -> Failures {
-    let Located { series, noise, .. } = *located;
+pub fn locate(series: &[Series], noise: &ArModel) -> Failures {
     let expected: Vec<Expected> = series
         .iter()
         .map(|one| Expected::of(noise, one.residual.len()))
@@ -227,9 +206,9 @@ pub fn locate(located: &Located) -> Failures {
         by_flow,
         by_direction,
         by_frequency: by_frequency(series, &expected),
-        sentences: Vec::new(),
+        worst: Vec::new(),
     };
-    failures.sentences = sentences::sentences(located, &residual, &failures);
+    failures.worst = worst::worst(&residual, &failures);
     failures
 }
 

@@ -2,6 +2,7 @@
 use std::f64::consts::TAU;
 
 use super::*;
+use crate::{Failure, FailureKind};
 use ct_signals::noise;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -16,23 +17,18 @@ fn rig(n: u32) -> (Vec<f64>, Vec<f64>) {
 fn located(noise: &ArModel, records: &[(&[f64], &[f64], &[f64])]) -> Failures {
     let series: Vec<Series> = records
         .iter()
-        .zip(["first", "second"])
-        .map(|((time, model, residual), name)| Series {
-            name,
+        .map(|(time, model, residual)| Series {
             time,
             input: model,
             model,
             residual,
         })
         .collect();
-    locate(&Located {
-        series: &series,
-        noise,
-        output_unit: "cm",
-        domain: plants::Domain::Hydraulic,
-        input_unit: "V",
-        clock: &ct_signals::Clock::of([]),
-    })
+    locate(&series, noise)
+}
+
+fn worst(failures: &Failures, by: FailureKind) -> &Failure {
+    failures.worst.iter().find(|worst| worst.by == by).unwrap()
 }
 
 fn failing(failures: &Failures) -> usize {
@@ -61,12 +57,9 @@ fn a_failure_at_high_level_is_found_where_it_is() {
         // The failing range begins at 14; a bin of 0.83 extends over this value.
         assert_eq!(bin.fails, bin.to > 14.0 + 0.05, "{bin:?}");
     }
-    assert!(
-        failures
-            .sentences
-            .iter()
-            .any(|s| s.contains("levels") && s.contains("too high"))
-    );
+    let high = worst(&failures, FailureKind::Level);
+    assert!(high.bin.from >= 13.2 && high.bin.mean < -0.5);
+    assert!(high.error_share > high.sample_share + 0.2);
     let n = residual.len() as f64;
     let mean_square: f64 = residual.iter().map(|r| r * r).sum::<f64>() / n;
     let mean = residual.iter().sum::<f64>() / n;
@@ -112,8 +105,9 @@ fn a_band_that_the_noise_does_not_fill_fails() {
         .collect()
     };
     let quick = located(&process, &[(&time, &model, &swing(3.0))]);
-    let said = quick.sentences.join("; ");
-    assert!(said.contains("most at periods of 2 to 4 s"), "{said}");
+    // Periods from 2 to 4 s.
+    let band = worst(&quick, FailureKind::Frequency);
+    assert!(band.bin.from <= 1.0 / 3.0 && band.bin.to >= 1.0 / 3.0);
     // Where the noise itself is large an oscillation of that size is nothing.
     assert_eq!(
         failing(&located(&process, &[(&time, &model, &swing(300.0))])),
@@ -141,6 +135,8 @@ fn a_failure_in_the_second_record_is_found_there() {
             .iter()
             .all(|bin| !bin.fails || bin.record == Some(1))
     );
-    let said = failures.sentences.join("; ");
-    assert!(said.contains("in second, from 500 to 583 s"), "{said}");
+    let window = worst(&failures, FailureKind::Time);
+    assert_eq!(window.bin.record, Some(1));
+    assert!((window.bin.from - 499.5).abs() < 1.0 && (window.bin.to - 582.75).abs() < 1.0);
+    assert!(window.error_share > 0.7 && (window.sample_share - 1.0 / 24.0).abs() < 0.005);
 }

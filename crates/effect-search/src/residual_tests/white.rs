@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use statrs::function::erf::erfc;
 
-use crate::spectral_line::strongest_line;
+use super::spectral_line::strongest_line;
 
 /// Longest tested window, as a fraction (1 over this number) of the record.
 const LONGEST_WINDOW: usize = 4;
@@ -200,9 +200,9 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         // At a level of one in a hundred, 600 series: chance exceeds 15 of them once in a thousand.
         let (mut periods, mut instants, mut levels) = (0, 0, 0);
-        // A level that wanders, and one that steps and stays.
-        let wander = noise::ar1(SAMPLES, 3.0, 0.99, &mut rng);
-        let steps: Vec<f64> = (0..SAMPLES).map(|k| wander[k / 50 * 50]).collect();
+        // A level that drifts, and one that steps and stays.
+        let drift = noise::ar1(SAMPLES, 3.0, 0.99, &mut rng);
+        let steps: Vec<f64> = (0..SAMPLES).map(|k| drift[k / 50 * 50]).collect();
         for run in 0..600 {
             let colour = [0.0, 0.8, 0.95][run % 3];
             let e = noise::ar1(SAMPLES, 0.1, colour, &mut rng);
@@ -210,7 +210,7 @@ mod tests {
             periods += usize::from(period(&e, 0.01).unwrap().is_some());
             let white = standardised(&model, &e);
             instants += usize::from(instant(&white, 0.01).is_some());
-            levels += usize::from(level_p([&wander, &steps][run % 2], &white) < 0.01);
+            levels += usize::from(level_p([&drift, &steps][run % 2], &white) < 0.01);
         }
         assert!(periods <= 15 && instants <= 15, "{periods}, {instants}");
         assert!((1..=15).contains(&levels), "{levels}");

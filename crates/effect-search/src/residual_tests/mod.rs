@@ -1,5 +1,11 @@
 //! Tests whether the residual of a set of effects is noise.
 
+mod energy;
+mod first_order;
+mod spectral_line;
+mod stationarity;
+pub mod white;
+
 use ct_signals::ArModel;
 use ct_signals::residual_tests::prewhitened_input_test;
 use estimation::Fit;
@@ -7,10 +13,13 @@ use greybox::ModelSetup;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use self::energy::concentrated;
+use self::first_order::first_order_p;
+pub use self::spectral_line::{Line, strongest_line};
+use self::stationarity::stationary_p;
+use self::white::{harmonics_p, instant, level_p, of_command, period, standardised};
 use crate::Error;
 use crate::node::{Context, Node};
-use crate::residual::{harmonics_p, instant, level_p, of_command, period, standardised};
-use crate::stationarity::stationary_p;
 use crate::thresholds::Thresholds;
 
 /// A property of a residual that noise does not have.
@@ -31,8 +40,19 @@ pub enum NotNoise {
         /// Its length \[s\].
         period: f64,
     },
-    /// A disturbance during a part of the record.
+    /// An abrupt change.
     Instant {
+        /// The output.
+        output: String,
+        /// The record.
+        record: String,
+        /// From when \[s, the record's clock\].
+        from: f64,
+        /// Until when \[s\].
+        to: f64,
+    },
+    /// It is larger in a part of the record than noise with its correlation would be: a disturbance for a while.
+    Disturbance {
         /// The output.
         output: String,
         /// The record.
@@ -60,6 +80,12 @@ pub enum NotNoise {
         effect: String,
         /// Its variable: a state or an input, or `time`.
         variable: String,
+    },
+    /// Its correlation is not that of first-order noise: for example a disturbance in a band of frequencies, or physics that no candidate
+    /// describes.
+    Correlation {
+        /// The output.
+        output: String,
     },
     /// Its correlation time is so long that the records contain too few independent samples to call it noise.
     Slow {
@@ -151,6 +177,16 @@ impl Context<'_> {
                     to: record.time[to],
                 }));
             }
+            let interrupted = || self.limit.passed();
+            let noise = own.noise.of_series(i);
+            if let Some(window) = concentrated(noise, residual, &white, interrupted) {
+                return Ok(Some(NotNoise::Disturbance {
+                    output: name(i),
+                    record: record.name.clone(),
+                    from: record.time[window.start],
+                    to: record.time[window.end],
+                }));
+            }
             if level_p(&models[i], &white) < level {
                 return Ok(Some(NotNoise::Level { output: name(i) }));
             }
@@ -164,8 +200,13 @@ impl Context<'_> {
         if let Some(function) = self.function(node, own) {
             return Ok(Some(function));
         }
-        let slow = self.slow_output(&own.noise);
-        Ok(slow.map(|o| NotNoise::Slow { output: name(o) }))
+        if let Some(o) = self.slow_output(&own.noise) {
+            return Ok(Some(NotNoise::Slow { output: name(o) }));
+        }
+        let other = residuals
+            .iter()
+            .position(|residual| first_order_p(residual, own.x.len()) < level);
+        Ok(other.map(|i| NotNoise::Correlation { output: name(i) }))
     }
 
     /// The smooth function that lowers the deviance of a set significantly, with the noise model of the set's own residual: a score test of each

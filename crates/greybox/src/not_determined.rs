@@ -1,0 +1,28 @@
+//! The parameters that records do not determine.
+
+use crate::{Fit, ModelSetup};
+
+/// Two estimates with a correlation above this are determined only in combination.
+const TOGETHER: f64 = 0.999;
+
+/// Names of the fitted entries that the records do not determine: one alone that has no effect on the readings, those of a combination that
+/// has none, and pairs of which only a combination is determined well.
+#[must_use]
+pub fn not_determined(setup: &ModelSetup, fit: &Fit) -> Vec<Vec<String>> {
+    let (names, free) = (setup.names(), setup.free());
+    let silent = (0..free.len())
+        .filter(|&column| fit.triangle.column_norm(column) <= f64::MIN_POSITIVE)
+        .map(|column| vec![names[free[column]].clone()]);
+    let mut found: Vec<Vec<String>> = silent.collect();
+    let of = |group: Vec<usize>| group.iter().map(|&i| names[i].clone()).collect();
+    found.extend(fit.undetermined().into_iter().map(of));
+    if let Some((entries, matrix)) = fit.correlations() {
+        for (i, row) in matrix.iter().enumerate() {
+            let together = (0..i).filter(|&j| row[j].abs() > TOGETHER);
+            found.extend(
+                together.map(|j| vec![names[entries[j]].clone(), names[entries[i]].clone()]),
+            );
+        }
+    }
+    found
+}

@@ -12,6 +12,7 @@ use ct_signals::{Channel, Record, residual_tests::prewhitened_input_test};
 use missing_effect::Problem;
 
 use crate::numbers;
+use crate::sentences::with_unit;
 
 /// A command has changed if its distance from the previous constant value is this share of its whole range.
 const MOVE: f64 = 0.1;
@@ -73,7 +74,7 @@ impl fmt::Display for ExcitationWarning {
                 "{record}: the command makes a single step, from {} to {}: a gain and a time constant can be fitted to it, but not how they \
                  change with the level or the command, and many effects cannot be told apart; record several steps of different sizes",
                 numbers::significant(*before, 3),
-                with_unit(*after, unit),
+                value_with_unit(*after, unit),
             ),
             Self::NoAnswer {
                 record,
@@ -88,16 +89,16 @@ impl fmt::Display for ExcitationWarning {
                 output
                     .as_ref()
                     .map_or(String::new(), |name| format!(" \"{name}\"")),
-                with_unit(*range, unit),
-                with_unit(*difference, unit),
+                value_with_unit(*range, unit),
+                value_with_unit(*difference, unit),
             ),
         }
     }
 }
 
-fn with_unit(value: f64, unit: &str) -> String {
-    let number = numbers::significant(value, 3);
-    format!("{number} {unit}").trim_end().to_string()
+/// A value to three digits, with its unit.
+fn value_with_unit(value: f64, unit: &str) -> String {
+    with_unit(&numbers::significant(value, 3), unit)
 }
 
 /// Warnings for the fitted records of a problem.

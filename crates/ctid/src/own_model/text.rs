@@ -142,3 +142,26 @@ fn drawn(curves: &Curves, look: Look) -> String {
         plot(&one, (0.0, *length), own, 5, look)
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_records_do_not_determine_is_named_with_its_mend() {
+        let group = |names: &[&str]| names.iter().map(|name| name.to_string()).collect();
+        let text = undetermined(
+            &[
+                group(&["limit"]),
+                group(&["gain", "size"]),
+                group(&["a", "b", "c"]),
+            ],
+            Look::plain(),
+        );
+        let lines: Vec<&str> = text.split("warning: ").skip(1).collect();
+        assert!(lines[0].starts_with("limit has no effect on the readings"));
+        assert!(lines[1].contains("only a combination of gain and size"));
+        assert!(lines[2].contains("do not determine a, b, c"));
+        assert_eq!(undetermined(&[], Look::plain()), "");
+    }
+}

@@ -118,22 +118,18 @@ impl Fit {
         Ok(robust.map_or_else(none, |robust| robust.half_widths(level)))
     }
 
-    /// Names and covariance of what the records determine; `None` where they do not.
+    /// Names and covariance of what is fitted and not at a bound; `None` where the records do not determine all of it.
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Covariance<'py>> {
         let setup = self.fitted.setup().map_err(|error| error::of(&error))?;
         let robust = self.fitted.robust().map_err(|error| error::of(&error))?;
-        let Some(matrix) = robust.and_then(|robust| robust.covariance) else {
+        let fit = self.fitted.estimate();
+        let covariance = robust.and_then(|robust| robust.covariance);
+        let Some(matrix) = covariance.filter(|_| fit.is_determined()) else {
             return Ok(None);
         };
-        let fit = self.fitted.estimate();
-        let (free, interior, determined) = (setup.free(), fit.interior(), fit.determined());
-        let names = determined
-            .iter()
-            .map(|&i| setup.names()[free[interior[i]]].clone());
-        let matrix: Vec<Vec<f64>> = determined
-            .iter()
-            .map(|&i| determined.iter().map(|&j| matrix[i][j]).collect())
-            .collect();
+        let free = setup.free();
+        let names = fit.interior().iter();
+        let names = names.map(|&i| setup.names()[free[i]].clone());
         let matrix = PyArray2::from_vec2(py, &matrix);
         let matrix = matrix.map_err(|error| error::of_data(error.to_string()))?;
         Ok(Some((names.collect(), matrix)))

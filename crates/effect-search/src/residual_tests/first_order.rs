@@ -12,6 +12,8 @@ use ct_signals::StationaryNoise;
 use realfft::RealFftPlanner;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::bands::bands;
+
 /// Values of `atanh` of the two coefficients from which the search begins: for the pole correlation times from 0.7 to 450 samples.
 const STARTS: [f64; 9] = [-1.5, -0.7, -0.25, 0.25, 0.7, 1.2, 1.8, 2.5, 3.4];
 /// Largest `atanh` of a coefficient.
@@ -48,24 +50,17 @@ pub fn first_order_p(residual: &[f64], fitted: usize) -> f64 {
     if !(mean > 0.0 && mean.is_finite()) {
         return 1.0;
     }
-    let (mut deviance, mut bands) = (0.0, 0.0);
-    let (mut from, mut to) = (0, LINES);
-    while from < power.len() {
-        let end = if 2 * to > power.len() {
-            power.len()
-        } else {
-            to
-        };
-        let lines = (end - from) as f64;
-        let ratio = power[from..end].iter().sum::<f64>() / (mean * lines);
-        if ratio > 1.0 || from >= fitted {
+    let (mut deviance, mut count) = (0.0, 0.0);
+    for band in bands(power.len(), LINES) {
+        let lines = band.len() as f64;
+        let ratio = power[band.clone()].iter().sum::<f64>() / (mean * lines);
+        if ratio > 1.0 || band.start >= fitted {
             deviance += 2.0 * lines * (ratio - 1.0 - ratio.max(f64::MIN_POSITIVE).ln());
         }
-        bands += 1.0;
-        (from, to) = (end, 2 * end);
+        count += 1.0;
     }
     // The mean is one of the bands' degrees of freedom.
-    ChiSquared::new(bands - 1.0).map_or(1.0, |chi| chi.sf(deviance))
+    ChiSquared::new(count - 1.0).map_or(1.0, |chi| chi.sf(deviance))
 }
 
 /// A series whitened by the ARMA(1,1) process of the largest likelihood; zero where a sample is missing.

@@ -1,5 +1,6 @@
 //! Tests whether the residual of a set of effects is noise.
 
+mod bands;
 mod energy;
 mod first_order;
 mod spectral_line;
@@ -168,7 +169,8 @@ impl Context<'_> {
                     period: record.duration() / cycles as f64,
                 }));
             }
-            let white = standardised(own.noise.of_series(i), residual);
+            let noise = own.noise.of_series(i);
+            let white = standardised(noise, residual);
             if let Some((from, to)) = instant(&white, level) {
                 return Ok(Some(NotNoise::Instant {
                     output: name(i),
@@ -178,7 +180,6 @@ impl Context<'_> {
                 }));
             }
             let interrupted = || self.limit.passed();
-            let noise = own.noise.of_series(i);
             if let Some(window) = concentrated(noise, residual, &white, interrupted) {
                 return Ok(Some(NotNoise::Disturbance {
                     output: name(i),
@@ -190,7 +191,7 @@ impl Context<'_> {
             if level_p(&models[i], &white) < level {
                 return Ok(Some(NotNoise::Level { output: name(i) }));
             }
-            if stationary_p(own.noise.of_series(i), residual, &self.thresholds) < level {
+            if stationary_p(noise, residual, &self.thresholds) < level {
                 return Ok(Some(NotNoise::Spectrum {
                     output: name(i),
                     record: record.name.clone(),

@@ -11,6 +11,7 @@ use ct_signals::ArModel;
 use realfft::RealFftPlanner;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::bands::bands;
 use crate::thresholds::Thresholds;
 
 /// p-value of the test that a residual has the same noise model in all its parts; 1 where it is too short for that.
@@ -44,21 +45,14 @@ pub fn stationary_p(noise: &ArModel, residual: &[f64], thresholds: &Thresholds) 
         if mean <= 0.0 {
             return 1.0;
         }
-        let mut bands = Vec::new();
+        let mut of_part = Vec::new();
         lines.clear();
-        let (mut from, mut to) = (0, thresholds.stationary_lines);
-        while to <= power.len() {
-            // Lines that do not fill another band belong to the last band.
-            let end = if 2 * to > power.len() {
-                power.len()
-            } else {
-                to
-            };
-            bands.push(power[from..end].iter().sum::<f64>() / (mean * (end - from) as f64));
-            lines.push((end - from) as f64);
-            (from, to) = (end, 2 * end);
+        for band in bands(power.len(), thresholds.stationary_lines) {
+            lines.push(band.len() as f64);
+            let expected = mean * band.len() as f64;
+            of_part.push(power[band].iter().sum::<f64>() / expected);
         }
-        powers.push(bands);
+        powers.push(of_part);
     }
     let parts = powers.len() as f64;
     let mut deviance = 0.0;

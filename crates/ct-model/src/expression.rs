@@ -47,13 +47,16 @@ pub enum Function {
     Max,
     /// `play(x, b)`: backlash of half-width `b`; the result follows `x` from row to row at a distance of at most `b`.
     Play,
+    /// `slip(x, b, j)`: stiction; the result stays until `x` is further than `b (1 + j)` from it, and then moves to a distance of `b (1 - j)`
+    /// from `x`: with `j = 0` a play, with `j = 1` it jumps to `x`.
+    Slip,
     /// `quantise(x, d)`: the multiple of `d` that is nearest to `x`; `x` itself where `d` is zero.
     Quantise,
 }
 
 impl Function {
     /// List of all functions.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Abs,
         Self::Sign,
         Self::Sqrt,
@@ -68,6 +71,7 @@ impl Function {
         Self::Min,
         Self::Max,
         Self::Play,
+        Self::Slip,
         Self::Quantise,
     ];
 
@@ -89,6 +93,7 @@ impl Function {
             Self::Min => "min",
             Self::Max => "max",
             Self::Play => "play",
+            Self::Slip => "slip",
             Self::Quantise => "quantise",
         }
     }
@@ -98,6 +103,7 @@ impl Function {
     pub fn arguments(self) -> usize {
         match self {
             Self::Atan2 | Self::Min | Self::Max | Self::Play | Self::Quantise => 2,
+            Self::Slip => 3,
             _ => 1,
         }
     }
@@ -242,7 +248,7 @@ impl Expression {
                     Function::Atan2 => a.atan2(argument(1)),
                     Function::Min => a.min(argument(1)),
                     Function::Max => a.max(argument(1)),
-                    Function::Play => a,
+                    Function::Play | Function::Slip => a,
                     Function::Quantise => quantised(a, argument(1)),
                 }
             }

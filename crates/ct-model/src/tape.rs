@@ -56,7 +56,7 @@ pub(crate) struct Tape {
     first_operation: Register,
 }
 
-/// A backlash: `min(max(held, x - b), x + b)`, where `held` is its output at the last row.
+/// A function with memory, such as a backlash `min(max(held, x - b), x + b)`, where `held` is its output at the last row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Play {
     /// Register of the delay's input.

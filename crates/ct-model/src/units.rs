@@ -176,6 +176,10 @@ impl Walk<'_> {
                 (Function::Min | Function::Max | Function::Play | Function::Quantise, [a, b]) => {
                     self.together(a, b)
                 }
+                (Function::Slip, [a, b, share]) => {
+                    self.pure(*function, share);
+                    self.together(a, b)
+                }
                 (Function::Atan2, [a, b]) => {
                     self.together(a, b);
                     Known::Is(NONE)

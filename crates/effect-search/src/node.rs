@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ct_model::effects::{Candidate, apply};
 use ct_model::{Model, ModelSpec};
 use estimation::{Fit, Noise, Start, Stopping, fit_from};
-use greybox::ModelSetup;
+use greybox::{FitOptions, ModelSetup};
 
 use crate::Error;
 use crate::problem::{Limit, Problem};
@@ -133,7 +133,8 @@ impl Context<'_> {
         self.subset(node, added, noise, stopping)
     }
 
-    /// A part of the set, fitted from its estimates.
+    /// A part of the set, fitted from its estimates, or from its own starts if its simulation is not finite there: without an effect that
+    /// changes much, the other estimates may be far from any plausible model.
     pub fn subset(
         &self,
         node: &Node,
@@ -146,7 +147,23 @@ impl Context<'_> {
             let setup = self.setup(&model)?;
             self.transfer(node, &model, setup.start())
         };
-        self.fitted(added, model, vec![start], noise, stopping)
+        match self.fitted(added.clone(), model.clone(), vec![start], noise, stopping) {
+            Err(Error::Estimation(estimation::Error::NoFiniteStart { .. })) => {
+                let own = self.own_minimum(&model)?;
+                self.fitted(added, model, vec![own], noise, stopping)
+            }
+            fitted => fitted,
+        }
+    }
+
+    /// Minimum of a model that is fitted from its own starts with white noise.
+    pub fn own_minimum(&self, model: &Model) -> Result<Vec<f64>, Error> {
+        let options = FitOptions {
+            starts: self.thresholds.own_starts,
+            stopping: ROUGH,
+            ..FitOptions::default()
+        };
+        Ok(self.setup(model)?.fit(&options)?.x)
     }
 
     /// The vector of a set as a start of another set: additional parameters have their start values.

@@ -5,7 +5,6 @@
 //! and pairs are looked at before any single effect is chosen.
 
 use estimation::Noise;
-use greybox::FitOptions;
 use rayon::prelude::*;
 
 use crate::Error;
@@ -74,7 +73,7 @@ impl Context<'_> {
                 }
                 let start = match known.iter().find(|known| known.added == node.added) {
                     Some(known) => Ok(known.fit.x.clone()),
-                    None => self.own_minimum(node),
+                    None => self.own_minimum(&node.model),
                 };
                 let added = node.added.clone();
                 let model = node.model.clone();
@@ -86,16 +85,6 @@ impl Context<'_> {
                 }
             });
         sort_by_criterion(nodes);
-    }
-
-    /// Minimum of a set that is fitted from its own starts with white noise.
-    fn own_minimum(&self, node: &Node) -> Result<Vec<f64>, Error> {
-        let options = FitOptions {
-            starts: self.thresholds.own_starts,
-            stopping: ROUGH,
-            ..FitOptions::default()
-        };
-        Ok(self.setup(&node.model)?.fit(&options)?.x)
     }
 
     /// The search of sets up to a given number of effects. `of`: positions of the candidates; `known`: fits of single effects with another

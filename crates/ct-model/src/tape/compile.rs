@@ -7,6 +7,11 @@ use super::{Branch, Guard, Operation, Play, Register, Tape};
 use crate::expression::{Comparison, Condition, Expression, Function, Operator, Variable};
 use crate::spec::ModelSpec;
 
+/// Perturbation of a half-width for the finite differences of stiction, as a share of it, ...
+const PERTURBATION: f64 = 0.05;
+/// ... and the additional perturbation near a half-width of zero \[unit of the signal\].
+const LEAST_PERTURBATION: f64 = 1e-9;
+
 struct Compiler<'a> {
     spec: &'a ModelSpec,
     constants: Vec<f64>,
@@ -39,6 +44,10 @@ impl Tape {
                         numbers.set(numbers.get() + 2);
                     }
                     Expression::Call(Function::Play, _) => plays.set(plays.get() + 1),
+                    Expression::Call(Function::Slip, _) => {
+                        numbers.set(numbers.get() + 3);
+                        plays.set(plays.get() + 3);
+                    }
                     Expression::Delay(..) => delays.set(delays.get() + 1),
                     _ => {}
                 }
@@ -256,7 +265,8 @@ impl Compiler<'_> {
             }
             Expression::Call(function, arguments) => {
                 let given: Vec<Register> = arguments.iter().map(|a| self.expression(a)).collect();
-                self.call(*function, given[0], given.get(1).copied().unwrap_or(0))
+                let given_at = |i: usize| given.get(i).copied().unwrap_or(0);
+                self.call(*function, given[0], given_at(1), given_at(2))
             }
             Expression::If(condition, a, b) => {
                 let branch = self.condition(condition);
@@ -276,7 +286,7 @@ impl Compiler<'_> {
         }
     }
 
-    fn call(&mut self, function: Function, a: Register, b: Register) -> Register {
+    fn call(&mut self, function: Function, a: Register, b: Register, c: Register) -> Register {
         match function {
             Function::Abs => {
                 let (zero, negative) = (self.number(0.0), self.operation(Operation::Negative(a)));
@@ -294,6 +304,7 @@ impl Compiler<'_> {
             Function::Min => self.smaller(a, b),
             Function::Max => self.larger(a, b),
             Function::Play => self.play(a, b),
+            Function::Slip => self.slip(a, b, c),
             Function::Quantise => self.operation(Operation::Quantise(a, b)),
             Function::Sqrt => self.operation(Operation::Sqrt(a)),
             Function::Exp => self.operation(Operation::Exp(a)),
@@ -323,6 +334,46 @@ impl Compiler<'_> {
         let held = self.first_play + self.plays.len();
         let pushed = self.larger(held, low);
         let to = self.smaller(pushed, high);
+        self.plays.push(Play { from, held, to });
+        to
+    }
+
+    /// Stiction, with finite differences in place of its derivative by the half-width: a narrower and a wider element follow the same
+    /// signal. The derivative itself is zero almost everywhere if the jump is complete: the result changes only where a jump occurs or no
+    /// longer occurs.
+    fn slip(&mut self, from: Register, half_width: Register, jump: Register) -> Register {
+        let [one, share, least] = [1.0, PERTURBATION, LEAST_PERTURBATION].map(|n| self.number(n));
+        let width = self.operation(Operation::Scale(one, half_width));
+        let relative = self.operation(Operation::Multiply(share, width));
+        let reach = self.operation(Operation::Add(relative, least));
+        let narrower = self.operation(Operation::Subtract(width, reach));
+        let wider = self.operation(Operation::Add(width, reach));
+        let [below, middle, above] =
+            [narrower, width, wider].map(|width| self.stick(from, width, jump));
+        let rise = self.operation(Operation::Subtract(above, below));
+        let run = self.operation(Operation::Add(reach, reach));
+        let slope = self.operation(Operation::Divide(rise, run));
+        // Zero, but with the derivatives of the half-width.
+        let change = self.operation(Operation::Subtract(half_width, width));
+        let first_order = self.operation(Operation::Multiply(slope, change));
+        self.operation(Operation::Add(middle, first_order))
+    }
+
+    /// An element that sticks until its input is further from it than `half_width*(1 + jump)`, and then moves to a distance of
+    /// `half_width*(1 - jump)`.
+    fn stick(&mut self, from: Register, half_width: Register, jump: Register) -> Register {
+        let jumped = self.operation(Operation::Multiply(half_width, jump));
+        let band = self.operation(Operation::Add(half_width, jumped));
+        let rest = self.operation(Operation::Subtract(half_width, jumped));
+        let low = self.operation(Operation::Subtract(from, band));
+        let high = self.operation(Operation::Add(from, band));
+        let from_below = self.operation(Operation::Subtract(from, rest));
+        let from_above = self.operation(Operation::Add(from, rest));
+        let held = self.first_play + self.plays.len();
+        let rises = self.guard(Comparison::Less, held, low);
+        let falls = self.guard(Comparison::Greater, held, high);
+        let lowered = self.select(falls, from_above, held);
+        let to = self.select(rises, from_below, lowered);
         self.plays.push(Play { from, held, to });
         to
     }

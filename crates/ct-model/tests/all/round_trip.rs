@@ -88,9 +88,10 @@ fn expression(site: Site, of_time: bool) -> BoxedStrategy<Expression> {
             proptest::sample::select(Function::ALL.to_vec()),
             inner.clone(),
             inner.clone(),
+            inner.clone(),
         );
-        let call = function.prop_map(|(function, a, b)| {
-            let mut arguments = vec![a, b];
+        let call = function.prop_map(|(function, a, b, c)| {
+            let mut arguments = vec![a, b, c];
             arguments.truncate(function.arguments());
             Expression::Call(function, arguments)
         });

@@ -137,6 +137,17 @@ fn block(equation: &str) -> String {
         .replace("g*u - k*(T - Ta)", equation)
 }
 
+#[test]
+fn an_actuator_that_sticks_and_jumps_is_named() {
+    let hidden = block("g*slip(u, 3, 1) - k*(T - Ta)");
+    let found = found(&problem(BLOCK, record(&hidden, 0.0, 0.3, 4)));
+    assert!(names(&found, "backlash(u)"), "{:?}", found.groups);
+    assert_eq!(found.effects, ["backlash(u)"]);
+    let last = found.steps.last().unwrap();
+    let jump = last.parameters.iter().find(|p| p.name == "backlash_u_jump");
+    assert_eq!(jump.unwrap().value, 1.0);
+}
+
 /// The block after a sensor with a time constant of 25 s.
 fn lagging() -> String {
     block("g*u - k*(T - Ta)")

@@ -9,17 +9,30 @@ pub(super) const EFFECT: Effect = Effect {
 model backlash
   input Real u;
   constant Real width(unit="signal") = 1;
-  parameter Real half_width(unit="port", min=0, max=0.5*width) = 0 "half of the play";
-  output Real v(unit="port") = play(u, half_width);
+  final parameter Real jump(min=0, max=1) = 0 "0: play; 1: stiction, which moves by steps of twice the half-width";
+  parameter Real half_width(unit="port", min=0, max=0.5*width) = 0 "half of the play, or of the step by which it moves";
+  output Real v(unit="port") = slip(u, half_width, jump);
 end backlash;
 "#,
-    parameters: &[(
-        "half_width",
-        Role::Size,
-        Starts::Widths(&[0.01, 0.05, 0.15]),
-    )],
-    physics: "After each reversal the command has to cross a backlash before the actuator follows: worn gears, a valve's stem that sticks.",
+    parameters: &[
+        ("jump", Role::Choice, Starts::Values(&[0.0, 1.0])),
+        // With stiction, the cost has a visible minimum only within a sixth of the true width.
+        (
+            "half_width",
+            Role::Threshold,
+            Starts::Widths(&[
+                0.01, 0.018, 0.026, 0.036, 0.05, 0.068, 0.09, 0.12, 0.16, 0.21, 0.27, 0.35,
+            ]),
+        ),
+    ],
+    physics: "After each reversal the command has to cross a backlash before the actuator follows (worn gears), or the actuator sticks until the command has moved far enough, and then jumps (a valve's stem).",
     confused_with: &["dead_zone(u)", "lag(u)", "hysteresis(y)"],
     confirm: "Reverse the input in small steps and count those that change nothing.",
-    symptoms: &["play", "stiction", "no answer to small reversals", "slack"],
+    symptoms: &[
+        "play",
+        "stiction",
+        "no answer to small reversals",
+        "slack",
+        "sticks and jumps",
+    ],
 };

@@ -1,5 +1,6 @@
 //! The plants as text, diagnosed as any model of a user, on the blind records of tanks, where these lie beside the checkout.
 
+use std::error::Error;
 use std::path::PathBuf;
 
 use ct_model::ModelSpec;
@@ -9,7 +10,7 @@ use effect_search::{Diagnosis, Options, Problem, Verdict, diagnose};
 use plants::Plant;
 
 /// The diagnosis of a blind record with the text of its plant, on the measured command.
-fn diagnosed(case: &str, plant: Plant, known: &[(&str, f64)]) -> Diagnosis {
+fn diagnosed(case: &str, plant: Plant, known: &[(&str, f64)]) -> Result<Diagnosis, Box<dyn Error>> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/blind/public");
     let files = Files {
         data: vec![folder.join(format!("{case}.csv"))],
@@ -17,8 +18,8 @@ fn diagnosed(case: &str, plant: Plant, known: &[(&str, f64)]) -> Diagnosis {
         model: folder.join(format!("{case}.toml")),
         options: ReadOptions::default(),
     };
-    let kernel = files.read().unwrap().problem;
-    let spec = ModelSpec::parse(plant.text()).unwrap();
+    let kernel = files.read()?.problem;
+    let spec = ModelSpec::parse(plant.text())?;
     let mut record = kernel.records[0].clone();
     let named = |channels: &mut [Channel], names: Vec<String>| {
         for (channel, name) in channels.iter_mut().zip(names) {
@@ -38,14 +39,14 @@ fn diagnosed(case: &str, plant: Plant, known: &[(&str, f64)]) -> Diagnosis {
     for (name, value) in known {
         builder = builder.known(*name, *value);
     }
-    diagnose(&builder.build().unwrap(), &Options::default(), &|_| {}).unwrap()
+    Ok(diagnose(&builder.build()?, &Options::default(), &|_| {})?)
 }
 
 /// The pump sticks until its command has moved by more than 0.56 V, and then jumps: a play does not explain it.
 #[test]
 #[cfg_attr(not(blind_records), ignore = "no blind records beside the checkout")]
 fn stiction_is_a_backlash_that_jumps() {
-    let found = diagnosed("case-0016", Plant::CascadedTanksLinear, &[]);
+    let found = diagnosed("case-0016", Plant::CascadedTanksLinear, &[]).unwrap();
     assert_eq!(found.verdict, Verdict::Effect);
     assert_eq!(found.effects, ["backlash(u)"]);
     let last = found.steps.last().unwrap();
@@ -63,7 +64,7 @@ fn stiction_is_a_backlash_that_jumps() {
 #[test]
 #[cfg_attr(not(blind_records), ignore = "no blind records beside the checkout")]
 fn a_set_that_cannot_lose_an_effect_at_its_estimates_is_diagnosed() {
-    let found = diagnosed("case-0021", Plant::SingleTank, &[("area", 154.0)]);
+    let found = diagnosed("case-0021", Plant::SingleTank, &[("area", 154.0)]).unwrap();
     assert_eq!(found.verdict, Verdict::Undecided);
     let errors: Vec<f64> = found.steps.iter().filter_map(|step| step.rmse).collect();
     let (first, last) = (errors[0], errors[errors.len() - 1]);

@@ -47,9 +47,9 @@ pub enum Function {
     Max,
     /// `play(x, b)`: backlash of half-width `b`; the result follows `x` from row to row at a distance of at most `b`.
     Play,
-    /// `slip(x, b, j)`: stiction; the result stays until `x` is further than `b (1 + j)` from it, and then moves to a distance of `b (1 - j)`
+    /// `stick_slip(x, b, j)`: stiction; the result stays until `x` is further than `b (1 + j)` from it, and then moves to a distance of `b (1 - j)`
     /// from `x`: with `j = 0` a play, with `j = 1` it jumps to `x`.
-    Slip,
+    StickSlip,
     /// `quantise(x, d)`: the multiple of `d` that is nearest to `x`; `x` itself where `d` is zero.
     Quantise,
 }
@@ -71,7 +71,7 @@ impl Function {
         Self::Min,
         Self::Max,
         Self::Play,
-        Self::Slip,
+        Self::StickSlip,
         Self::Quantise,
     ];
 
@@ -93,7 +93,7 @@ impl Function {
             Self::Min => "min",
             Self::Max => "max",
             Self::Play => "play",
-            Self::Slip => "slip",
+            Self::StickSlip => "stick_slip",
             Self::Quantise => "quantise",
         }
     }
@@ -103,7 +103,7 @@ impl Function {
     pub fn arguments(self) -> usize {
         match self {
             Self::Atan2 | Self::Min | Self::Max | Self::Play | Self::Quantise => 2,
-            Self::Slip => 3,
+            Self::StickSlip => 3,
             _ => 1,
         }
     }
@@ -211,7 +211,7 @@ impl Expression {
         }
     }
 
-    /// The value for these values of the variables; a delay and a backlash return their input.
+    /// The value for these values of the variables; a delay, a play and stick-slip return their input.
     #[must_use]
     pub fn value(&self, time: f64, of: &impl Fn(Variable) -> f64) -> f64 {
         match self {
@@ -248,7 +248,7 @@ impl Expression {
                     Function::Atan2 => a.atan2(argument(1)),
                     Function::Min => a.min(argument(1)),
                     Function::Max => a.max(argument(1)),
-                    Function::Play | Function::Slip => a,
+                    Function::Play | Function::StickSlip => a,
                     Function::Quantise => quantised(a, argument(1)),
                 }
             }

@@ -176,7 +176,7 @@ impl Walk<'_> {
                 (Function::Min | Function::Max | Function::Play | Function::Quantise, [a, b]) => {
                     self.together(a, b)
                 }
-                (Function::Slip, [a, b, share]) => {
+                (Function::StickSlip, [a, b, share]) => {
                     self.pure(*function, share);
                     self.together(a, b)
                 }

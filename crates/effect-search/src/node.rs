@@ -150,7 +150,16 @@ impl Context<'_> {
         match self.fitted(added.clone(), model.clone(), vec![start], noise, stopping) {
             Err(Error::Estimation(estimation::Error::NoFiniteStart { .. })) => {
                 let own = self.own_minimum(&model)?;
-                self.fitted(added, model, vec![own], noise, stopping)
+                // The own starts of the effects are absent, and a fit does not change a choice.
+                let mut with_effects = own.clone();
+                let own_count = self.problem.spec.parameters.len();
+                let parameters = model.spec().parameters.iter().enumerate();
+                for (at, parameter) in parameters.skip(own_count) {
+                    if let Some(value) = node.value(&parameter.about.name) {
+                        with_effects[at] = value;
+                    }
+                }
+                self.fitted(added, model, vec![with_effects, own], noise, stopping)
             }
             fitted => fitted,
         }

@@ -10,7 +10,7 @@
 use std::sync::Arc;
 
 use ct_model::Model;
-use ct_model::effects::Role;
+use ct_model::effects::{Role, best_of_each_choice};
 use estimation::{Noise, Residuals, Rows, Triangle, linearise, within};
 use rayon::prelude::*;
 
@@ -54,23 +54,6 @@ struct Place {
     cost: f64,
     x: Vec<f64>,
     stepped: Vec<f64>,
-}
-
-/// The best places of a sorted list, and the best place of each value of the choices that these lack: a fit does not change a choice.
-fn best_of_each_choice(sorted: Vec<Place>, choices: &[usize], most: usize) -> Vec<Place> {
-    let of = |place: &Place| -> Vec<f64> { choices.iter().map(|&at| place.x[at]).collect() };
-    let mut seen: Vec<Vec<f64>> = Vec::new();
-    let mut rank = 0;
-    let kept = sorted.into_iter().filter(|place| {
-        let choice = of(place);
-        let new = !seen.contains(&choice);
-        if new {
-            seen.push(choice);
-        }
-        rank += 1;
-        new || rank <= most
-    });
-    kept.collect()
 }
 
 /// The effect whose starts come from the spectrum of the residual.
@@ -294,9 +277,11 @@ impl Context<'_> {
             .filter(|(own, _)| own.role == Role::Choice)
             .filter_map(|(_, place)| *place)
             .collect();
+        let choice =
+            |place: &Place| -> Vec<f64> { choices.iter().map(|&at| place.x[at]).collect() };
         if !smooth {
             // The presence of the effect changes the derivatives of the other parameters.
-            scored = best_of_each_choice(scored, &choices, self.thresholds.linearised_starts);
+            scored = best_of_each_choice(scored, choice, self.thresholds.linearised_starts);
             scored = scored
                 .into_iter()
                 .filter_map(|Place { x, .. }| {
@@ -324,7 +309,7 @@ impl Context<'_> {
             let cost = squares.map_or(f64::INFINITY, |squares| squares.cost());
             if cost.is_nan() { f64::INFINITY } else { cost }
         };
-        let mut places: Vec<(f64, Vec<f64>)> = best_of_each_choice(scored, &choices, kept)
+        let mut places: Vec<(f64, Vec<f64>)> = best_of_each_choice(scored, choice, kept)
             .into_iter()
             .map(|place| {
                 let to = |share: f64| -> Vec<f64> {
@@ -348,37 +333,5 @@ impl Context<'_> {
             starts,
             fall,
         }))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_best_place_of_each_choice_is_kept() {
-        let place = |predicted: f64, side: f64| Place {
-            predicted,
-            cost: 10.0,
-            x: vec![side, predicted],
-            stepped: vec![side, predicted],
-        };
-        let sorted = || {
-            [
-                (1.0, -1.0),
-                (2.0, -1.0),
-                (3.0, -1.0),
-                (4.0, 1.0),
-                (5.0, 1.0),
-            ]
-        };
-        let kept = |choices: &[usize], most: usize| -> Vec<f64> {
-            let places = sorted().map(|(predicted, side)| place(predicted, side));
-            let best = best_of_each_choice(places.into(), choices, most);
-            best.iter().map(|place| place.predicted).collect()
-        };
-        assert_eq!(kept(&[], 2), [1.0, 2.0]);
-        assert_eq!(kept(&[0], 2), [1.0, 2.0, 4.0]);
-        assert_eq!(kept(&[0], 5), [1.0, 2.0, 3.0, 4.0, 5.0]);
     }
 }

@@ -20,7 +20,7 @@ pub struct Thresholds {
     /// further effects would fit noise. Chosen.
     pub effects_before_noise: usize,
     /// Longest correlation time of the noise model with which effects are searched, as a share of the longest record (0 to 1): noise with a
-    /// longer correlation time leaves fewer than about ten independent samples. Chosen.
+    /// longer correlation time leaves fewer than about fifteen independent samples. Chosen.
     pub longest_memory: f64,
     /// Correlation time up to which noise is never called slow, however short the record \[samples\]. Chosen.
     pub memory_limit: f64,
@@ -35,10 +35,10 @@ pub struct Thresholds {
     /// Largest number of starts of a candidate that are scored (1 or more); of more starts, an evenly spaced selection is scored. Chosen,
     /// for time.
     pub scored_starts: usize,
-    /// Number of best starts of a candidate with a threshold for which the model is linearised by all parameters (1 or more). Chosen, for
-    /// time.
+    /// Number of best starts of a candidate with a threshold for which the model is linearised by all parameters, in addition to the
+    /// best one of each choice, such as an upper or a lower limit (1 or more). Chosen, for time.
     pub linearised_starts: usize,
-    /// Number of best starts from which a candidate is fitted (1 or more). Chosen, for time.
+    /// Number of best starts from which a candidate is fitted, in addition to the best one of each choice (1 or more). Chosen, for time.
     pub kept_starts: usize,
     /// As [`Self::kept_starts`], for a candidate whose absent value is a limit, such as an RC pair (1 or more). Chosen, for time.
     pub kept_factor_starts: usize,
@@ -175,7 +175,7 @@ impl Thresholds {
     pub const DEFAULT: Self = Self {
         noise_order: 6,
         effects_before_noise: 2,
-        longest_memory: 1.0 / 15.0,
+        longest_memory: 1.0 / 30.0,
         memory_limit: 12.0,
         memory_times: 10.0,
         same_noise: 0.05,

@@ -333,3 +333,39 @@ fn ports_of(
         | Place::Terminal => domain::ports(spec, effect),
     }
 }
+
+/// The best starts of a sorted list, and the best start of each value of a choice that these lack: a fit does not change a choice. `choice`:
+/// the values of the parameters with [`Role::Choice`].
+pub fn best_of_each_choice<T>(
+    sorted: Vec<T>,
+    choice: impl Fn(&T) -> Vec<f64>,
+    most: usize,
+) -> Vec<T> {
+    let mut seen: Vec<Vec<f64>> = Vec::new();
+    let kept = sorted.into_iter().enumerate().filter(|(rank, start)| {
+        let choice = choice(start);
+        let new = !seen.contains(&choice);
+        if new {
+            seen.push(choice);
+        }
+        new || *rank < most
+    });
+    kept.map(|(_, start)| start).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::best_of_each_choice;
+
+    #[test]
+    fn the_best_start_of_each_choice_is_kept() {
+        let sorted = vec![(1, -1.0), (2, -1.0), (3, -1.0), (4, 1.0), (5, 1.0)];
+        let kept = |choice: fn(&(i32, f64)) -> Vec<f64>, most: usize| -> Vec<i32> {
+            let best = best_of_each_choice(sorted.clone(), choice, most);
+            best.iter().map(|(start, _)| *start).collect()
+        };
+        assert_eq!(kept(|_| Vec::new(), 2), [1, 2]);
+        assert_eq!(kept(|(_, side)| vec![*side], 2), [1, 2, 4]);
+        assert_eq!(kept(|(_, side)| vec![*side], 5), [1, 2, 3, 4, 5]);
+    }
+}

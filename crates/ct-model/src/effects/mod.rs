@@ -48,7 +48,9 @@ mod unit_text;
 mod visited;
 
 pub use apply::{ApplyError, apply};
-pub use candidate::{Candidate, EffectParameter, candidates, candidates_keeping, shapes_keeping};
+pub use candidate::{
+    Candidate, EffectParameter, best_of_each_choice, candidates, candidates_keeping, shapes_keeping,
+};
 pub use effect::{Effect, Place, Role, Starts};
 pub use own::{OwnCandidate, OwnError, OwnParameter, OwnState, own_candidate, own_candidates};
 pub use port::{Port, Ports};

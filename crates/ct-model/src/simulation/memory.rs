@@ -1,8 +1,8 @@
-//! Initialisation at the first sample, and the memory of play operators (backlash) from sample to sample.
+//! Initialisation at the first sample, and the memory of play and stick-slip operators from sample to sample.
 //!
-//! The output of a play operator differs from its input by at most the half-width. Within a sampling interval the output is computed from
-//! its value at the last sample: this is exact for an input that is held or monotone in the interval, as every model input is. Before the
-//! record, the play is in the middle position.
+//! Within a sampling interval the output is computed from its value at the last sample. For a play this is exact if its input is held or
+//! monotone in the interval, as every model input is. For stick-slip it is exact if the input is held; otherwise the output moves at most
+//! once in an interval, and then follows its input to the next sample. Before the record, the output is the input.
 
 use super::SimulationState;
 use super::delays::{Delay, Delays};

@@ -7,10 +7,8 @@ use super::{Branch, Guard, Operation, Play, Register, Tape};
 use crate::expression::{Comparison, Condition, Expression, Function, Operator, Variable};
 use crate::spec::ModelSpec;
 
-/// Perturbation of a half-width for the finite differences of stiction, as a share of it, ...
+/// Perturbation of the half-width of stiction for its finite difference, as a share of it.
 const PERTURBATION: f64 = 0.05;
-/// ... and the additional perturbation near a half-width of zero \[unit of the signal\].
-const LEAST_PERTURBATION: f64 = 1e-9;
 
 struct Compiler<'a> {
     spec: &'a ModelSpec,
@@ -44,9 +42,9 @@ impl Tape {
                         numbers.set(numbers.get() + 2);
                     }
                     Expression::Call(Function::Play, _) => plays.set(plays.get() + 1),
-                    Expression::Call(Function::Slip, _) => {
+                    Expression::Call(Function::StickSlip, _) => {
                         numbers.set(numbers.get() + 3);
-                        plays.set(plays.get() + 3);
+                        plays.set(plays.get() + 4);
                     }
                     Expression::Delay(..) => delays.set(delays.get() + 1),
                     _ => {}
@@ -304,7 +302,7 @@ impl Compiler<'_> {
             Function::Min => self.smaller(a, b),
             Function::Max => self.larger(a, b),
             Function::Play => self.play(a, b),
-            Function::Slip => self.slip(a, b, c),
+            Function::StickSlip => self.stick_slip(a, b, c),
             Function::Quantise => self.operation(Operation::Quantise(a, b)),
             Function::Sqrt => self.operation(Operation::Sqrt(a)),
             Function::Exp => self.operation(Operation::Exp(a)),
@@ -338,14 +336,14 @@ impl Compiler<'_> {
         to
     }
 
-    /// Stiction, with finite differences in place of its derivative by the half-width: a narrower and a wider element follow the same
+    /// Stiction, with a finite difference in place of its derivative by the half-width: a narrower and a wider element follow the same
     /// signal. The derivative itself is zero almost everywhere if the jump is complete: the result changes only where a jump occurs or no
-    /// longer occurs.
-    fn slip(&mut self, from: Register, half_width: Register, jump: Register) -> Register {
-        let [one, share, least] = [1.0, PERTURBATION, LEAST_PERTURBATION].map(|n| self.number(n));
+    /// longer occurs. Without a jump it is a play, with its exact derivative.
+    fn stick_slip(&mut self, from: Register, half_width: Register, jump: Register) -> Register {
+        let [zero, one, share] = [0.0, 1.0, PERTURBATION].map(|n| self.number(n));
+        let play = self.play(from, half_width);
         let width = self.operation(Operation::Scale(one, half_width));
-        let relative = self.operation(Operation::Multiply(share, width));
-        let reach = self.operation(Operation::Add(relative, least));
+        let reach = self.operation(Operation::Multiply(share, width));
         let narrower = self.operation(Operation::Subtract(width, reach));
         let wider = self.operation(Operation::Add(width, reach));
         let [below, middle, above] =
@@ -356,7 +354,11 @@ impl Compiler<'_> {
         // Zero, but with the derivatives of the half-width.
         let change = self.operation(Operation::Subtract(half_width, width));
         let first_order = self.operation(Operation::Multiply(slope, change));
-        self.operation(Operation::Add(middle, first_order))
+        let stuck = self.operation(Operation::Add(middle, first_order));
+        let present = self.guard(Comparison::Greater, half_width, zero);
+        let jumps = self.guard(Comparison::Greater, jump, zero);
+        let both = Branch::And(Box::new(present), Box::new(jumps));
+        self.select(both, stuck, play)
     }
 
     /// An element that sticks until its input is further from it than `half_width*(1 + jump)`, and then moves to a distance of

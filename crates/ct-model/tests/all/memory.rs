@@ -54,7 +54,7 @@ fn stiction_moves_by_jumps() {
       parameter Real b = 0.5;
       final parameter Real j = 1;
       input Real u;
-      output Real y = slip(u, b, j);
+      output Real y = stick_slip(u, b, j);
     end Slip;";
     let u = [2.0, 2.9, 3.1, 2.2, 2.0, 5.0, 4.5];
     let (y, _) = run(&model(text), &[0.5, 1.0], &u, false);
@@ -78,21 +78,52 @@ fn the_slope_of_stiction_is_a_finite_difference() {
       parameter Real b = 0.5;
       final parameter Real j = 1;
       input Real u;
-      output Real y = slip(u, b, j);
+      output Real y = stick_slip(u, b, j);
     end Slip;";
     let u: Vec<f64> = (0..300)
         .map(|k| 3.0 * (0.11 * f64::from(k)).sin() + (0.37 * f64::from(k)).cos())
         .collect();
-    for (b, j) in [(0.5, 1.0), (0.8, 0.3), (0.8, 0.0)] {
+    for (b, j) in [(0.5, 1.0), (0.8, 0.3)] {
         let parameters = [Dual::<2>::variable(b, 0), Dual::constant(j)];
         let (y, _) = run(&model(text), &parameters, &u, false);
         let at = |b: f64| run(&model(text), &[b, j], &u, false).0;
-        let reach = 0.05 * b + 1e-9;
+        let reach = 0.05 * b;
         let (below, above) = (at(b - reach), at(b + reach));
         for ((y, below), above) in y.iter().zip(below).zip(above) {
             let slope = (above - below) / (2.0 * reach);
             assert!((y.eps[0] - slope).abs() < 1e-9, "{} {slope}", y.eps[0]);
         }
+        assert!(y.iter().any(|y| y.eps[0] != 0.0));
+    }
+    // Without a jump, and with a half-width of zero, the slope is that of a play.
+    let play =
+        "model Play parameter Real b = 0.5; input Real u; output Real y = play(u, b); end Play;";
+    for b in [0.8, 0.0] {
+        let parameters = [Dual::<2>::variable(b, 0), Dual::constant(0.0)];
+        let slopes = |text: &str, parameters: &[Dual<2>]| -> Vec<f64> {
+            let (y, _) = run(&model(text), parameters, &u, false);
+            y.iter().map(|y| y.eps[0]).collect()
+        };
+        assert_eq!(slopes(text, &parameters), slopes(play, &parameters[..1]));
+    }
+}
+
+/// Between rows it is compared with its output at the last row: it moves once, and then follows.
+#[test]
+fn stiction_moves_within_an_interval() {
+    let text = "model Slip
+      parameter Real b = 1;
+      final parameter Real j = 1;
+      input Real u;
+      output Real x(start=0);
+    equation
+      der(x) = stick_slip(u, b, j) + 0*x^2;
+    end Slip;";
+    // From 0 to 5 in a straight line: it jumps at u = 2, after two fifths of the interval.
+    let (x, _) = run(&model(text), &[1.0, 1.0], &[0.0, 5.0, 5.0], true);
+    let first = 0.6 * (2.0 + 5.0) / 2.0;
+    for (x, expected) in x.iter().zip([0.0, first, first + 5.0]) {
+        assert!((x - expected).abs() < 1e-9, "{x} {expected}");
     }
 }
 

@@ -192,6 +192,12 @@ fn expressions() {
         "1 are given here",
     );
     refuses(
+        "  Real q = stick_slip(x, 1);",
+        12,
+        "stick_slip takes three arguments",
+        "2 are given here",
+    );
+    refuses(
         "  Real q = 1 + if x > 0 then 1 else 2;",
         16,
         "`if` within an expression",

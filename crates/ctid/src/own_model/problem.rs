@@ -114,6 +114,8 @@ impl OwnModelFile {
             for parameter in &candidate.parameters {
                 let kept = kept.and_then(|kept| kept.start.get(&parameter.short).copied());
                 let own = candidate.effect.is_none().then(|| own_start(parameter));
+                // A choice that is not stated is that of the effect's text.
+                let own = own.or((parameter.role == Role::Choice).then_some(parameter.absent));
                 let value = kept.or(self.known.get(&parameter.name).copied()).or(own);
                 let value = value.ok_or_else(|| {
                     refuse(format!(

@@ -14,7 +14,6 @@ mod result;
 mod separation;
 mod sequences;
 
-use ct_model::effects::Role;
 use estimation::Noise;
 use rayon::prelude::*;
 
@@ -212,14 +211,12 @@ impl Bounds {
 fn alternative(context: &Context, base: &Node, node: &Node) -> Alternative {
     let last = node.added[node.added.len() - 1];
     let candidate = &context.candidates[last];
-    let own = candidate
-        .parameters
-        .iter()
-        .filter(|p| p.role != Role::Choice);
     let outputs = &context.problem.records[0].outputs;
     Alternative {
         effect: candidate.id.clone(),
-        sizes: own
+        sizes: candidate
+            .parameters
+            .iter()
             .filter_map(|p| Some((p.short.clone(), node.value(&p.name)?)))
             .collect(),
         bic_gain: node.gain_over(base),

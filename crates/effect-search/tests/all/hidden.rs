@@ -139,7 +139,7 @@ fn block(equation: &str) -> String {
 
 #[test]
 fn an_actuator_that_sticks_and_jumps_is_named() {
-    let hidden = block("g*slip(u, 3, 1) - k*(T - Ta)");
+    let hidden = block("g*stick_slip(u, 3, 1) - k*(T - Ta)");
     let found = found(&problem(BLOCK, record(&hidden, 0.0, 0.3, 4)));
     assert!(names(&found, "backlash(u)"), "{:?}", found.groups);
     assert_eq!(found.effects, ["backlash(u)"]);

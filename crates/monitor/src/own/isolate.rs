@@ -16,7 +16,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_model::effects::{Candidate, Place, Role, Visited, apply, candidates};
+use ct_model::effects::{Candidate, Place, Role, Visited, apply, best_of_each_choice, candidates};
 use ct_model::{Model, ModelSpec, State};
 use ct_signals::{Hold, Record};
 use estimation::{Noise, Start, fit_from, squares, within};
@@ -45,7 +45,8 @@ const BEGIN: [&str; 11] = [
 const STEP: &str = "step";
 /// Onsets that are tried, in rows after the one that is found first.
 const AROUND: [f64; 5] = [1.0, 0.6, 0.8, 1.25, 1.6];
-/// Number of starts that are fitted for an effect, those with the least sum of squares.
+/// Number of starts that are fitted for an effect, those with the least sum of squares, and the best one of each other choice (an upper or a
+/// lower limit).
 const STARTS: usize = 3;
 /// Number of the user's own candidates that are tried at every onset. The candidates with the largest improvement at the first onset are
 /// chosen: a file may contain hundreds, and computing time per row is limited.
@@ -295,7 +296,11 @@ impl Search<'_> {
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         starts.retain(|(cost, _)| cost.is_finite());
-        starts.truncate(STARTS);
+        let choice = |(_, x): &(f64, Vec<f64>)| -> Vec<f64> {
+            let choices = own.iter().filter(|(_, p)| p.role == Role::Choice);
+            choices.map(|(at, _)| x[*at]).collect()
+        };
+        let starts = best_of_each_choice(starts, choice, STARTS);
         let starts: Vec<Start> = starts.into_iter().map(|(_, x)| Start::from(x)).collect();
         // The catalogue's starts are shares of the range of the rows; those of the user's own candidates may be far from the actual size.
         let stopping = match candidate.effect {

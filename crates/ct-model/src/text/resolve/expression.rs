@@ -166,10 +166,10 @@ impl Builder<'_> {
                 };
                 count(
                     function.arguments(),
-                    if function.arguments() == 1 {
-                        "one argument"
-                    } else {
-                        "two arguments"
+                    match function.arguments() {
+                        1 => "one argument",
+                        2 => "two arguments",
+                        _ => "three arguments",
                     },
                 )?;
                 let arguments = arguments

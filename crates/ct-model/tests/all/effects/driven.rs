@@ -161,7 +161,9 @@ pub(super) fn active(candidate: &Candidate) -> Vec<f64> {
     // Quantiles are levels at which an input is constant: a limit that passes over such a level has no derivative.
     let of = |p: &EffectParameter| {
         let start = match p.role {
-            Role::Size | Role::Choice => p.starts[0],
+            Role::Size => p.starts[0],
+            // Stiction has tests of its own.
+            Role::Choice if p.short == "jump" => p.starts[0],
             _ => p.starts[p.starts.len() / 2],
         };
         let aside = if p.role == Role::Threshold {

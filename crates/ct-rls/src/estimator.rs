@@ -83,7 +83,7 @@ pub enum Outcome {
     /// A signal is not finite or too large: the regressor is above 1e30, an output error above 1e100; or a step of any rule but
     /// [`ExactHold`](crate::ExactHold) would, or might, overflow. The sample was not used.
     NotFinite,
-    /// `dt` is not above 0 and at most 1e30 s, or `eta dt` is above 300: nothing was done.
+    /// `dt` is outside `0 < dt <= 1e30` s, or `eta dt` is above 300: nothing was done.
     BadStep,
     /// The regressor has a wrong length (run-time sizes only): nothing was done.
     BadSize,

@@ -67,7 +67,7 @@ pub struct WalkState<const P: usize> {
     q: [f64; P],
 }
 
-/// Above this times the longest step, `P` could leave its range in one step.
+/// Largest intensity `q`: in the longest step, 1e30 s, it raises `P` by at most 1e90, inside the limit of 1e100.
 const MAX_INTENSITY: f64 = 1e60;
 
 pub(crate) fn check_intensity(q: &[f64]) -> Result<(), Error> {

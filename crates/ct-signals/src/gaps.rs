@@ -1,8 +1,8 @@
 //! Records in which rows or samples of an input are missing: held for a while, cut where that is too long.
 //!
-//! A missing sample of an *output* costs nothing but itself: a likelihood leaves it out. What an *input* did while nothing was
+//! A missing sample of an *output* is left out of the likelihood; nothing else is lost. What an *input* did while nothing was
 //! recorded is not known. For a short while it is taken to have stayed as it was (or, of a [`Hold::First`] input, to have run in a
-//! straight line), and what that does to the plant is small beside its response. For longer the record is cut: its parts keep their time
+//! straight line), and the resulting error of the simulated output is small compared with the response. For longer the record is cut: its parts keep their time
 //! stamps, so that they share a clock, and each begins with states of its own.
 
 use serde::{Deserialize, Serialize};
@@ -125,7 +125,8 @@ impl Sampling {
     }
 }
 
-/// The longest step of the slowest rate, if most of the steps longer than `interval` occur in sequences of equal steps.
+/// For a logger with several sampling rates, its longest sampling interval, if at least half of the steps longer than 1.5 `interval` occur in
+/// runs of nearly equal steps.
 fn slowest_rate(time: &[f64], interval: f64) -> Option<f64> {
     let steps: Vec<f64> = steps(time).collect();
     let long = |step: f64| step > GAP * interval;

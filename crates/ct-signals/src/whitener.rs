@@ -32,7 +32,7 @@ pub struct Whitener {
     seen: usize,
     /// The ring's next slot.
     slot: usize,
-    /// The slots of the last `p` rows that are lost, the oldest first.
+    /// Slots of the missing rows among the last `p` rows, the oldest first.
     lost: Vec<usize>,
     /// Covariance of the lost rows' estimates by slots, `(p + 1) x (p + 1)`, in `sigma^2`; entries of other rows are not used.
     covariance: Vec<f64>,

@@ -78,7 +78,7 @@ pub struct Thresholds {
     // The floating search.
     /// Number of best sets, for each noise model, from which the floating search may begin (1 or more). Chosen, for time.
     pub floating_seeds: usize,
-    /// The floating search also begins from the best set with at most this many effects. Chosen.
+    /// The floating search also begins from the best set with at most this many effects in addition to those of the model file. Chosen.
     pub floating_small_set: usize,
     /// Number of effects, those with the best scores, that are tried in place of another effect (swap step). Chosen, for time.
     pub floating_swaps: usize,

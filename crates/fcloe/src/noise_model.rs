@@ -274,7 +274,7 @@ fn of_sampled(ar: &ArModel, system: &StateSpace, sampled: &Sampled) -> Stationar
     let o = ar.len();
     let n = system.order();
     let nu = o + n;
-    // States: the last o values of w, then those of F. w = ar' history + e.
+    // States: the last o values of w (o: order of the AR model), then the states of F. w = ar' (last o values of w) + e.
     let mut a = vec![0.0; nu * nu];
     let mut b = vec![0.0; nu];
     let mut c = vec![0.0; nu];

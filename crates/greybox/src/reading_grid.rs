@@ -16,7 +16,7 @@ use ct_signals::Record;
 const NEAR: f64 = 0.1;
 /// Share of the readings that must lie on the grid.
 const MOST: f64 = 0.9;
-/// Least number of steps between the smallest and the largest reading.
+/// Least range of the readings, in steps of the grid.
 const FEWEST_STEPS: f64 = 3.0;
 /// Largest number of steps for the search.
 const MOST_STEPS: f64 = 2e4;

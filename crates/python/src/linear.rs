@@ -20,7 +20,7 @@ fn matrix<'py>(
     numpy::PyArrayMethods::reshape(&flat, [rows.len(), columns])
 }
 
-/// Linearises a model at values of its inputs and states by name; a linear one anywhere.
+/// Linearises a model at an operating point: values of inputs and states by name. A linear model needs none.
 pub fn linearize<'py>(
     py: Python<'py>,
     spec: ModelSpec,

@@ -166,7 +166,7 @@ impl<'a> Session<'a> {
         {
             if self.seen_before == 0 {
                 self.screen.say(&format!(
-                    "rows up to {} were seen before the state was saved, and are skipped; if the clock began anew since, name another --state",
+                    "rows up to {} were processed before the state was saved, and are skipped; if the clock has been reset since then, give another file with --state",
                     self.monitor.axis().at(last)
                 ));
             }

@@ -151,7 +151,7 @@ fn iterations() -> String {
     section(
         "iterations",
         "Iterations",
-        "Runs by the steps that were taken until none of the parameters changed by more than 1 %. With mu I the normalisation saves steps; with mu diag(J″) it changes nothing.",
+        "Number of runs against the iterations until no parameter changes by more than 1 %. With mu I the normalisation saves iterations; with mu diag(J″) it changes nothing.",
         &figure("iterations", "Table I", ""),
     )
 }

@@ -147,12 +147,12 @@ fn parameters(found: &Identification) -> String {
     let (title, caption) = match (&found.settings, &found.trajectory) {
         (Some(_), _) => (
             "At the end of the record",
-            "Standard errors hold for white and coloured noise, and for a model that is right; those of the recursion with its memory, \
+            "Standard errors hold for white and coloured noise, and for a model that is right; those of the recursive estimate, from the data within its memory, \
              not of the whole record.",
         ),
         (None, Some(_)) => (
             "At the end of the record",
-            "Standard errors are those of the recursion with its memory, and assume a white residual.",
+            "Standard errors are those of the recursive estimate, from the data within its memory, and assume a white residual.",
         ),
         (None, None) => (
             "Of the whole record",

@@ -39,9 +39,11 @@ pub const PLENTY: f64 = 200.0;
 const BIC_MARGIN: f64 = Thresholds::DEFAULT.bic_margin;
 /// Excursions with a smaller difference are equal.
 const SAME_EXCURSION: f64 = 0.1;
-/// Nearly certain decision, likely decision, and difference below the resolution of the criterion.
+/// Probability from which a decision is nearly certain, ...
 const SURE: f64 = 0.9;
+/// ... and from which it is likely.
 const LIKELY: f64 = 0.5;
+/// Noncentrality below which two models give the same response.
 const NOTHING: f64 = 1.0;
 /// Quantile of the required probability for a longer experiment.
 const WANTED: f64 = 1.645;

@@ -114,7 +114,7 @@ mod tests {
             let model = ArModel::fit(&[&e], 6).unwrap();
             seen += usize::from(stationary_p(&model, &e, &Thresholds::DEFAULT) < 1e-4);
         }
-        // An autoregressive model explains most of the change: the test uses the rest.
+        // The autoregressive model describes a part of the moving line as a broad resonance, and the test sees the remainder only.
         assert!(seen >= RUNS / 2, "{seen} of {RUNS}");
     }
 }

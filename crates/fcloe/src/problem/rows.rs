@@ -8,7 +8,8 @@ use crate::simulation::BLOCK;
 use crate::{ClosedLoop, Error, LoopSimulator, PlantModel};
 
 impl Problem {
-    /// J and its derivatives at x, or the residual's column alone, unless J exceeds a limit, which is usually known before the last sample.
+    /// Triangular factor of the sensitivities and the residual at x (without sensitivities: of the residual alone). Returns
+    /// [`Undefined::Higher`] as soon as the partial sum of J exceeds the limit, usually before the last sample.
     pub(crate) fn evaluate(
         &self,
         x: &[f64],

@@ -274,7 +274,7 @@ fn name_and_unit(kind: Kind, integrator: bool, record: &Record) -> (String, Stri
         index => format!("{name}_{}", index + 1),
     };
     let output = &record.outputs[0].unit;
-    // With an integrator, A begins with p: all units are divided by a time.
+    // With an integrator, the lowest term of A is p instead of 1, so the unit of every coefficient is divided by a time.
     let lower = usize::from(integrator);
     match kind {
         Kind::A { power } => (format!("a{power}"), power_of_time(power - lower)),

@@ -20,8 +20,8 @@ use crate::{
     },
 };
 
-/// Rounding is named if its variance is this share of the mean squared residual. If it clearly exceeds the residual, the level is constant,
-/// or the grid is not that of a converter.
+/// Rounding is named if its variance is within this range, as a share of the mean squared residual. A larger variance means that the level is
+/// constant, or that the grid is not that of a converter.
 const SHARE: RangeInclusive<f64> = 1.0 / 3.0..=1.1;
 
 /// A model with quantisation, and the share of quantisation in the error.

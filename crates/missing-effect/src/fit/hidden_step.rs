@@ -171,7 +171,7 @@ mod tests {
             vessel: 0,
         };
         let setup = Parent::new(&node).with(placed).unwrap();
-        // The step itself, from starts with and without noise before the quantisation.
+        // Two starts of the effect, with and without noise before the quantisation, and all steps that were compared.
         assert_eq!(
             setup.structure.alternatives(placed),
             2.0 + found.alternatives

@@ -16,10 +16,10 @@ pub(crate) fn noise_of(node: &Node) -> Result<Noise, Error> {
     Ok(greybox::noise_of(&node.setup, &node.fit, NOISE_ORDER)?)
 }
 
-/// The memory of a noise model in whose weighting effects are searched is at most this part of the longest record.
+/// Limit of the correlation time of the noise model that prewhitens the search, as a share of the longest record.
 ///
-/// A root near one takes every slow effect for noise, and lets the simulation drift off. Noise whose memory is longer than
-/// this has left fewer than some ten independent samples in the record: nothing says that it is noise.
+/// With a pole near the unit circle the filter would explain every slow effect as noise, and the simulation could drift. Noise with a longer
+/// correlation time leaves fewer than about ten independent samples: too few to show that it is noise.
 const LONGEST_MEMORY: f64 = 1.0 / 15.0;
 
 /// The longest memory of a noise model \[samples\].

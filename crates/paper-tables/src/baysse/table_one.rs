@@ -81,7 +81,7 @@ pub(super) fn assumptions() -> Vec<String> {
         "The noise is white, held from sample to sample, and is fed back in the loop; its standard deviation is a tenth of that of y without it.".to_owned(),
         "State variable filters and the instruments' model go by Euler's rule.".to_owned(),
         "Estimates are those of a fit that went on to 1e-8. Iterations are counted to the first that changes no parameter by more than 1 %, with mu I, a tenth of mu after each step.".to_owned(),
-        "The excitation and the stop of the count were found by a search against the same table: agreement says that the paper can be so, not that it is.".to_owned(),
+        "The excitation and the stop of the count were found by a search against the same table: agreement shows that they are possible, not that the paper used them.".to_owned(),
     ]
 }
 

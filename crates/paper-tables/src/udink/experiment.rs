@@ -78,9 +78,9 @@ impl Settings {
             ),
             format!("c_p = gamma = {}.", self.weight),
             "The c-update has a minus: with the printed plus, every run ends at the bound of c^.".to_owned(),
-            "The criterion has tau squared below its second term: with the printed tau it could not be as small as tabulated.".to_owned(),
+            "The second term of the criterion is divided by tau squared: divided by tau, as printed, the criterion could not be as small as tabulated.".to_owned(),
             "Averages are over 20 values from 905 s to 1000 s; a relative variance is a standard deviation (n - 1) over a mean.".to_owned(),
-            "These were found by a search against the same tables: agreement says that the paper can be so, not that it is.".to_owned(),
+            "These settings were found by a search against the same tables: agreement shows that they are possible, not that the paper used them.".to_owned(),
         ]
     }
 

@@ -89,7 +89,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         let level = &levels[i];
         let laws = &self.vessels[i].laws;
         if !laws.flows {
-            // No effect changes a flow; an effect may still change the surface.
+            // No effect changes the head or a flow; one may still change the area.
             let outflow = self.own_outflow(i, &self.own_head(i, level, levels));
             return (outflow, inflow - outflow);
         }

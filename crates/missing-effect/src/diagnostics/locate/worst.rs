@@ -5,7 +5,8 @@ use crate::{Bin, Failure, FailureKind, Failures};
 /// A bin is among the worst if its share of the error exceeds its share of the samples by more than this.
 const EXCESS: f64 = 0.05;
 
-/// The worst bin of each kind in which the model fails, the largest excess of its share of the error first, the frequencies last.
+/// The worst bin of each kind in which the model fails, sorted by how far its share of the squared error exceeds its share of the samples; the
+/// frequency band comes last.
 pub(super) fn worst(residual: &[f64], failures: &Failures) -> Vec<Failure> {
     let present = residual.iter().filter(|r| !r.is_nan());
     let total: f64 = present.map(|r| r * r).sum();

@@ -17,8 +17,8 @@ const CLOSING: &str = "</script>";
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rerun-if-changed=build.rs");
     let sources = plotly::Plot::offline_js_sources();
-    let script =
-        plotting_script(&sources).ok_or("the first script of the plotly crate is no longer plotly.js")?;
+    let script = plotting_script(&sources)
+        .ok_or("the first script of the plotly crate is no longer plotly.js")?;
     let mut packed = GzEncoder::new(Vec::new(), Compression::best());
     packed.write_all(script.as_bytes())?;
     let folder = std::env::var("OUT_DIR")?;

@@ -48,45 +48,43 @@ fn a_play_follows_at_a_distance() {
     assert_eq!(slopes, [0.0, 0.0, -1.0, -1.0, -1.0, 1.0, -1.0]);
 }
 
+const STICK_SLIP: &str = "model Slip
+  parameter Real b = 0.5;
+  final parameter Real j = 1;
+  input Real u;
+  output Real y = stick_slip(u, b, j);
+end Slip;";
+const PLAY: &str = "model Play
+  parameter Real b = 0.5;
+  input Real u;
+  output Real y = play(u, b);
+end Play;";
+
 #[test]
 fn stiction_moves_by_jumps() {
-    let text = "model Slip
-      parameter Real b = 0.5;
-      final parameter Real j = 1;
-      input Real u;
-      output Real y = stick_slip(u, b, j);
-    end Slip;";
     let u = [2.0, 2.9, 3.1, 2.2, 2.0, 5.0, 4.5];
-    let (y, _) = run(&model(text), &[0.5, 1.0], &u, false);
+    let (y, _) = run(&model(STICK_SLIP), &[0.5, 1.0], &u, false);
     assert_eq!(y, [2.0, 2.0, 3.1, 3.1, 2.0, 5.0, 5.0]);
     // Without the jump it is a play, with half of it a part of the play remains, ...
-    let play =
-        "model Play parameter Real b = 0.5; input Real u; output Real y = play(u, b); end Play;";
     assert_eq!(
-        run(&model(text), &[0.5, 0.0], &u, false).0,
-        run(&model(play), &[0.5], &u, false).0
+        run(&model(STICK_SLIP), &[0.5, 0.0], &u, false).0,
+        run(&model(PLAY), &[0.5], &u, false).0
     );
-    let (y, _) = run(&model(text), &[0.5, 0.5], &u, false);
+    let (y, _) = run(&model(STICK_SLIP), &[0.5, 0.5], &u, false);
     assert_eq!(y, [2.0, 2.65, 2.65, 2.65, 2.65, 4.75, 4.75]);
     // ... and with width zero it is absent.
-    assert_eq!(run(&model(text), &[0.0, 1.0], &u, false).0, u);
+    assert_eq!(run(&model(STICK_SLIP), &[0.0, 1.0], &u, false).0, u);
 }
 
 #[test]
 fn the_slope_of_stiction_is_a_finite_difference() {
-    let text = "model Slip
-      parameter Real b = 0.5;
-      final parameter Real j = 1;
-      input Real u;
-      output Real y = stick_slip(u, b, j);
-    end Slip;";
     let u: Vec<f64> = (0..300)
         .map(|k| 3.0 * (0.11 * f64::from(k)).sin() + (0.37 * f64::from(k)).cos())
         .collect();
     for (b, j) in [(0.5, 1.0), (0.8, 0.3)] {
         let parameters = [Dual::<2>::variable(b, 0), Dual::constant(j)];
-        let (y, _) = run(&model(text), &parameters, &u, false);
-        let at = |b: f64| run(&model(text), &[b, j], &u, false).0;
+        let (y, _) = run(&model(STICK_SLIP), &parameters, &u, false);
+        let at = |b: f64| run(&model(STICK_SLIP), &[b, j], &u, false).0;
         let reach = 0.05 * b;
         let (below, above) = (at(b - reach), at(b + reach));
         for ((y, below), above) in y.iter().zip(below).zip(above) {
@@ -96,15 +94,16 @@ fn the_slope_of_stiction_is_a_finite_difference() {
         assert!(y.iter().any(|y| y.eps[0] != 0.0));
     }
     // Without a jump, and with a half-width of zero, the slope is that of a play.
-    let play =
-        "model Play parameter Real b = 0.5; input Real u; output Real y = play(u, b); end Play;";
     for b in [0.8, 0.0] {
         let parameters = [Dual::<2>::variable(b, 0), Dual::constant(0.0)];
         let slopes = |text: &str, parameters: &[Dual<2>]| -> Vec<f64> {
             let (y, _) = run(&model(text), parameters, &u, false);
             y.iter().map(|y| y.eps[0]).collect()
         };
-        assert_eq!(slopes(text, &parameters), slopes(play, &parameters[..1]));
+        assert_eq!(
+            slopes(STICK_SLIP, &parameters),
+            slopes(PLAY, &parameters[..1])
+        );
     }
 }
 

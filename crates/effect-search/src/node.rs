@@ -150,7 +150,7 @@ impl Context<'_> {
         match self.fitted(added.clone(), model.clone(), vec![start], noise, stopping) {
             Err(Error::Estimation(estimation::Error::NoFiniteStart { .. })) => {
                 let own = self.own_minimum(&model)?;
-                // The own starts of the effects are absent, and a fit does not change a choice.
+                // In the own starts the effects are absent, and a fit does not change a choice.
                 let mut with_effects = own.clone();
                 let own_count = self.problem.spec.parameters.len();
                 let parameters = model.spec().parameters.iter().enumerate();

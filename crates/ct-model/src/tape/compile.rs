@@ -1,14 +1,13 @@
 //! Compiles a model's expressions to operations on registers: a repeated subexpression becomes one operation.
 
+mod memory;
+
 use std::cell::Cell;
 use std::collections::HashMap;
 
 use super::{Branch, Guard, Operation, Play, Register, Tape};
 use crate::expression::{Comparison, Condition, Expression, Function, Operator, Variable};
 use crate::spec::ModelSpec;
-
-/// Perturbation of the half-width of stiction for its finite difference, as a share of it.
-const PERTURBATION: f64 = 0.05;
 
 struct Compiler<'a> {
     spec: &'a ModelSpec,
@@ -324,60 +323,6 @@ impl Compiler<'_> {
     fn larger(&mut self, a: Register, b: Register) -> Register {
         let larger = self.guard(Comparison::GreaterOrEqual, a, b);
         self.select(larger, a, b)
-    }
-
-    fn play(&mut self, from: Register, half_width: Register) -> Register {
-        let low = self.operation(Operation::Subtract(from, half_width));
-        let high = self.operation(Operation::Add(from, half_width));
-        let held = self.first_play + self.plays.len();
-        let pushed = self.larger(held, low);
-        let to = self.smaller(pushed, high);
-        self.plays.push(Play { from, held, to });
-        to
-    }
-
-    /// Stiction, with a finite difference in place of its derivative by the half-width: a narrower and a wider element follow the same
-    /// signal. The derivative itself is zero almost everywhere if the jump is complete: the result changes only where a jump occurs or no
-    /// longer occurs. Without a jump it is a play, with its exact derivative.
-    fn stick_slip(&mut self, from: Register, half_width: Register, jump: Register) -> Register {
-        let [zero, one, share] = [0.0, 1.0, PERTURBATION].map(|n| self.number(n));
-        let play = self.play(from, half_width);
-        let width = self.operation(Operation::Scale(one, half_width));
-        let reach = self.operation(Operation::Multiply(share, width));
-        let narrower = self.operation(Operation::Subtract(width, reach));
-        let wider = self.operation(Operation::Add(width, reach));
-        let [below, middle, above] =
-            [narrower, width, wider].map(|width| self.stick(from, width, jump));
-        let rise = self.operation(Operation::Subtract(above, below));
-        let run = self.operation(Operation::Add(reach, reach));
-        let slope = self.operation(Operation::Divide(rise, run));
-        // Zero, but with the derivatives of the half-width.
-        let change = self.operation(Operation::Subtract(half_width, width));
-        let first_order = self.operation(Operation::Multiply(slope, change));
-        let stuck = self.operation(Operation::Add(middle, first_order));
-        let present = self.guard(Comparison::Greater, half_width, zero);
-        let jumps = self.guard(Comparison::Greater, jump, zero);
-        let both = Branch::And(Box::new(present), Box::new(jumps));
-        self.select(both, stuck, play)
-    }
-
-    /// An element that sticks until its input is further from it than `half_width*(1 + jump)`, and then moves to a distance of
-    /// `half_width*(1 - jump)`.
-    fn stick(&mut self, from: Register, half_width: Register, jump: Register) -> Register {
-        let jumped = self.operation(Operation::Multiply(half_width, jump));
-        let band = self.operation(Operation::Add(half_width, jumped));
-        let rest = self.operation(Operation::Subtract(half_width, jumped));
-        let low = self.operation(Operation::Subtract(from, band));
-        let high = self.operation(Operation::Add(from, band));
-        let from_below = self.operation(Operation::Subtract(from, rest));
-        let from_above = self.operation(Operation::Add(from, rest));
-        let held = self.first_play + self.plays.len();
-        let rises = self.guard(Comparison::Less, held, low);
-        let falls = self.guard(Comparison::Greater, held, high);
-        let lowered = self.select(falls, from_above, held);
-        let to = self.select(rises, from_below, lowered);
-        self.plays.push(Play { from, held, to });
-        to
     }
 
     fn condition(&mut self, condition: &Condition) -> Branch {

@@ -61,7 +61,9 @@ pub use expression::{Comparison, Condition, Expression, Function, Operator, Vari
 pub use linear_form::{LinearForm, TransferFunction};
 pub use linearity::Linearity;
 pub use scalar::{Dual, Scalar};
-pub use simulation::{Method, Model, NoSolution, SharedSimulation, Simulation, SimulationNumber};
+pub use simulation::{
+    Method, Model, NoSolution, SharedSimulation, Simulation, SimulationNumber, TOLERANCE,
+};
 pub use spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
 pub use text::{Position, TextError, unknown_units};
 pub use units::{UnitWarning, unit_warnings};

@@ -103,7 +103,7 @@ impl Tape {
         let once = self.operations[..self.once].iter().copied();
         let once = once.zip(self.first_operation..);
         for (operation, to) in once {
-            values[to] = operation.result(&values, false);
+            run(&[(operation, to)], &mut values, false);
         }
         let answers = vec![false; self.guards.len()];
         let taken = self.branches.iter().map(|branch| branch.holds(&answers));
@@ -174,7 +174,11 @@ impl Tape {
                 .iter()
                 .filter(|(_, to)| self.of_inputs[*to])
             {
-                registers.values[to] = operation.result(&registers.values, registers.extended);
+                run(
+                    &[(operation, to)],
+                    &mut registers.values,
+                    registers.extended,
+                );
             }
         }
     }

@@ -76,6 +76,7 @@ pub(crate) fn begin<'a>(
         candidates: Vec::new(),
         shapes: Vec::new(),
         scales: None,
+        tolerance: ct_model::TOLERANCE,
         limit,
         thresholds: options.thresholds,
     };
@@ -85,12 +86,15 @@ pub(crate) fn begin<'a>(
         ..FitOptions::default()
     };
     let model = Arc::new(Model::new(problem.spec.clone()));
-    let (fit, visited) = {
+    let (fit, visited, tolerance) = {
         let setup = context.setup(&model)?;
         let fit = setup.fit(&fit_options)?;
         let visited = visited(problem, &setup, &fit)?;
-        (fit, visited)
+        let noise = setup.output_noise(&fit.x);
+        let tolerance = noise.map(|noise| setup.sufficient_tolerance(&noise));
+        (fit, visited, tolerance)
     };
+    context.tolerance = tolerance.unwrap_or(ct_model::TOLERANCE);
     let all = all_candidates(&problem.spec, &visited, &problem.kept, &problem.candidates)?;
     let is_searched =
         |candidate: &Candidate| !candidate.is_shape() || problem.effects.contains(&candidate.id);

@@ -176,6 +176,7 @@ pub fn diagnose(
     let (seconds, left_out) = (context.limit.seconds(), context.limit.left_out());
     let context = Context {
         limit: context.limit.of_report(),
+        tolerance: ct_model::TOLERANCE,
         ..context
     };
     assemble(

@@ -29,6 +29,8 @@ pub(crate) struct Context<'a> {
     pub problem: &'a Problem,
     /// Standard deviation of each output's noise, if it is known already.
     pub scales: Option<Vec<f64>>,
+    /// Relative tolerance of simulations ([`ModelSetup::sufficient_tolerance`]).
+    pub tolerance: f64,
     pub candidates: Vec<Candidate>,
     /// Smooth functions, for the shape of the error that no candidate explains.
     pub shapes: Vec<Candidate>,
@@ -85,6 +87,7 @@ impl Context<'_> {
         let known = of_model(model, &problem.known);
         let priors = of_model(model, &problem.priors);
         let setup = ModelSetup::new(model, &problem.records, &known, problem.time_unit)?;
+        let setup = setup.with_tolerance(self.tolerance);
         let setup = self.limit.on(setup.with_priors(&priors)?);
         Ok(match &self.scales {
             Some(scales) => setup.with_scales(scales.clone()),

@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 
 use ct_model::{Model, Variable};
 use ct_signals::Record;
-use estimation::{Fit, Noise, Prior, Robust, Start};
+use estimation::{Fit, Noise, Prior, Robust, Start, Stopping};
 
 use self::build::{SETTLED, samples_of};
 use crate::{Error, FitOptions, PriorValue, TimeLimit, clock::Clock, output_noise::output_noise};
@@ -35,6 +35,8 @@ pub struct ModelSetup<'a> {
     floors: Vec<f64>,
     priors: Vec<Prior>,
     known_scales: Option<Vec<f64>>,
+    /// Relative tolerance of a simulation's steps.
+    tolerance: f64,
     time_limit: Option<Arc<TimeLimit>>,
     interrupt: Option<&'a AtomicBool>,
 }
@@ -43,6 +45,13 @@ pub struct ModelSetup<'a> {
 const STATE_REACH: f64 = 300.0;
 /// Number of iterations of the output weights.
 const WEIGHTINGS: usize = 3;
+/// Tolerance of simulations in fits from many starts, whose best result is fitted again with the tolerance of the setup, ...
+const START_TOLERANCE: f64 = 1e-7;
+/// ... and the least relative fall of their cost.
+const START_COST: f64 = 1e-6;
+/// Tolerance of a step, as a share of the noise: over a record, the errors of the steps are then small beside the noise.
+const OF_NOISE: f64 = 1e-4;
+
 impl<'a> ModelSetup<'a> {
     /// Adds a time limit: once it has passed, or `interrupt` is set, fits take no further steps.
     #[must_use]
@@ -168,6 +177,31 @@ impl<'a> ModelSetup<'a> {
         }
     }
 
+    /// Sets the relative tolerance of a simulation's steps ([`ct_model::Simulation::with_tolerance`]).
+    #[must_use]
+    pub fn with_tolerance(self, tolerance: f64) -> Self {
+        Self { tolerance, ..self }
+    }
+
+    /// The tolerance that is sufficient for fits in this noise, the standard deviation at each output: the errors of the simulation are
+    /// small beside it.
+    #[must_use]
+    pub fn sufficient_tolerance(&self, noise: &[f64]) -> f64 {
+        let largest = |o: usize| {
+            let all = self
+                .records
+                .iter()
+                .flat_map(move |r| r.outputs[o].present());
+            all.fold(0.0, |largest: f64, y| largest.max(y.abs()))
+        };
+        let shares = noise
+            .iter()
+            .enumerate()
+            .map(|(o, noise)| noise / largest(o));
+        let least = shares.filter(|share| share.is_finite()).fold(1.0, f64::min);
+        (OF_NOISE * least).clamp(ct_model::TOLERANCE, START_TOLERANCE)
+    }
+
     /// Standard deviation of the noise of each output, from a linear prediction from the past, which is nearly independent of model errors;
     /// that of the residual if there are too few samples. `None` if the simulation diverges.
     #[must_use]
@@ -257,15 +291,23 @@ impl<'a> ModelSetup<'a> {
     /// Where no start gives a finite simulation.
     pub fn fit(&self, options: &FitOptions) -> Result<Fit, Error> {
         let white = Noise::white(self.samples.len());
-        let starts = self.starts(options.starts, options.seed, options.stopping);
-        let mut fit = estimation::fit_from(self, starts.clone(), &white, options.stopping)?;
-        if self.samples.len() < 2 {
-            return Ok(fit);
-        }
-        let mut weighted = self.clone();
-        for round in 0..WEIGHTINGS {
-            let scales = weighted.output_noise(&fit.x).ok_or(Error::Stopped)?;
-            let settled = weighted.known_scales.as_ref().is_some_and(|known| {
+        let stopping = Stopping {
+            cost: options.stopping.cost.max(START_COST),
+            ..options.stopping
+        };
+        let mut setup = self
+            .clone()
+            .with_tolerance(START_TOLERANCE.max(self.tolerance));
+        let starts = setup.starts(options.starts, options.seed, stopping);
+        let mut fit = estimation::fit_from(&setup, starts.clone(), &white, stopping)?;
+        let weightings = if self.samples.len() > 1 {
+            WEIGHTINGS
+        } else {
+            0
+        };
+        for round in 0..weightings {
+            let scales = setup.output_noise(&fit.x).ok_or(Error::Stopped)?;
+            let settled = setup.known_scales.as_ref().is_some_and(|known| {
                 known
                     .iter()
                     .zip(&scales)
@@ -274,14 +316,22 @@ impl<'a> ModelSetup<'a> {
             if settled {
                 break;
             }
-            weighted.known_scales = Some(scales);
+            setup.known_scales = Some(scales);
             let mut from: Vec<Start> = vec![fit.x.clone().into()];
             if round == 0 {
                 from.extend(starts.iter().cloned());
             }
-            fit = estimation::fit_from(&weighted, from, &white, options.stopping)?;
+            let again = estimation::fit_from(&setup, from, &white, stopping)?;
+            fit = if round == 0 {
+                again
+            } else {
+                again.continuing(&fit)
+            };
         }
-        Ok(fit)
+        setup.tolerance = self.tolerance;
+        let end = vec![fit.x.clone().into()];
+        let exact = estimation::fit_from(&setup, end, &white, options.stopping)?;
+        Ok(exact.continuing(&fit))
     }
 
     /// The uncertainty of a fit under the noise of its residual, of order zero to `order` at each output ([`estimation::robust`]):

@@ -23,6 +23,7 @@ mod owners;
 mod sliding;
 mod step;
 
+pub use self::interval::TOLERANCE;
 pub use self::model::Model;
 pub use self::numbers::SimulationNumber;
 pub use self::owners::{SharedSimulation, Simulation};
@@ -70,6 +71,8 @@ pub struct SimulationState<T> {
     delays: Option<Delays<T>>,
     /// Time at which each guard last changed its branch.
     changed: Vec<f64>,
+    /// Relative tolerance of a step.
+    tolerance: f64,
     /// Absolute tolerance of each state: the largest absolute value that it has had, times the relative tolerance.
     scale: Vec<f64>,
     largest: Vec<f64>,
@@ -129,6 +132,7 @@ impl<T: Scalar> SimulationState<T> {
                 all: delays.collect(),
             }),
             changed: vec![f64::NEG_INFINITY; tape.guards.len()],
+            tolerance: TOLERANCE,
             scale: vec![0.0; tape.states],
             largest: initial.iter().map(|x| x.value().abs()).collect(),
             steps_left: MOST_STEPS,

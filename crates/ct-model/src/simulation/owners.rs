@@ -25,6 +25,14 @@ impl<'a, T: SimulationNumber> Simulation<'a, T> {
         }
     }
 
+    /// Sets the tolerance of a step, as a share of the largest absolute value that a state has had ([`TOLERANCE`](super::TOLERANCE) if it is
+    /// not set). Exact steps of linear models do not depend on it.
+    #[must_use]
+    pub fn with_tolerance(mut self, tolerance: f64) -> Self {
+        self.state.tolerance = tolerance;
+        self
+    }
+
     /// The present outputs, with the inputs of this sample.
     pub fn read(&mut self, inputs: &[f64], outputs: &mut [T]) {
         T::read(&mut self.state, self.model, inputs, outputs);

@@ -56,7 +56,10 @@ pub(super) fn run<T: Scalar>(
     extended: bool,
 ) {
     for &(operation, to) in operations {
-        values[to] = operation.result(values, extended);
+        let (before, after) = values.split_at_mut(to);
+        if let Some(to) = after.first_mut() {
+            operation.write(before, to, extended);
+        }
     }
 }
 
@@ -74,60 +77,62 @@ fn whole_power<T: Scalar>(a: T, n: i32) -> T {
 }
 
 impl Operation {
-    /// Result of the operation. `extended`: roots, powers and logarithms of negative numbers are zero.
+    /// Writes the result of the operation. `extended`: roots, powers and logarithms of negative numbers are zero.
+    ///
+    /// Every operation writes to its register itself: results that meet in one variable would be written twice.
     #[inline(always)]
-    pub(super) fn result<T: Scalar>(self, values: &[T], extended: bool) -> T {
+    pub(super) fn write<T: Scalar>(self, values: &[T], to: &mut T, extended: bool) {
         let no_value = |x: f64| extended && x < 0.0;
         match self {
-            Self::Negative(a) => -values[a],
-            Self::Add(a, b) => values[a] + values[b],
-            Self::Subtract(a, b) => values[a] - values[b],
-            Self::Multiply(a, b) => values[a] * values[b],
-            Self::Divide(a, b) => values[a] / values[b],
-            Self::Scale(a, b) => values[a] * values[b].value(),
-            Self::Reciprocal(a) => T::constant(1.0) / values[a],
+            Self::Negative(a) => *to = -values[a],
+            Self::Add(a, b) => *to = values[a] + values[b],
+            Self::Subtract(a, b) => *to = values[a] - values[b],
+            Self::Multiply(a, b) => *to = values[a] * values[b],
+            Self::Divide(a, b) => *to = values[a] / values[b],
+            Self::Scale(a, b) => *to = values[a] * values[b].value(),
+            Self::Reciprocal(a) => *to = T::constant(1.0) / values[a],
             Self::Power(a, _) | Self::Sqrt(a) | Self::Log(a) if no_value(values[a].value()) => {
-                T::constant(0.0)
+                *to = T::constant(0.0);
             }
-            Self::Power(a, b) => power(values[a], values[b]),
-            Self::WholePower(a, n) => whole_power(values[a], n),
+            Self::Power(a, b) => *to = power(values[a], values[b]),
+            Self::WholePower(a, n) => *to = whole_power(values[a], n),
             Self::Sqrt(a) => {
                 let root = values[a].value().sqrt();
-                slope(values[a], root, 0.5 / root)
+                *to = slope(values[a], root, 0.5 / root);
             }
-            Self::Exp(a) => values[a].exp(),
+            Self::Exp(a) => *to = values[a].exp(),
             Self::Log(a) => {
                 let x = values[a].value();
-                slope(values[a], x.ln(), 1.0 / x)
+                *to = slope(values[a], x.ln(), 1.0 / x);
             }
             Self::Log10(a) => {
                 let x = values[a].value();
-                slope(values[a], x.log10(), std::f64::consts::LOG10_E / x)
+                *to = slope(values[a], x.log10(), std::f64::consts::LOG10_E / x);
             }
-            Self::Sin(a) => values[a].sin_cos().0,
-            Self::Cos(a) => values[a].sin_cos().1,
+            Self::Sin(a) => *to = values[a].sin_cos().0,
+            Self::Cos(a) => *to = values[a].sin_cos().1,
             Self::Tan(a) => {
                 let tan = values[a].value().tan();
-                slope(values[a], tan, 1.0 + tan * tan)
+                *to = slope(values[a], tan, 1.0 + tan * tan);
             }
             Self::Tanh(a) => {
                 let tanh = values[a].value().tanh();
-                slope(values[a], tanh, 1.0 - tanh * tanh)
+                *to = slope(values[a], tanh, 1.0 - tanh * tanh);
             }
             Self::Atan2(a, b) => {
                 let (y, x) = (values[a].value(), values[b].value());
                 let square = x * x + y * y;
                 let of = [(values[a], x / square), (values[b], -y / square)];
-                T::with_slopes(y.atan2(x), of)
+                *to = T::with_slopes(y.atan2(x), of);
             }
             Self::Quantise(a, b) => {
                 // A rounded value rises with its argument on average; its steps have no derivative.
                 let value = quantised(values[a].value(), values[b].value());
-                slope(values[a], value, 1.0)
+                *to = slope(values[a], value, 1.0);
             }
-            Self::Copy(a) => values[a],
+            Self::Copy(a) => *to = values[a],
             // The condition selects the branch before the branch is computed.
-            Self::Select(_, a, _) => values[a],
+            Self::Select(_, a, _) => *to = values[a],
         }
     }
 

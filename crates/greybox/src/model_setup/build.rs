@@ -149,6 +149,7 @@ impl<'a> ModelSetup<'a> {
             free,
             priors: Vec::new(),
             known_scales: None,
+            tolerance: ct_model::TOLERANCE,
             time_limit: None,
             interrupt: None,
         })

@@ -67,6 +67,7 @@ impl<'a> ModelSetup<'a> {
                     let parameters: Vec<_> = (0..count).map(dual).collect();
                     let initial: Vec<_> = own.clone().map(dual).collect();
                     Simulation::new(self.model, &parameters, &initial, begin)
+                        .with_tolerance(self.tolerance)
                 })
                 .collect();
             let mut read = vec![T::constant(0.0); outputs * chunks.len()];

@@ -2,20 +2,25 @@
 
 mod end;
 mod prewhitened;
+mod starts;
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use self::end::End;
 pub use self::prewhitened::{coloured, noise_of, prewhitened};
+pub use self::starts::Start;
+use self::starts::{least_cost, minima};
 use crate::{
-    Error, Noise, Residuals, Stop, Stopping, Triangle, costs_more, levenberg_marquardt::held,
-    levenberg_marquardt::minimise, levenberg_marquardt::within, linearise_below,
-    prior::begin_near_priors, prior::free_priors, squares,
+    Error, Noise, Residuals, Stop, Stopping, Triangle, levenberg_marquardt::held,
+    prior::free_priors,
 };
 
 /// Two results are the same minimum if twice the logarithm of their likelihood ratio is below this.
 const SAME_MINIMUM: f64 = 0.1;
+/// Evaluations of each of many starts, after which only the best continue, ...
+const FIRST_EVALUATIONS: usize = 30;
+/// ... those whose cost is at most this multiple of the best one's: about twice its simulation error.
+const WORSE: f64 = 4.0;
 
 /// A fit.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -227,52 +232,39 @@ impl Fit {
     }
 }
 
-/// Start of a fit.
-#[derive(Debug, Clone)]
-pub struct Start {
-    /// The vector.
-    pub x: Vec<f64>,
-    /// R factor from [`crate::linearise`] at the start, weighted as in the fit, if known: it is not computed again.
-    pub triangle: Option<Triangle>,
-}
-
-impl From<Vec<f64>> for Start {
-    fn from(x: Vec<f64>) -> Self {
-        Self { x, triangle: None }
-    }
-}
-
-impl Start {
-    /// Start at the result of a fit of the same model, for a fit with a given noise model.
-    #[must_use]
-    pub fn at_end(fit: &Fit, noise: &Noise) -> Self {
-        Self {
-            x: fit.x.clone(),
-            triangle: fit.noise.same_colour(noise).then(|| fit.triangle.clone()),
-        }
-    }
-}
-
-/// Start of a fit: within the bounds, and near the priors unless the given start has a lower cost, as the result of another fit can have.
-fn begun(model: &impl Residuals, given: &[f64], noise: &Noise) -> Vec<f64> {
-    let inside = |mut x: Vec<f64>| {
-        for &i in model.free() {
-            x[i] = within(x[i], model.bounds()[i]);
-        }
-        x
+/// [`fit_from`], but after [`FIRST_EVALUATIONS`] only the starts whose cost is at most [`WORSE`] times the best continue: a start far from
+/// any minimum would use all evaluations, and seldom end in the best one.
+///
+/// # Errors
+/// As [`fit_from`].
+pub fn fit_from_best(
+    model: &impl Residuals,
+    starts: Vec<Start>,
+    noise: &Noise,
+    stopping: Stopping,
+) -> Result<Fit, Error> {
+    let count = starts.len();
+    let first = Stopping {
+        evaluations: stopping.evaluations.min(FIRST_EVALUATIONS),
+        ..stopping
     };
-    let mut near = given.to_vec();
-    begin_near_priors(model, &mut near);
-    let (there, near) = (inside(given.to_vec()), inside(near));
-    if there == near {
-        return there;
+    let ends = minima(model, starts, noise, first);
+    let most = WORSE * least_cost(&ends);
+    let near = ends.into_iter().filter_map(|(x, minimum)| {
+        let start = Start {
+            x,
+            triangle: Some(minimum.triangle),
+        };
+        let triangle = start.triangle.as_ref()?;
+        (triangle.cost() <= most).then_some(start)
+    });
+    let near: Vec<Start> = near.collect();
+    if near.is_empty() {
+        return Err(Error::NoFiniteStart { starts: count });
     }
-    let cost = |x: &[f64]| squares(model, x, noise).map_or(f64::INFINITY, |squares| squares.cost());
-    if cost(&there) <= cost(&near) {
-        there
-    } else {
-        near
-    }
+    let mut fit = fit_from(model, near, noise, stopping)?;
+    fit.starts = count;
+    Ok(fit)
 }
 
 /// Fits from the given starts, in parallel, with the AR coefficients of a given noise model as weighting. Returns the best fit, and the
@@ -286,44 +278,9 @@ pub fn fit_from(
     noise: &Noise,
     stopping: Stopping,
 ) -> Result<Fit, Error> {
-    let free = model.free();
-    let bounds: Vec<(f64, f64)> = free.iter().map(|&i| model.bounds()[i]).collect();
     let count = starts.len();
-    let minima: Vec<_> = starts
-        .into_par_iter()
-        .enumerate()
-        .filter_map(|(k, Start { x: given, triangle })| {
-            // After the time limit a fit still uses one start.
-            if k > 0 && model.out_of_time() {
-                return None;
-            }
-            let start = begun(model, &given, noise);
-            let known = triangle.filter(|_| start == given);
-            let full = |x: &[f64]| {
-                let mut full = start.clone();
-                for (&i, value) in free.iter().zip(x) {
-                    full[i] = *value;
-                }
-                full
-            };
-            let x: Vec<f64> = free.iter().map(|&i| start[i]).collect();
-            let minimum = minimise(
-                x,
-                known,
-                &bounds,
-                stopping,
-                |x, limit| linearise_below(model, &full(x), noise, limit),
-                |x, limit| costs_more(model, &full(x), noise, limit),
-                || model.out_of_time(),
-            );
-            Some((full(&minimum.x), minimum))
-        })
-        .filter(|(_, minimum)| minimum.stop != Stop::NotFinite)
-        .collect();
-    let best = minima
-        .iter()
-        .map(|(_, minimum)| minimum.triangle.cost())
-        .fold(f64::INFINITY, f64::min);
+    let minima = minima(model, starts, noise, stopping);
+    let best = least_cost(&minima);
     // Results with nearly equal likelihood count as one minimum.
     let samples: usize = model.samples().iter().sum();
     let same = best * (SAME_MINIMUM / samples as f64).exp();
@@ -335,6 +292,8 @@ pub fn fit_from(
         .into_iter()
         .find(|(_, minimum)| minimum.triangle.cost() <= best)
         .ok_or(Error::NoFiniteStart { starts: count })?;
+    let free = model.free();
+    let bounds: Vec<(f64, f64)> = free.iter().map(|&i| model.bounds()[i]).collect();
     let inside: Vec<usize> = (0..free.len())
         .filter(|&j| {
             // A parameter without influence on any sample has no standard error, such as the initial state of a lag with time constant

@@ -68,7 +68,7 @@ mod triangle;
 mod weights;
 
 pub use error::Error;
-pub use fit::{Fit, Start, coloured, fit_from, noise_of, prewhitened};
+pub use fit::{Fit, Start, coloured, fit_from, fit_from_best, noise_of, prewhitened};
 pub use levenberg_marquardt::{Stop, Stopping, within};
 pub use noise::Noise;
 pub use prior::{Prior, begin_near_priors};

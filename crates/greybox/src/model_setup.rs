@@ -299,7 +299,7 @@ impl<'a> ModelSetup<'a> {
             .clone()
             .with_tolerance(START_TOLERANCE.max(self.tolerance));
         let starts = setup.starts(options.starts, options.seed, stopping);
-        let mut fit = estimation::fit_from(&setup, starts.clone(), &white, stopping)?;
+        let mut fit = estimation::fit_from_best(&setup, starts.clone(), &white, stopping)?;
         let weightings = if self.samples.len() > 1 {
             WEIGHTINGS
         } else {
@@ -321,7 +321,7 @@ impl<'a> ModelSetup<'a> {
             if round == 0 {
                 from.extend(starts.iter().cloned());
             }
-            let again = estimation::fit_from(&setup, from, &white, stopping)?;
+            let again = estimation::fit_from_best(&setup, from, &white, stopping)?;
             fit = if round == 0 {
                 again
             } else {

@@ -221,7 +221,7 @@ def row_count(data: Data) -> int:
 
 
 def band_table(outputs: Iterable[tuple[str, Mapping[str, Array]]], data: Data, interval: float | None) -> pd.DataFrame:
-    """A simulation as a table: `mean`, and with an interval `lower` and `upper`, of each output; the index is that of the data."""
+    """Simulated outputs as a table with the index of the data. Columns of each output: `mean`, and with an interval its bounds `lower`, `upper`."""
     columns: dict[Any, Array] = {}
     for output, band in outputs:
         for name, values in band.items():

@@ -13,7 +13,7 @@
 //! refined.
 //!
 //! **Start**: where hardly any two samples are this lag apart, as where only every third sample is there, `D` does not change
-//! to first order at 0, and may have several minima: the best of a few values is the start. Of two that the samples cannot tell apart, the
+//! to first order at 0, and may have several minima: the best of a few values is the start. Of two that the samples do not distinguish, the
 //! positive one: the process that is slower than the sampling.
 //!
 //! **After a system** ([`fit_behind`]): the same, where the autoregression is seen through a system that is known; the whitening is then

@@ -60,7 +60,7 @@ pub enum Error {
     },
     /// A state of another model.
     #[error(
-        "the state belongs to another model: {differences}; name another state file, or delete it to start again"
+        "the state belongs to another model: {differences}; use another state file, or delete this one to start again"
     )]
     OtherModel {
         /// The differences, in the words of the model file.

@@ -166,7 +166,7 @@ impl<'a> Session<'a> {
         {
             if self.seen_before == 0 {
                 self.screen.say(&format!(
-                    "rows up to {} were processed before the state was saved, and are skipped; if the clock has been reset since then, give another file with --state",
+                    "rows up to {} were processed before the state was saved, and are skipped; if the clock has been reset since then, use another state file with --state FILE",
                     self.monitor.axis().at(last)
                 ));
             }

@@ -293,7 +293,7 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
     let decides = 100.0 * best.power.decides;
     all.push(match design.prospect {
         Prospect::Twins => format!(
-            "{} and {} give the same response in every experiment that was tried within these limits: no experiment of this kind tells them apart. Another sensor, or an inspection of the plant, may.",
+            "{} and {} give the same response in every experiment that was tried within these limits: no experiment of this kind distinguishes them. Another sensor, or an inspection of the plant, may.",
             words.placed(a),
             words.placed(b)
         ),

@@ -170,7 +170,7 @@ pub fn of_design(design: &Design) -> Vec<String> {
     };
     if design.twins() {
         said.push(format!(
-            "{} tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters gives nearly the response of {}.",
+            "{} distinguishes them: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters gives nearly the response of {}.",
             if design.effort.left_out.is_empty() {
                 "No experiment within these limits"
             } else {
@@ -209,7 +209,7 @@ pub fn of_design(design: &Design) -> Vec<String> {
             significant(best.power.power, 2),
             reservation(best),
             match design.prospect {
-                _ if design.bic_ahead.abs() > GROUP_MARGIN => "it is not needed to tell them apart",
+                _ if design.bic_ahead.abs() > GROUP_MARGIN => "it is not needed to distinguish them",
                 Prospect::Decides => "apply it",
                 Prospect::May => "it is worth applying, and may leave the question open",
                 _ => "it will hardly do",

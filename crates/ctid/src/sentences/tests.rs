@@ -14,7 +14,7 @@ fn effects_come_first_with_size_and_alternatives() {
     );
     assert!(
         said[1].starts_with(
-            "It is pump_deadzone or pump_nonlinearity: these data cannot tell them apart; pump_deadzone (u_dz = 0.550 ± 0.027 V) fits best."
+            "It is pump_deadzone or pump_nonlinearity: these data do not distinguish them; pump_deadzone (u_dz = 0.550 ± 0.027 V) fits best."
         ),
         "{}",
         said[1]
@@ -36,7 +36,7 @@ fn a_comparison_says_what_the_residual_shows() {
     assert!(
         said.starts_with("The model does not explain the data: the residual of ")
             && said.ends_with(
-                "drifts: its correlation time of longer than the record reaches the slowest time constant, 140 s; it may be a disturbance or an effect that the model lacks."
+                "drifts: its correlation time (longer than the record) exceeds the slowest time constant of the model (140 s); it may be a disturbance or an effect that the model lacks."
             ),
         "{said}"
     );

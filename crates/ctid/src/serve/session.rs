@@ -357,7 +357,7 @@ impl Session {
         let what = match job.kind {
             Kind::Compare | Kind::Chain | Kind::Own => None,
             Kind::Diagnose => Some(("the search", "Diagnose")),
-            Kind::Design => Some(("the design of the experiment", "What would tell?")),
+            Kind::Design => Some(("the design of the experiment", "Design an experiment")),
         };
         self.stop();
         if let Some((what, button)) = what {

@@ -56,7 +56,7 @@ def designed(
     seed: int,
     progress: Progress,
 ) -> TankDesign:
-    """The experiment that distinguishes two effects; `content`: the plant and its records as a fit of it is pickled."""
+    """The experiment that distinguishes two effects; `content`: plant and records, in the form in which a fit is pickled."""
     first, second = between
     for name in inputs:
         _of_the_only("inputs", {name: None}, applied, plant)

@@ -104,8 +104,8 @@ fn a_lag_at_zero_scores_what_it_should() {
     );
 }
 
-/// By how much the criterion falls with the best single effect, the noise taken for white: what a tool says that does not
-/// know its colour. The believed model is fitted from the given starts.
+/// Fall of BIC with the best single effect if the noise is assumed white: the result of a tool without a noise model. The model without the
+/// effect is fitted from the given starts.
 fn gain_as_white(setup: &Setup, starts: &[Vec<f64>]) -> f64 {
     let white = Noise::white(1);
     let base = fit_from(setup, starts, &white, STOPPING).unwrap();
@@ -124,8 +124,8 @@ fn gain_as_white(setup: &Setup, starts: &[Vec<f64>]) -> f64 {
     gains.fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Records without any effect in a noise of some colour: taken for white noise, more than half would be blamed; with the
-/// colour, none. What that costs is said, and from which size on an effect would have been seen.
+/// Records without an effect, in autocorrelated noise: if the noise is assumed white, an effect is reported in more than half of them; with
+/// the noise model, in none. The loss of detectability is reported, and the smallest size of an effect that would have been detected.
 fn coloured_records_are_not_blamed(colours: &[f64], noise: f64, runs: u64) {
     let mut blamed_as_white = 0;
     for (&colour, seed) in colours

@@ -170,7 +170,7 @@ fn a_function_of_time_is_not_sold_as_one_of_the_level() {
             ..Rig::single_tank()
         };
         let found = found(&rig, 1);
-        // Where an effect was taken for it, what remains is still no function of the level.
+        // If an effect was accepted for the disturbance, the rest of the residual is still no function of the level.
         let Some(unknown) = &found.unknown else {
             continue;
         };

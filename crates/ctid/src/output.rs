@@ -208,7 +208,7 @@ impl Output {
         }
         Err(Error::file(
             &self.path,
-            "somebody else has written it while this command ran, so that it was not overwritten; choose another name and run it again",
+            "another program has written it while this command ran, so it was not overwritten; choose another name and run it again",
         ))
     }
 }

@@ -70,7 +70,7 @@ impl Condition {
         })
     }
 
-    /// With the filter of an estimate, against a plant that is taken for the true one.
+    /// The condition for the filter of an estimate, with `truth` as the true plant.
     ///
     /// # Errors
     /// As [`Condition::new`], and those of [`ClosedLoop::new`].

@@ -7,14 +7,14 @@
 //! | question | answer |
 //! |---|---|
 //! | Which plant is in my loop? | [`Problem::new`] with [`LoopRecord`]s and a [`Controller`], then [`Problem::fit`] |
-//! | How well do I know it? | [`Problem::uncertainty`]: it finds where the noise enters, and what colour it has |
+//! | How well do I know it? | [`Problem::uncertainty`]: it estimates where the noise enters the loop, and its AR model |
 //! | Why did the fit end? | [`Fit::stop`], and [`Stop::was_successful`] |
 //! | Where do I start? | [`start::pipeline`] needs the orders alone; [`start`] has each regression by itself, in open loop too |
 //! | The plant drifts; I want estimates as the samples come | [`RecursiveFcloe`], with [`RecursiveSettings`]; [`RecursiveFcloe::loop_health`] says how it fares |
 //! | Will the recursion converge from here? | [`Condition`]: condition (14) exactly, and the frequency where it fails worst; [`locus`] for a picture, [`TableOfStarts`] for many starts |
 //! | Is this the controller that made the record? | [`controller_mismatch`]; [`Problem::new`] asks it too |
 //! | What does the loop do, and how does that change with a parameter? | [`LoopSimulator`], exact for a held reference |
-//! | I want many starts at once, or a fit in the metric of a noise | [`Problem`] implements [`estimation::Residuals`]: [`estimation::fit_from`], [`estimation::coloured`] |
+//! | I want many starts at once, or a fit prewhitened by a noise model | [`Problem`] implements [`estimation::Residuals`]: [`estimation::fit_from`], [`estimation::coloured`] |
 //! | I need data to try it on | [`continuous_loop`], [`sampled_loop`], [`noise_at_snr`], [`Quantiser`] |
 //!
 //! Time is in any one unit throughout. Signals are deviations from an operating point at which the loop rested before
@@ -57,7 +57,7 @@
 //! # Figures
 //! | | | command |
 //! |---|---|---|
-//! | 95 % intervals hold the truth, 4000 runs for each of eleven settings | in 94.2 to 96.0 % for every parameter | `cargo run --release -p fcloe --example coverage` |
+//! | 95 % intervals contain the true value, 4000 runs for each of eleven settings | in 94.2 to 96.0 % for every parameter | `cargo run --release -p fcloe --example coverage` |
 //! | sensitivities against central differences of an adaptive integration | within 1e-7 | `cargo test -p fcloe --test all sensitivities::` |
 //! | noise-free recovery, n = 1 to 3, PI and filtered PID | within 1e-8 | `cargo test -p fcloe --test all recovery::` |
 //! | recursion, n = 1, 20 dB: 60 starts within a factor of 5 | 60 end within 3 %; 37 with the filter of the start | `cargo run --release -p fcloe --example recursive` |

@@ -140,7 +140,7 @@ impl<'a> Session<'a> {
             }
         }
         let text = format!(
-            "{INPUT}, row {}: the header comes again in another form, and the rows behind it are read as it says: {}",
+            "{INPUT}, row {}: another header follows in a different form, and the rows after it are read accordingly: {}",
             self.line,
             rows.order()
         );

@@ -17,7 +17,7 @@ const LISTED: usize = 8;
 /// Searches the candidates.
 ///
 /// # Errors
-/// Where nothing can be fitted, with the file that is to blame.
+/// If nothing can be fitted; the message names the file that causes it.
 pub fn diagnose(
     file: &OwnModelFile,
     records: &Records,

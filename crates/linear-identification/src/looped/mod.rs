@@ -199,7 +199,7 @@ impl Task<'_> {
         let mut warnings = found.warnings;
         if self.request.levels == LevelChoice::Auto && found.levels_from == LevelChoice::Mean {
             warnings.push(
-                "the record does not begin at rest: its means were taken for the levels, which biases the estimates; --method fcloe estimates the levels, --levels says them"
+                "the record does not begin at rest: its mean values were used as the operating point, which biases the estimates; --method fcloe estimates the operating point, and --levels sets it"
                     .to_owned(),
             );
         }

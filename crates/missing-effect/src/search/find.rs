@@ -145,7 +145,7 @@ pub(crate) fn find<'a>(
                     residual_kind(node)
                 }
             },
-            &|done, total| tell("searching in the noise's metric", done, total),
+            &|done, total| tell("searching, prewhitened by the noise model", done, total),
         )?;
         let best = chosen(&coloured.sizes, &base);
         let other = confirm(refine(&best, &noise, &[])?, &noise)?;

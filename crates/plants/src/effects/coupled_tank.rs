@@ -36,7 +36,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         starts: vec![start],
     };
     if site.is_above_another() {
-        return vec![coupling("backflow", "share of the lower level that the upper outflow feels", 0.95, 0.05)];
+        return vec![coupling("backflow", "share of the lower level that reduces the head of the upper outflow", 0.95, 0.05)];
     }
     let (sample, duration) = (site.scales.sample_interval, site.duration());
     vec![

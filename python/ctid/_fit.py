@@ -110,7 +110,7 @@ class Fit:
 
     @property
     def fitted(self) -> pd.DataFrame:
-        """What the fitted model gives on its records, a column for each output."""
+        """Simulated outputs of the fitted model on its records, one column for each output."""
         return self._tables(lambda _, model: model)
 
     @property

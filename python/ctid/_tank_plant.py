@@ -34,7 +34,7 @@ def monitored(
 
 
 def _of_the_only(what: str, given: Mapping[str, Any], name: str, plant: str) -> Any:
-    """What is given for the one signal that is applied."""
+    """The entry of the only applied signal; an error if there is an entry for another signal."""
     for other in given:
         if other != name:
             raise ModelError(f'{what}: "{other}" is not applied to {plant}: its experiment has the one signal "{name}"')

@@ -13,7 +13,7 @@
 //! | Can I trust the estimates? | [`health`](RecursiveEstimator::health): excitation, definiteness, trace |
 //! | Parameters that are related, or bounded | the crate `ct-constrained` |
 //! | Two blocks of parameters, one output, no covariance between them | [`update_blocks`] |
-//! | The program ends and goes on later | with the feature `serde` an estimator is saved as it stands; what is restored continues to the bit |
+//! | The program ends and goes on later | with the feature `serde` an estimator can be saved and restored; it continues with bit-identical results |
 //! | How does Euler's rule compare? | [`ContinuousRls::with_integrator`] with [`Euler`] or [`Rk4`] |
 //!
 //! # Which way to forget

@@ -20,12 +20,12 @@
 //! Time is in any one unit throughout. Signals are deviations from an operating point at which the loop rested before
 //! the record; [`Offsets`] says which, or has it estimated.
 //!
-//! What it needs: the controller to its last digit (a PI printed with two digits moves a gain of 6 by 0.8 %), a reference
-//! that moves and knows nothing of the noise, and a start whose loop is stable. What it does not need: u; only the starts
-//! by regression do.
+//! Requirements: the exact controller (with the settings of a PI controller rounded to two digits, a gain of 6 is biased by 0.8 %), a
+//! reference that is exciting and independent of the noise, and a start whose loop is stable. u is not required, except for starts by
+//! regression.
 //!
 //! # Example
-//! A tank level under PI control, 20 dB of noise that circulates in the loop; the start is off by a third.
+//! A tank level under PI control, with noise at 20 dB that is fed back in the loop; the start is off by a third.
 //! ```
 //! use ct_lti::Hold;
 //! use ct_signals::excitation;

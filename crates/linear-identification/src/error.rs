@@ -30,7 +30,7 @@ pub enum Error {
     },
     /// A signal is constant.
     #[error(
-        "{record}: \"{signal}\" stands at {value} throughout, so that nothing can be identified; record at least a step up and a step down"
+        "{record}: \"{signal}\" is constant at {value}, so that nothing can be identified; record at least a step up and a step down"
     )]
     Constant {
         /// Name of the record.

@@ -10,7 +10,7 @@
 //! | The noise is coloured | [`Noise::Autoregressive`]: RIVC; with [`Noise::White`] the standard errors allow for it |
 //! | There is a delay, or an integrator | [`Structure::with_delay`], [`Structure::with_integrator`] |
 //! | The records are from a loop | [`Data::reference`]: the instruments come from it, and the controller need not be known |
-//! | What does the plant say of another record? | [`Plant::fitted`] |
+//! | Simulate the plant on another record | [`Plant::fitted`] |
 //! | Readings of the output are missing | they are NaN in [`Data::output`]; where inputs are not known for a while, [`Data::continues`] |
 //! | How well do I know it? | [`Parameter::std_error`], [`Estimate::covariance`] |
 //!

@@ -270,7 +270,7 @@ impl Session {
     /// Replaces the displayed text by another model.
     ///
     /// # Errors
-    /// Where it is no model file, or another text stands there meanwhile; everything is then as it was.
+    /// If the text is not a model file, or the file has been changed meanwhile; nothing is changed then.
     pub(super) fn replace(&mut self, from: &str, text: String) -> Result<(), Error> {
         let name = self.model_name();
         model_file::parse(&name, &text)?;

@@ -222,7 +222,7 @@ fn what_does_not_go_together_is_one_line() {
         ),
         (
             &format!("{pair} --out notes.csv"),
-            &["notes.csv", "it is there already"],
+            &["notes.csv", "the file exists already"],
         ),
         (
             &format!("{pair} --out no/next.csv"),

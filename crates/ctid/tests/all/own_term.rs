@@ -121,7 +121,7 @@ fn the_unknown_is_written_kept_and_taken_out() {
     place.refuses(
         "add my_wave --from u.csv --model tank.toml",
         &[
-            "[term.my_wave] is there already",
+            "[term.my_wave] exists already",
             "or `ctid add my_wave` alone",
         ],
     );

@@ -16,10 +16,10 @@
 //! M. Gilson, H. Garnier, P. C. Young, P. Van den Hof, in Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 5,
 //! for the loop). With a continuous-time controller, an error remains because u changes between samples.
 //!
-//! Readings of y may be missing; their rows do not count. In least squares y runs on lines between its readings, and rows after long gaps
-//! are left out ([`ct_lti::ReadingFilter`]). With instruments what the model of the loop says stands for a missing reading in the filters
-//! of y: the instruments owe nothing to what the others hold beside it, so that the estimates are consistent, and for the filter `E = A^`
-//! the residual of a row has no part of what stands in other rows at all.
+//! Readings of y may be missing; their rows are not used. In least squares y is interpolated linearly between its readings, and rows after
+//! long gaps are left out ([`ct_lti::ReadingFilter`]). With instruments a missing reading is replaced in the filters of y by the simulated
+//! output of the loop. The instruments are independent of the error of this replacement, so the estimates are consistent, and for the
+//! filter `E = A^` the residual of a row does not depend on the replacements in other rows.
 //!
 //! Several records are taken together.
 

@@ -156,7 +156,7 @@ pub(crate) fn find<'a>(
         }
         prewhitened = Some(coloured);
     }
-    if !by_simulation && !base.setup.leaves_out("the exchange of confirmed effects") {
+    if !by_simulation && !base.setup.leaves_out("swaps of confirmed effects") {
         confirmed = improve(confirmed, &noise)?;
     }
     Ok(Found {

@@ -33,7 +33,7 @@ fn an_unknown_effect() {
 fn an_effect_twice() {
     refuses(
         "plant = \"single-tank\"\neffects = [\"overflow\", \"overflow\"]",
-        "tank.toml:2: effect `overflow` is on already",
+        "tank.toml:2: effect `overflow` is listed twice",
         "remove it once",
     );
 }

@@ -87,7 +87,7 @@ def _numbers(name: str, column: str, values: Any) -> Array:
 
 
 def _time(name: str, header: str, values: Any) -> Array | list[str]:
-    """The time as numbers, or dates in words."""
+    """The time as numbers, or as dates in text form."""
     module = pandas()
     if module is not None and isinstance(values, module.MultiIndex):
         raise DataError(f"{name}: the index has several levels: the time alone has to be the index, one frame for each experiment")

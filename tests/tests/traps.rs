@@ -56,8 +56,8 @@ fn a_local_minimum_of_a_right_model_is_not_blamed_on_an_effect() {
     assert!(trapped > 0, "the trap is not there: the test shows nothing");
 }
 
-/// A lag has a derivative where it vanishes: its score there is a number that means something. On records without a
-/// lag none is named and the size found is within what chance shows; a lag of three samples is found with its size.
+/// A lag has a derivative at a time constant of zero, so its score test there is valid. On records without a lag none is found, and the
+/// estimated size is within its statistical error; a lag of three samples is found with its size.
 #[test]
 fn a_lag_at_zero_scores_what_it_should() {
     for (seed, rig) in [
@@ -242,8 +242,8 @@ fn effects_are_scored_from_the_better_of_two_basins() {
     assert!(trapped > 0, "the trap is not there: the test shows nothing");
 }
 
-/// A command that is held between the samples and is taken to run in straight lines leaves a trace of the input ten times
-/// that of a leak of a drop a second, and the tool would find something; with the record's own type it does not.
+/// If a held command is interpolated linearly, the residual depends on the input ten times as much as with a leak of a drop a second, and a
+/// wrong effect would be found; with the hold of the record none is.
 #[test]
 fn a_held_input_is_not_taken_for_a_continuous_one() {
     let leaking = Rig {

@@ -16,12 +16,12 @@
 //! | The program ends and goes on later | with the feature `serde` an estimator can be saved and restored; it continues with bit-identical results |
 //! | How does Euler's rule compare? | [`ContinuousRls::with_integrator`] with [`Euler`] or [`Rk4`] |
 //!
-//! # Which way to forget
+//! # Choice of the forgetting method
 //!
 //! | | [`ExactHold`] | [`Directional`] | [`RandomWalk`] |
 //! |---|---|---|---|
-//! | What is forgotten | all, at the rate `eta` | what the present regressor sees, at the rate `eta` | of each parameter, its intensity `q_i` a second |
-//! | Where a direction is silent | `P` grows as `e^{eta t}` to the cap; then forgetting stops for all | nothing happens to it | `P` grows as `q t` to the cap; the others go on |
+//! | What is forgotten | all, at the rate `eta` | the direction of the present regressor, at the rate `eta` | of each parameter, its intensity `q_i` a second |
+//! | A direction without excitation | `P` grows as `e^{eta t}` to the cap; then forgetting stops for all | `P` does not change | `P` grows as `q t` to the cap; the others go on |
 //! | Bounds of `P` | the cap, with excitation also better ones | for every step, from `eta`, `gamma` and the lengths of the regressors | the cap, with excitation also better ones |
 //! | The step | exact | exact, or of first order | of first order; the Kalman filter for a walk between samples |
 //! | Independent of the parameters' units | yes | no: scale them | yes |

@@ -1,9 +1,9 @@
-//! The loop around the plant: the controller is simulated with it, from the reference.
+//! Simulation of plant and controller in a loop, from the reference.
 //!
-//! **Model**: `y = P u + v`, `u = C (r - y) + d`, limited as the controller does it; `v` any disturbance, `d` what was
-//! added to the command and is known: the measured command less the one that the controller gives on the measured
-//! reading. The loop runs on `r` and `d` alone, `ym = P um`, `um = C (r - ym) + d`, so that neither the model's output nor
-//! its derivatives hold any of the noise which came back through `u`. At the true parameters
+//! **Model**: `y = P u + v`, `u = C (r - y) + d`, with the limits of the controller; `v` is any disturbance, `d` a known
+//! signal that was added to the command: the measured command less the output of the controller for the measured reading. The loop is
+//! simulated from `r` and `d` only, `ym = P um`, `um = C (r - ym) + d`, so that neither the model's output nor its derivatives contain noise
+//! that is fed back through `u`. At the true parameters
 //! ```text
 //! y - ym = v / (1 + P C),   v = (1 + P C) (y - ym)
 //! ```

@@ -9,7 +9,7 @@ pub enum Error {
     Structure(#[from] plants::Error),
     /// An effect that is a function of the time since a record began.
     #[error(
-        "{effect} follows the time since a record began, and a monitored plant has no start time: remove it, the monitor looks for it by itself"
+        "{effect} is a function of the time since the record began, but a monitored plant has no such start time: remove it; the monitor searches for it itself"
     )]
     ByClock {
         /// The effect.

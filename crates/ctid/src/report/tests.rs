@@ -123,7 +123,7 @@ fn a_partial_answer_shows_its_test_its_places_and_its_limit() {
         "<td class=\"number\">85 %</td><td>90 % where the residual is not noise; 50 % for a partial explanation</td>",
         "<td class=\"number\">86 %</td><td>not used for the verdict</td>",
         "<td class=\"number\">512</td><td>more than 6</td>",
-        "<li>what is fitted to one half of the record does not predict the other</li>",
+        "<li>fitted to one half of the record, it does not predict the other half</li>",
         "where it acts, with relative likelihood: upper tank 1.00, lower tank 0.31: not determined</li>",
         "<h3>Two rankings</h3>",
         "<th scope=\"row\">Its offset</th>",

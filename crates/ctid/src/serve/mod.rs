@@ -17,8 +17,8 @@
 //! every request, so that page and commands can be mixed.
 //!
 //! # The requests
-//! Every tab has a session, named in the query; what is sent is JSON but for a record, what comes back is JSON but for a download. No
-//! parameter ever reaches the file system. Every address begins with the secret of the run, `/SECRET/api/state`, which the table leaves
+//! Every tab has a session, named in the query; requests are JSON except for a record, and answers are JSON except for a download. No
+//! parameter is used as a file path. Every address begins with the secret of the run, `/SECRET/api/state`, which the table leaves
 //! out. A refusal is `{"error": "..."}` with a status of 400 or more: one line with the correction, as the commands write it. What the page
 //! never sends, such as broken JSON, is refused in plain text.
 //!

@@ -7,7 +7,7 @@
 //! | The number of parameters is known only at run time | `DynamicRls`, with the feature `alloc` |
 //! | Which `eta`, `c`, `gamma`? | [`Weights`]: `least_squares(eta)`, `1/eta` 5 to 10 dominant time constants |
 //! | The signals are silent for hours | [`Guards`]: forgetting stops at a cap, or while the regressor is silent |
-//! | Some parameters are not excited for long, the others drift | [`Directional`], or [`RandomWalk`] with a rate for each: [below](#which-way-to-forget) |
+//! | Some parameters are not excited for long, the others drift | [`Directional`], or [`RandomWalk`] with a rate for each: [below](#choice-of-the-forgetting-method) |
 //! | The parameters have jumped | [`ContinuousRls::reset_covariance`] |
 //! | A reading is missing | hand in the NaN: it is [refused](Innovation::accepted) and changes nothing |
 //! | Can I trust the estimates? | [`health`](RecursiveEstimator::health): excitation, definiteness, trace |

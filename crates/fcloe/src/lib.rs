@@ -2,7 +2,7 @@
 //!
 //! Model: a plant `A(p) y = B(p) u` of any order in a loop with a known controller `u = R/S (r - y)`. The model's
 //! output is that of the whole loop driven by the reference, `y^ = B^ R/P^ r` with `P^ = A^ S + B^ R`, so noise that
-//! circulates in the loop does not bias the estimates. Without a controller it is the output error method.
+//! is fed back in the loop does not bias the estimates. Without a controller it is the output error method.
 //!
 //! | question | answer |
 //! |---|---|

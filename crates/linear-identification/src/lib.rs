@@ -12,7 +12,7 @@
 //!
 //! | method | what it does | use it where |
 //! |---|---|---|
-//! | [`Method::Fcloe`] | output error of the loop, over the whole record | always, to begin with: noise that circulates does not bias it, and it says its standard errors |
+//! | [`Method::Fcloe`] | output error of the loop, over the whole record | always, to begin with: noise that is fed back does not bias it, and it gives standard errors |
 //! | [`Method::RecursiveFcloe`] | the same, sample by sample, with a memory that does not fade | the plant drifts: it follows with a delay of that memory |
 //! | [`Method::Iv`] | instruments simulated in the loop | a check that needs no iteration |
 //! | [`Method::Ls`] | least squares | noise is low, or to see what noise does |

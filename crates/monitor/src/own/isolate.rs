@@ -10,8 +10,8 @@
 //! is the fall of the Bayesian information criterion. The onset counts as a parameter; `n` is the number of stored rows times that of the
 //! outputs. The onsets that are tried lie around the one that was estimated without an assumption about the effect ([`super::onset`]).
 //!
-//! **Cost**, for each effect, port and onset, in simulations of the rows from the onset on: one for each start (2 for most effects, 24 for
-//! backlash), and at most 8 evaluations in each fit from the best [`STARTS`] starts; at most 40 in each fit of a candidate of the user's own.
+//! **Cost**, for each effect, port and onset, in simulations of the rows from the onset on: one for each start (2 to 18, with backlash
+//! 24), and at most 8 evaluations in each fit from the best [`STARTS`] starts; at most 40 in each fit of a candidate of the user's own.
 
 use std::collections::BTreeMap;
 

@@ -34,7 +34,7 @@ fn an_effect_twice() {
     refuses(
         "plant = \"single-tank\"\neffects = [\"overflow\", \"overflow\"]",
         "tank.toml:2: effect `overflow` is listed twice",
-        "remove it once",
+        "delete one of them",
     );
 }
 

@@ -22,7 +22,7 @@ class Design:
 
     @property
     def prospect(self) -> str:
-        """`decides`, `may`, `hardly`, or `twins` where no experiment tells the two apart."""
+        """`decides`, `may`, `hardly`, or `twins` if no experiment distinguishes the two effects."""
         return str(self._found["prospect"])
 
     @property

@@ -41,7 +41,7 @@ class Diagnosis:
 
     @property
     def groups(self) -> list[list[str]]:
-        """For each of them itself, then all that these records cannot tell from it, the best first."""
+        """For each added effect: the effect itself, then all effects that these records do not distinguish from it, best first."""
         return [list(group) for group in self._found["groups"]]
 
     @property

@@ -66,7 +66,7 @@ class Fit:
         return result
 
     def conf_int(self, level: float = 0.95) -> pd.DataFrame:
-        """Intervals that hold the truth with probability `level`, within 0 and 1: columns `lower` and `upper`."""
+        """Confidence intervals: columns `lower` and `upper`. `level`: probability that an interval contains the true value, between 0 and 1."""
         halves = [np.nan if half is None else half for half in self._native.half_widths(level)]
         all = self._native.estimates
         lower = [e[1] - half for e, half in zip(all, halves, strict=True)]
@@ -110,7 +110,7 @@ class Fit:
 
     @property
     def fitted(self) -> pd.DataFrame:
-        """What the fitted model gives on its records, a column for each output."""
+        """Simulated outputs of the fitted model on its records, one column for each output."""
         return self._tables(lambda _, model: model)
 
     @property

@@ -87,7 +87,7 @@ def _numbers(name: str, column: str, values: Any) -> Array:
 
 
 def _time(name: str, header: str, values: Any) -> Array | list[str]:
-    """The time as numbers, or dates in words."""
+    """The time as numbers, or as dates in text form."""
     module = pandas()
     if module is not None and isinstance(values, module.MultiIndex):
         raise DataError(f"{name}: the index has several levels: the time alone has to be the index, one frame for each experiment")
@@ -221,7 +221,7 @@ def row_count(data: Data) -> int:
 
 
 def band_table(outputs: Iterable[tuple[str, Mapping[str, Array]]], data: Data, interval: float | None) -> pd.DataFrame:
-    """A simulation as a table: `mean`, and with an interval `lower` and `upper`, of each output; the index is that of the data."""
+    """Simulated outputs as a table with the index of the data. Columns of each output: `mean`, and with an interval its bounds `lower`, `upper`."""
     columns: dict[Any, Array] = {}
     for output, band in outputs:
         for name, values in band.items():

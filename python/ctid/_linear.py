@@ -100,12 +100,12 @@ class Identification:
 
     @property
     def warnings(self) -> list[str]:
-        """What should be known before it is used."""
+        """Warnings to read before the model is used."""
         return list(self._found["warnings"])
 
     @property
     def simulated(self) -> tuple[Array, Array]:
-        """Times in s, and what the model gives then."""
+        """Times [s], and the simulated output at these times."""
         return self._curves[0], self._curves[2]
 
     def to_dict(self) -> dict[str, Any]:

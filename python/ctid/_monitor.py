@@ -20,24 +20,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RowResult:
-    """What a row says."""
+    """Result of one row."""
 
     #: Measured minus model, by output; NaN without a reading, and while it learns.
     residuals: dict[str, float]
-    #: The same, less what the noise's past foretells, in standard deviations.
+    #: Innovations of the noise model (residual minus its one-step prediction), in standard deviations.
     innovations: dict[str, float]
-    #: The model does not fit any more, or more is known of that: what `ctid monitor` writes as a line of JSON.
+    #: Alarm (the model does not fit any more), or its update with a better diagnosis: the object that `ctid monitor` writes as a line of JSON.
     alarm: dict[str, Any] | None
-    #: Outputs whose noise has grown, or is back where it was.
+    #: Outputs whose noise has grown, or has returned to its former size.
     scatter: list[dict[str, Any]]
-    #: Something about the rows or the phase; `kind` says what.
+    #: Notices about the rows or the phase (learning, monitoring), by `kind`.
     notices: list[dict[str, Any]]
     #: Why readings are not used, by output.
     lost: dict[str, str]
 
 
 class Monitor:
-    """Watches a plant row by row: it learns first, then says when the model stops fitting, since when, and which effect it looks like."""
+    """Monitors a plant row by row. It first fits the model, then reports when the model no longer fits, the onset, and the effects that explain it."""
 
     __slots__ = ("_inputs", "_native", "_outputs")
 

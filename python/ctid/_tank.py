@@ -1,4 +1,4 @@
-"""A plant of the program that was fitted, and what it is missing."""
+"""A fitted plant of the library, and the diagnosis of its missing effects."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def monitored(
 
 
 def _of_the_only(what: str, given: Mapping[str, Any], name: str, plant: str) -> Any:
-    """What is given for the one signal that is applied."""
+    """The entry of the only applied signal; an error if there is an entry for another signal."""
     for other in given:
         if other != name:
             raise ModelError(f'{what}: "{other}" is not applied to {plant}: its experiment has the one signal "{name}"')
@@ -56,7 +56,7 @@ def designed(
     seed: int,
     progress: Progress,
 ) -> TankDesign:
-    """The experiment that distinguishes two effects; `content`: the plant and its records as a fit of it is pickled."""
+    """The experiment that distinguishes two effects; `content`: plant and records, in the form in which a fit is pickled."""
     first, second = between
     for name in inputs:
         _of_the_only("inputs", {name: None}, applied, plant)

@@ -9,7 +9,7 @@
 //! over, it is. Where all are twins the record is no case, and is counted apart. The first so many cases are taken.
 //!
 //! **The columns**: `pair`: both records diagnosed together name the truth in their one group, and the other is not in it. `alone`:
-//! nothing else is in the group either. `decides` is what the design had promised of applying it once.
+//! nothing else is in the group either. `decides` is the probability of a decision that the design predicted for one application.
 
 use clap::Parser;
 use ctid_tests::design_cases::{
@@ -126,6 +126,6 @@ fn main() {
         );
     }
     println!(
-        "{looked_at} records, {twins} of them undecided between twins alone; {cases} cases: the pair is decided for the truth in {pairs} ({promised:.1} promised), the truth is left alone in {alone}"
+        "{looked_at} records, {twins} of them undecided between twins alone; {cases} cases: the pair is decided for the truth in {pairs} ({promised:.1} predicted), the truth is left alone in {alone}"
     );
 }

@@ -1,5 +1,5 @@
-//! Two tanks in series whose pump saturates at a fifth of the recorded range of the command: what a diagnosis says, how far the level that
-//! is not measured goes in its models, and what it costs. Of every other record nothing is known but its columns. `cargo run --release -p
+//! Two tanks in series whose pump saturates at a fifth of the recorded range of the command: the result of a diagnosis, the range of the
+//! unmeasured level in its models, and the computing time. In every second record no constant of the plant is given. `cargo run --release -p
 //! ctid-tests --example low_saturation`.
 
 use std::{collections::BTreeMap, error::Error, fs, path::PathBuf};

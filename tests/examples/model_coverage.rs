@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// Coverage of the intervals of `ctid compare`.
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// Records of each model.
+    /// Number of records of each model.
     #[arg(long, default_value_t = 400)]
     records: u64,
     /// Models.

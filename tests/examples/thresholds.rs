@@ -1,14 +1,14 @@
-//! What a diagnosis says of simulated records when each of its thresholds is halved and doubled:
+//! Results of the diagnosis of simulated records with each threshold halved and doubled:
 //!
 //! ```sh
 //! cargo run --release -p ctid-tests --example thresholds -- --records 24
 //! ```
-//! Records are drawn as `library_study` draws them: single effects of the catalogue, candidates of a user's own, nothing, and what neither
-//! holds, in equal parts; the structural error is 1 or 3 times the noise, which is white or coloured. A record takes part where its
-//! diagnosis with the default thresholds ends within a quarter of the time limit, so that the limit decides nothing.
+//! Records are drawn as `library_study` draws them: single effects of the catalogue, candidates of a user's own, nothing, and disturbances
+//! that neither describes, in equal parts; the structural error is 1 or 3 times the noise, which is white or coloured. A record is used if
+//! its diagnosis with the default thresholds ends within a quarter of the time limit, so that the limit does not influence the result.
 //!
-//! A column has three values: with half the threshold, with its default and with twice of it. Whole numbers are rounded, and at least 1.
-//! A record that comes from outside is not counted where an effect that was named describes it as well.
+//! A column has three values: with half the threshold, with the default and with twice the default. Integer thresholds are rounded, and at
+//! least 1. A record with a disturbance that neither describes is not counted if the effect that was found describes it as well.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;

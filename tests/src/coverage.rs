@@ -19,7 +19,7 @@ const MISSING: f64 = 0.3;
 pub struct Coverage {
     /// Name of the number.
     pub name: String,
-    /// Records whose interval held the truth.
+    /// Number of records whose interval contained the true value.
     pub held: usize,
     /// Records that gave an interval.
     pub of: usize,

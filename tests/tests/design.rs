@@ -4,7 +4,7 @@
 use ctid_tests::design_cases::{ROWS, answered, proposed, rig, undecided};
 use missing_effect::design::Prospect;
 
-/// Rows and seeds of `cargo run --release -p ctid-tests --example design` for which the experiment is promised to decide: the static
+/// Rows and seeds of `cargo run --release -p ctid-tests --example design` for which the design predicts that the experiment decides: the static
 /// curve, lags, in open loop and in a loop.
 const CASES: [(usize, u64); 4] = [(0, 1), (4, 1), (5, 1), (17, 1)];
 

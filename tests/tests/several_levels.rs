@@ -1,5 +1,5 @@
-//! Two tanks whose levels are both measured, each with noise of its own: what is hidden is named with its place, and what one level cannot
-//! tell apart two do.
+//! Two tanks whose levels are both measured, each with noise of its own: the hidden effect is found with its place, and two
+//! measured levels distinguish effects that one does not.
 #![allow(clippy::unwrap_used)]
 
 use ctid_tests::{Drive, Rig};

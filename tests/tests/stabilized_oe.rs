@@ -78,7 +78,7 @@ fn run(record: &Record, time: f64, memory: Memory) -> Vec<Theta> {
     thetas
 }
 
-/// Two lags fitted to all samples at once, and their residual taken for white.
+/// Batch fit of two lags to all samples, with its residual assumed white.
 fn batch(record: &Record, known: &Known) -> (Fit, Vec<Vec<f64>>, [usize; 4]) {
     let records = std::slice::from_ref(record);
     let plant = Plant::CascadedTanksLinear;

@@ -56,8 +56,8 @@ fn a_local_minimum_of_a_right_model_is_not_blamed_on_an_effect() {
     assert!(trapped > 0, "the trap is not there: the test shows nothing");
 }
 
-/// A lag has a derivative where it vanishes: its score there is a number that means something. On records without a
-/// lag none is named and the size found is within what chance shows; a lag of three samples is found with its size.
+/// A lag has a derivative at a time constant of zero, so its score test there is valid. On records without a lag none is found, and the
+/// estimated size is within its statistical error; a lag of three samples is found with its size.
 #[test]
 fn a_lag_at_zero_scores_what_it_should() {
     for (seed, rig) in [
@@ -104,8 +104,8 @@ fn a_lag_at_zero_scores_what_it_should() {
     );
 }
 
-/// By how much the criterion falls with the best single effect, the noise taken for white: what a tool says that does not
-/// know its colour. The believed model is fitted from the given starts.
+/// Fall of BIC with the best single effect if the noise is assumed white: the result of a tool without a noise model. The model without the
+/// effect is fitted from the given starts.
 fn gain_as_white(setup: &Setup, starts: &[Vec<f64>]) -> f64 {
     let white = Noise::white(1);
     let base = fit_from(setup, starts, &white, STOPPING).unwrap();
@@ -124,8 +124,8 @@ fn gain_as_white(setup: &Setup, starts: &[Vec<f64>]) -> f64 {
     gains.fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Records without any effect in a noise of some colour: taken for white noise, more than half would be blamed; with the
-/// colour, none. What that costs is said, and from which size on an effect would have been seen.
+/// Records without an effect, in autocorrelated noise: if the noise is assumed white, an effect is reported in more than half of them; with
+/// the noise model, in none. The loss of detectability is reported, and the smallest size of an effect that would have been detected.
 fn coloured_records_are_not_blamed(colours: &[f64], noise: f64, runs: u64) {
     let mut blamed_as_white = 0;
     for (&colour, seed) in colours
@@ -242,8 +242,8 @@ fn effects_are_scored_from_the_better_of_two_basins() {
     assert!(trapped > 0, "the trap is not there: the test shows nothing");
 }
 
-/// A command that is held between the samples and is taken to run in straight lines leaves a trace of the input ten times
-/// that of a leak of a drop a second, and the tool would find something; with the record's own type it does not.
+/// If a held command is interpolated linearly, the residual depends on the input ten times as much as with a leak of a drop a second, and a
+/// wrong effect would be found; with the hold of the record none is.
 #[test]
 fn a_held_input_is_not_taken_for_a_continuous_one() {
     let leaking = Rig {

@@ -1,4 +1,4 @@
-//! What the catalogue does not hold: where it acts, on what it depends, and that it can be kept as a term of one's own.
+//! Model errors outside the catalogue: where they act, on which variable they depend, and that they can be kept as the user's own term.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use ctid_tests::Rig;
@@ -64,7 +64,7 @@ fn with_level(f: fn(f64) -> f64) -> Rig {
     }
 }
 
-/// What the catalogue does not hold may resemble an effect in a part; it is never said to be that effect.
+/// A disturbance outside the catalogue may partly resemble an effect, but the diagnosis never says that it is that effect.
 #[test]
 fn a_wave_over_the_level_is_a_part_at_most() {
     let found = found(&with_level(|h| 2.5 * (1.1 * h).sin()), 1);
@@ -126,7 +126,7 @@ fn a_function_of_the_level_is_named_and_can_be_kept() {
     );
     assert!(after.rmse < 1.2 * rig.noise);
     assert!(after.rmse_test.unwrap() < 0.25 * before.rmse_test.unwrap());
-    // The scale says that the shape holds as it stands.
+    // A scale of one confirms the identified shape.
     let scale = after
         .parameters
         .iter()
@@ -170,7 +170,7 @@ fn a_function_of_time_is_not_sold_as_one_of_the_level() {
             ..Rig::single_tank()
         };
         let found = found(&rig, 1);
-        // Where an effect was taken for it, what remains is still no function of the level.
+        // If an effect was accepted for the disturbance, the rest of the residual is still no function of the level.
         let Some(unknown) = &found.unknown else {
             continue;
         };

@@ -49,7 +49,7 @@ use crate::{Error, Relation, Row};
 /// use nalgebra::{SMatrix, SVector};
 ///
 /// let rls = ContinuousRls::new(SVector::zeros(), SMatrix::identity() * 100.0, Weights::least_squares(0.01)?)?;
-/// // the parameters are known to sum to 1; the regressor alone could not tell them apart
+/// // the parameters are known to sum to 1; the regressor alone does not determine them separately
 /// let mut constrained = ConstrainedRls::new(rls, [Row::equal([1.0, 1.0], 1.0, 1e3)?])?;
 /// for _ in 0..100 {
 ///     constrained.update(&Sample::new([2.0, -1.0], 0.5), 0.1);

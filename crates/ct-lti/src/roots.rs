@@ -126,7 +126,7 @@ fn ratio(a: Complex64, b: Complex64) -> Complex64 {
     (a / size) / (b / size)
 }
 
-/// A sum of two numbers that do not overlap: twice the digits of one.
+/// Double-double number: the unevaluated sum of two numbers, with twice the digits of one.
 #[derive(Clone, Copy)]
 struct Double {
     high: f64,

@@ -33,7 +33,7 @@ pub struct Sampled {
 }
 
 impl Sampled {
-    /// The state after the step, from `x` (n entries) under an input that is held at `u`: [`Hold::Zero`] is taken for granted.
+    /// The state after the step, from `x` (n entries) with an input that is held at `u` (as with [`Hold::Zero`]).
     pub fn held_step(&self, x: &[f64], u: f64) -> Vec<f64> {
         let rows = self.phi.chunks_exact(x.len().max(1)).zip(&self.g0);
         rows.map(|(row, g)| dot(row, x) + g * u).collect()

@@ -20,7 +20,7 @@
 //! let model = ModelSpec::parse(text)?;
 //! assert_eq!((model.states.len(), model.inputs.len(), model.outputs.len()), (1, 2, 1));
 //!
-//! // What is outside the subset is refused with its place and the mend.
+//! // A construct outside the subset is an error with its place and the correction.
 //! let error = ModelSpec::parse(&text.replace("k*(T", "kk*(T")).unwrap_err();
 //! assert_eq!(
 //!     error.to_string(),

@@ -1,7 +1,7 @@
-//! Where units do not fit together: dimensions through every expression.
+//! Check of units: the dimensions of both sides of every equation, sum and comparison have to agree.
 //!
-//! A number that stands in a text has any dimension in a sum and a comparison (`T + 273.15`), and none in a product. What has no unit, or
-//! one that is not understood, fits everything. Sizes are not compared: `kW` and `W` are both power.
+//! A literal number has any dimension in a sum and a comparison (`T + 273.15`), and none in a product. A quantity without a unit, or with an
+//! unknown one, agrees with every dimension. Scales are not compared: `kW` and `W` are both power.
 
 use ct_signals::{Dimension, Unit};
 

@@ -6,8 +6,8 @@
 //! dR/dt      = gamma phi phi' - eta R phi phi' R / (phi' R phi)
 //! dP/dt      = eta phi phi' / (phi' P^-1 phi) - gamma P phi phi' P
 //! ```
-//! The rank-one part of `R` that the regressor sees decays at the rate `eta`; `x' P x` of every `x` with `phi' x = 0` never grows,
-//! so a direction that is silent for hours keeps what is known of it, while the others go on tracking.
+//! The rank-one part of `R` in the direction of the regressor decays at the rate `eta`; `x' P x` of every `x` with `phi' x = 0` never
+//! grows, so a direction without excitation for hours keeps its information, while the others are tracked.
 //! Assumptions: `phi`, `y` and the weights are constant over the step `h`; the parameters are scaled so that the entries of `phi`
 //! have comparable sizes, since `phi` is here a direction among the parameters too, and the rule is not invariant to their units.
 //!

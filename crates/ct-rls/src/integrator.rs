@@ -83,7 +83,7 @@ pub(crate) mod sealed {
     /// Reason why a step was not made; the state does not change.
     #[derive(Clone, Copy)]
     pub enum Refusal {
-        /// The sample is of no use.
+        /// The sample has a value that is not finite.
         NotFinite,
         /// The rule is at its end.
         Stop(Error),

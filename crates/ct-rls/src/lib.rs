@@ -7,21 +7,21 @@
 //! | The number of parameters is known only at run time | `DynamicRls`, with the feature `alloc` |
 //! | Which `eta`, `c`, `gamma`? | [`Weights`]: `least_squares(eta)`, `1/eta` 5 to 10 dominant time constants |
 //! | The signals are silent for hours | [`Guards`]: forgetting stops at a cap, or while the regressor is silent |
-//! | Some parameters are not excited for long, the others drift | [`Directional`], or [`RandomWalk`] with a rate for each: [below](#which-way-to-forget) |
+//! | Some parameters are not excited for long, the others drift | [`Directional`], or [`RandomWalk`] with a rate for each: [below](#choice-of-the-forgetting-method) |
 //! | The parameters have jumped | [`ContinuousRls::reset_covariance`] |
 //! | A reading is missing | hand in the NaN: it is [refused](Innovation::accepted) and changes nothing |
 //! | Can I trust the estimates? | [`health`](RecursiveEstimator::health): excitation, definiteness, trace |
 //! | Parameters that are related, or bounded | the crate `ct-constrained` |
 //! | Two blocks of parameters, one output, no covariance between them | [`update_blocks`] |
-//! | The program ends and goes on later | with the feature `serde` an estimator is saved as it stands; what is restored continues to the bit |
+//! | The program ends and goes on later | with the feature `serde` an estimator can be saved and restored; it continues with bit-identical results |
 //! | How does Euler's rule compare? | [`ContinuousRls::with_integrator`] with [`Euler`] or [`Rk4`] |
 //!
-//! # Which way to forget
+//! # Choice of the forgetting method
 //!
 //! | | [`ExactHold`] | [`Directional`] | [`RandomWalk`] |
 //! |---|---|---|---|
-//! | What is forgotten | all, at the rate `eta` | what the present regressor sees, at the rate `eta` | of each parameter, its intensity `q_i` a second |
-//! | Where a direction is silent | `P` grows as `e^{eta t}` to the cap; then forgetting stops for all | nothing happens to it | `P` grows as `q t` to the cap; the others go on |
+//! | What is forgotten | all, at the rate `eta` | the direction of the present regressor, at the rate `eta` | of each parameter, its intensity `q_i` a second |
+//! | A direction without excitation | `P` grows as `e^{eta t}` to the cap; then forgetting stops for all | `P` does not change | `P` grows as `q t` to the cap; the others go on |
 //! | Bounds of `P` | the cap, with excitation also better ones | for every step, from `eta`, `gamma` and the lengths of the regressors | the cap, with excitation also better ones |
 //! | The step | exact | exact, or of first order | of first order; the Kalman filter for a walk between samples |
 //! | Independent of the parameters' units | yes | no: scale them | yes |

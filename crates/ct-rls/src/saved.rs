@@ -1,4 +1,4 @@
-//! An estimator as it stands, saved and restored: after that the next updates give the same numbers to the bit.
+//! Saving and restoring the state of an estimator: the next updates give bit-identical results.
 //!
 //! `theta`, the factors of `P`, the settings, and what the guards have counted are written, alike for [`ContinuousRls`] and `DynamicRls`,
 //! so that each reads what the other has saved. `P` is written as `U` and `D`: it is symmetric whatever is read. What is read is checked

@@ -134,9 +134,9 @@ impl ArModel {
     }
 
     /// The process with its memory limited to so many samples: poles that decay more slowly than `exp(-1/samples)` a sample are
-    /// drawn in until none does. The innovations' standard deviation is kept.
+    /// moved inwards until none does. The innovations' standard deviation is kept.
     ///
-    /// A model whose root is near one takes any slow misfit for noise. All poles are scaled by one factor, `a_i gamma^i`, which hardly
+    /// A model with a pole near one describes any slow model error as noise. All poles are scaled by one factor, `a_i gamma^i`, which hardly
     /// moves those that decay fast (bandwidth expansion; R. Viswanathan, J. Makhoul, IEEE Trans. ASSP 23 (1975) 309-321).
     ///
     /// `samples`: above 0; a model within the limit is returned as it is.

@@ -13,11 +13,11 @@
 //! refined.
 //!
 //! **Start**: where hardly any two samples are this lag apart, as where only every third sample is there, `D` does not change
-//! to first order at 0, and may have several minima: the best of a few values is the start. Of two that the samples cannot tell apart, the
+//! to first order at 0, and may have several minima: the best of a few values is the start. Of two that the samples do not distinguish, the
 //! positive one: the process that is slower than the sampling.
 //!
-//! **After a system** ([`fit_behind`]): the same, where the autoregression is seen through a system that is known; the whitening is then
-//! that of the process they make together ([`StationaryWhitener`](crate::StationaryWhitener)).
+//! **After a system** ([`fit_behind`]): the same, where the autoregression is filtered by a known system; the whitening is then
+//! that of the resulting process ([`StationaryWhitener`](crate::StationaryWhitener)).
 //!
 //! **Cost**: an evaluation is one whitening, `O(n p)` and a little more for missing samples; one or two for each order, and about
 //! `p + 2` for each iteration of a refinement. In all 20 to 50 times Burg's recursion where 30 % of 2000 samples are missing, and about

@@ -138,9 +138,9 @@ pub enum Error {
         /// What has to be smaller than it.
         limit: f64,
     },
-    /// A sampling interval that no process has.
+    /// A sampling interval outside the range that can be computed with.
     #[error(
-        "{file}, column \"{column}\": the time steps by {interval:e} s, and between {low:e} and {high:e} s can be computed with; check the column and its unit"
+        "{file}, column \"{column}\": the sampling interval is {interval:e} s, but it has to be between {low:e} and {high:e} s; check the column and its unit"
     )]
     InvalidInterval {
         /// The path as it was given.
@@ -156,7 +156,7 @@ pub enum Error {
     },
     /// The output sits at its limit for much of the record.
     #[error(
-        "{file}, column \"{column}\": {count} of {rows} samples sit exactly at a limit of the output ({limits}), where the sensor no longer sees the process; keep the experiment within the sensor's range, or cut those rows out: each part that is left is a record of its own"
+        "{file}, column \"{column}\": {count} of {rows} samples sit exactly at a limit of the output ({limits}), where the sensor does not measure the process; keep the experiment within the sensor's range, or cut those rows out and use each remaining part as a separate record"
     )]
     Saturated {
         /// The path as it was given.

@@ -56,8 +56,8 @@ fn unwritten(path: &Path, error: &io::Error) -> Error {
     )
 }
 
-/// Keeps other `ctid` programs from changing files of the folder in which `path` lies, until it is dropped. Where the system
-/// cannot lock a folder, or somebody holds the lock for long, there is none.
+/// A lock on the folder of `path`: until it is dropped, other `ctid` programs do not change files there. `None` if the system cannot lock a
+/// folder, or another program holds the lock for too long.
 pub(crate) fn lock_beside(path: &Path) -> Option<File> {
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     let folder = File::open(folder(&target)).ok()?;

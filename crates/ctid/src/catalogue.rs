@@ -162,7 +162,7 @@ fn place(effect: &'static EffectInfo) -> String {
                 })
             };
             let of_two = match names(2)[..] {
-                [] => "in the balance of an only vessel".to_string(),
+                [] => "in the balance of a single vessel".to_string(),
                 [only] => format!("in a vessel's balance; of two vessels the {only} one"),
                 _ => "in a vessel's balance; of two vessels either, `ctid add --where upper|lower`"
                     .to_string(),

@@ -228,7 +228,7 @@ pub(crate) fn acceptance_title(diagnosis: &Diagnosis, test: &Acceptance) -> Stri
     }
 }
 
-/// Places of each effect that can act in several places: `overflow: upper tank 1.00, lower tank 0.31: cannot be told`.
+/// Places of each effect that can act in several places: `overflow: upper tank 1.00, lower tank 0.31: not determined`.
 pub(crate) fn places(diagnosis: &Diagnosis) -> Vec<String> {
     let of_effects = diagnosis.effects.iter().zip(&diagnosis.places);
     of_effects
@@ -237,7 +237,7 @@ pub(crate) fn places(diagnosis: &Diagnosis) -> Vec<String> {
         .collect()
 }
 
-/// Places of an effect in words: `upper tank 1.00, lower tank 0.31: cannot be told`.
+/// Places of an effect in words: `upper tank 1.00, lower tank 0.31: not determined`.
 pub(crate) fn place_scores(domain: Domain, places: &[PlaceScore]) -> String {
     let scores: Vec<String> = places
         .iter()
@@ -258,7 +258,7 @@ pub(crate) fn place_scores(domain: Domain, places: &[PlaceScore]) -> String {
         .count();
     let finding = match (places.first(), possible) {
         (Some(best), 1) => format!("it is the {}", place_name(domain, &best.place)),
-        _ => "cannot be told".to_string(),
+        _ => "not determined".to_string(),
     };
     format!("{}: {finding}", scores.join(", "))
 }

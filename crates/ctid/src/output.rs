@@ -177,7 +177,7 @@ impl Output {
     /// Writes the result; returns whether there was a result to write.
     ///
     /// # Errors
-    /// Where the disk does not take it, or something else stands there than when the command began; that is then still there.
+    /// If the file cannot be written, or has changed since the command began; it is not overwritten then.
     pub fn write(&self, found: &impl Found) -> Result<bool, Error> {
         let content = match self.kind {
             Kind::Json => {
@@ -208,7 +208,7 @@ impl Output {
         }
         Err(Error::file(
             &self.path,
-            "somebody else has written it while this command ran, so that it was not overwritten; choose another name and run it again",
+            "another program has written it while this command ran, so it was not overwritten; choose another name and run it again",
         ))
     }
 }
@@ -323,10 +323,10 @@ fn check(kind: Kind, path: &Path) -> Result<Standing, Error> {
             // Files of these kinds contain no mark.
             let why = match kind {
                 Kind::Record | Kind::Model => {
-                    "it is there already; choose another name or delete it"
+                    "the file exists already; choose another name or delete it"
                 }
                 _ => {
-                    "it is there already, and ctid did not write it; choose another name or delete it"
+                    "the file exists already, and ctid did not write it; choose another name or delete it"
                 }
             };
             return Err(Error::file(path, why));

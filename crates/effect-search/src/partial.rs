@@ -5,7 +5,7 @@
 //! are compared by their simulation error. A set is a partial explanation if
 //! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an
 //!   effect that follows time alone, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and
-//!   without others beside it, as those then bend to any disturbance;
+//!   without others beside it, as such a set can then fit any disturbance;
 //! - several effects are significant if each model has a noise model of its own, of limited memory;
 //! - it predicts the next sample as well as the model without it, each beside a noise model of its own;
 //! - what is fitted to three quarters of the records predicts the fourth (cross-validation);

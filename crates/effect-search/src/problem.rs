@@ -92,7 +92,7 @@ pub(crate) enum Phase {
     Believed,
     /// The search in white noise.
     White,
-    /// The search in the metric of a noise model.
+    /// The search, prewhitened by a noise model.
     Coloured,
     /// The acceptance test of the effects.
     Confirm,

@@ -57,7 +57,7 @@ pub struct Step {
     /// First rows of each held-out record, to which its initial states were fitted and which are not scored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub state_rows: Option<Vec<usize>>,
-    /// Simulation error, each output divided by its noise: 1 is the noise.
+    /// Simulation error, each output divided by the standard deviation of its noise: 1 if only noise is left.
     pub weighted_rmse: f64,
     /// Bayesian information criterion, with the weighting of the confirmation.
     pub bic: f64,

@@ -1,4 +1,4 @@
-//! The search of sets of effects in the metric of one noise model: all single effects, pairs by their joint scores, and a beam of sets that
+//! The search of sets of effects, prewhitened by one noise model: all single effects, pairs by their joint scores, and a beam of sets that
 //! grow by one effect at a time.
 //!
 //! Effects act together: a pair may explain what neither of its members does. So every set of the beam is scored again with all candidates,

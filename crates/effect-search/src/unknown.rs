@@ -1,9 +1,9 @@
 //! The unexplained error as a function: place, variable and shape.
 //!
 //! At every port a smooth function ([`ct_model::effects::shapes_keeping`]) of every state and input is added to the model and fitted with
-//! all other parameters. A function bends to whatever there is, so ports and variables are compared by the error that each leaves on
-//! quarters of the records that it was not fitted to, against that of the model without it on all it was fitted to. Where none lowers that
-//! error, functions of time take part too, and the criterion decides.
+//! all other parameters. A smooth function can fit any error, so ports and variables are compared by cross-validation: the error on quarters
+//! of the records to which the function was not fitted, against the error of the model without it on the records to which it was fitted. If
+//! no function lowers this error, functions of time are tried too, and BIC selects.
 
 use std::collections::BTreeMap;
 

@@ -2,11 +2,11 @@
 //!
 //! - [`fit_from`]: Levenberg-Marquardt within bounds from many starts, in parallel, in `O(p^2)` memory ([`Triangle`]).
 //! - [`coloured`]: the noise of each output as an autoregressive process, from the residual by marginal likelihood ([`noise_of`]), and the
-//!   fit in that metric.
+//!   prewhitened fit.
 //! - [`Squares`]: several outputs, each with a variance of its own, by the sum of their likelihoods.
 //! - [`Prior`]: what is known of an entry beside the records, as one more row.
 //! - [`Fit`]: standard errors with their degrees of freedom, correlations, likelihood and information criterion; [`robust`]: standard
-//!   errors where the residual has another spectrum than the metric of the fit.
+//!   errors where the residual has another spectrum than the noise model of the fit.
 //!
 //! Samples that are missing are left out of all of this exactly.
 //!

@@ -7,9 +7,6 @@ use crate::Error;
 
 /// Noise model of each output. Its scales are the standard deviations of the innovations, in the outputs' units. A fit estimates the scales
 /// itself and uses only the AR coefficients of the given noise model.
-///
-/// Its scales (the innovations' standard deviations) are those of the outputs, in their units. A fit estimates the scales itself and
-/// takes from the noise that it is given the colour alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<Reflections>", into = "Vec<Reflections>")]
 pub struct Noise {

@@ -12,7 +12,9 @@ use rig::Rig;
 fn main() {
     let asked = std::env::args().nth(1).map(|runs| runs.parse());
     let runs = asked.unwrap_or(Ok(4000)).expect("a number of runs");
-    println!("share of {runs} runs whose 95 % interval holds the truth, for each of a1.., b0..");
+    println!(
+        "share of {runs} runs whose 95 % interval contains the true value, for each of a1.., b0.."
+    );
     for in_loop in [true, false] {
         println!(
             "noise {}",
@@ -47,7 +49,7 @@ fn show(rig: &Rig, runs: u64) {
         false => "",
     };
     println!("  {}{missing}", rig.name);
-    println!("    with the residual's colour {}", share(&found.hits));
+    println!("    with the residual's noise model {}", share(&found.hits));
     println!("    as if it were white        {}", share(&found.white));
     println!(
         "    noise placed rightly in    {:6.3}",

@@ -1,11 +1,11 @@
 //! Checks whether the measured u is the output of the controller for r and y.
 //!
-//! Method. The controller is run on the recorded r and y, and compared with u; both sides go through `H = (p/(p +
-//! lambda))^q`, q the number of integrators in S and 1/lambda a twentieth of the record, or else noise on y that the controller
-//! never saw would be a random walk, which seems to follow anything. The unknown initial states and the offset of u
-//! are fitted. What is left is the mismatch. Noise is part of it, so it is split: the *systematic* part is what r
-//! explains, filtered by a ladder of lags `1/(1 + T p)`, less what noise of that colour would show. A wrong gain, sign
-//! or unit of time shows there; noise does not, because r knows nothing of it.
+//! Method. The controller is simulated on the recorded r and y, and its output compared with u. Both are filtered by `H = (p/(p +
+//! lambda))^q` with q the number of integrators in S and 1/lambda a twentieth of the record; otherwise noise on y that the controller did
+//! not read would be integrated to a random walk, which correlates with anything. The unknown initial states and the offset of u are
+//! fitted. The difference is the mismatch. It contains noise, so it is split: its *systematic* part is what a regression on r, filtered by
+//! several lags `1/(1 + T p)`, explains, less what noise with the same spectrum would explain. A wrong gain, sign or unit of time is in the
+//! systematic part; noise is not, because it is independent of r.
 //!
 //! Assumptions: r does what its hold says; y runs in straight lines between samples, or is held, whichever fits better. Where readings of y
 //! are missing it runs in lines between those that are there: what the controller did with the readings that the record lacks adds to the

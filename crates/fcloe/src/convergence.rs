@@ -5,12 +5,12 @@
 //! ```text
 //! Re (P^/P)(jw) > 1/2   for all w, infinity included;   P Hurwitz.
 //! ```
-//! Decided by Sturm's chain on a polynomial in `x = w^2`, see [`TransferFunction::exceeds`]. Where R has an integrator
-//! it asks for `b0^ > b0/2` (w = 0), and for `m < n` or a strictly proper R/S for `an^ > an/2` (w infinite): a start may
-//! be twice too large, and much more, but not twice too small.
+//! Decided by a Sturm sequence of a polynomial in `x = w^2`, see [`TransferFunction::exceeds`]. If R has an integrator, the condition
+//! requires `b0^ > b0/2` (w = 0), and for `m < n` or a strictly proper R/S `an^ > an/2` (w infinite): a start may be too large by a factor
+//! of two or much more, but not too small by a factor of two.
 //!
-//! What it says: it is sufficient for the recursion with a fixed filter, and far from necessary. A filter that is
-//! renewed with the estimates comes nearer to it by itself. The batch fit does not need it.
+//! The condition is sufficient for the recursion with a fixed filter, and far from necessary. A filter that is updated with the estimates
+//! approaches it. The batch fit does not need it.
 
 use ct_lti::{Polynomial, Positivity, TransferFunction};
 use serde::{Deserialize, Serialize};
@@ -70,7 +70,7 @@ impl Condition {
         })
     }
 
-    /// With the filter of an estimate, against a plant that is taken for the true one.
+    /// The condition for the filter of an estimate, with `truth` as the true plant.
     ///
     /// # Errors
     /// As [`Condition::new`], and those of [`ClosedLoop::new`].

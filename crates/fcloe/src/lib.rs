@@ -2,30 +2,30 @@
 //!
 //! Model: a plant `A(p) y = B(p) u` of any order in a loop with a known controller `u = R/S (r - y)`. The model's
 //! output is that of the whole loop driven by the reference, `y^ = B^ R/P^ r` with `P^ = A^ S + B^ R`, so noise that
-//! circulates in the loop does not bias the estimates. Without a controller it is the output error method.
+//! is fed back in the loop does not bias the estimates. Without a controller it is the output error method.
 //!
 //! | question | answer |
 //! |---|---|
 //! | Which plant is in my loop? | [`Problem::new`] with [`LoopRecord`]s and a [`Controller`], then [`Problem::fit`] |
-//! | How well do I know it? | [`Problem::uncertainty`]: it finds where the noise enters, and what colour it has |
+//! | How well do I know it? | [`Problem::uncertainty`]: it estimates where the noise enters the loop, and its AR model |
 //! | Why did the fit end? | [`Fit::stop`], and [`Stop::was_successful`] |
 //! | Where do I start? | [`start::pipeline`] needs the orders alone; [`start`] has each regression by itself, in open loop too |
 //! | The plant drifts; I want estimates as the samples come | [`RecursiveFcloe`], with [`RecursiveSettings`]; [`RecursiveFcloe::loop_health`] says how it fares |
 //! | Will the recursion converge from here? | [`Condition`]: condition (14) exactly, and the frequency where it fails worst; [`locus`] for a picture, [`TableOfStarts`] for many starts |
 //! | Is this the controller that made the record? | [`controller_mismatch`]; [`Problem::new`] asks it too |
 //! | What does the loop do, and how does that change with a parameter? | [`LoopSimulator`], exact for a held reference |
-//! | I want many starts at once, or a fit in the metric of a noise | [`Problem`] implements [`estimation::Residuals`]: [`estimation::fit_from`], [`estimation::coloured`] |
+//! | I want many starts at once, or a fit prewhitened by a noise model | [`Problem`] implements [`estimation::Residuals`]: [`estimation::fit_from`], [`estimation::coloured`] |
 //! | I need data to try it on | [`continuous_loop`], [`sampled_loop`], [`noise_at_snr`], [`Quantiser`] |
 //!
 //! Time is in any one unit throughout. Signals are deviations from an operating point at which the loop rested before
 //! the record; [`Offsets`] says which, or has it estimated.
 //!
-//! What it needs: the controller to its last digit (a PI printed with two digits moves a gain of 6 by 0.8 %), a reference
-//! that moves and knows nothing of the noise, and a start whose loop is stable. What it does not need: u; only the starts
-//! by regression do.
+//! Requirements: the exact controller (with the settings of a PI controller rounded to two digits, a gain of 6 is biased by 0.8 %), a
+//! reference that is exciting and independent of the noise, and a start whose loop is stable. u is not required, except for starts by
+//! regression.
 //!
 //! # Example
-//! A tank level under PI control, 20 dB of noise that circulates in the loop; the start is off by a third.
+//! A tank level under PI control, with noise at 20 dB that is fed back in the loop; the start is off by a third.
 //! ```
 //! use ct_lti::Hold;
 //! use ct_signals::excitation;
@@ -57,7 +57,7 @@
 //! # Figures
 //! | | | command |
 //! |---|---|---|
-//! | 95 % intervals hold the truth, 4000 runs for each of eleven settings | in 94.2 to 96.0 % for every parameter | `cargo run --release -p fcloe --example coverage` |
+//! | 95 % intervals contain the true value, 4000 runs for each of eleven settings | in 94.2 to 96.0 % for every parameter | `cargo run --release -p fcloe --example coverage` |
 //! | sensitivities against central differences of an adaptive integration | within 1e-7 | `cargo test -p fcloe --test all sensitivities::` |
 //! | noise-free recovery, n = 1 to 3, PI and filtered PID | within 1e-8 | `cargo test -p fcloe --test all recovery::` |
 //! | recursion, n = 1, 20 dB: 60 starts within a factor of 5 | 60 end within 3 %; 37 with the filter of the start | `cargo run --release -p fcloe --example recursive` |

@@ -1,15 +1,14 @@
 //! Noise model of the residual, and its influence on the standard errors.
 //!
-//! Model: `v = H e`, e white of variance sigma^2, where H is an autoregression, and after it, for noise that circulates in the loop, `F = A
-//! S/P` sampled under a hold: in the loop the residual is `A S/P w` (Baysse, Carrillo, Habbadi, (13)). No autoregression of modest order
-//! stands for F: with an integrator in S it has a zero at frequency 0, just where the sensitivities of a slow experiment live, and standard
-//! errors without it are too large.
+//! Model: `v = H e`, e white of variance sigma^2, where H is an autoregression, followed, for noise that is fed back in the loop, by `F = A
+//! S/P` sampled under a hold: in the loop the residual is `A S/P w` (Baysse, Carrillo, Habbadi, (13)). An autoregression of moderate order
+//! cannot approximate F: with an integrator in S, F has a zero at frequency 0, where the sensitivities of a slow experiment are largest, and
+//! standard errors without it are too large.
 //!
-//! Method: the residual is whitened with both, F inverted exactly from sample to sample, `w = F^-1 v`, and an
-//! autoregression fitted to what is left; the one with the larger marginal likelihood stays, less the penalty of
-//! Bayes' criterion for its coefficients. What the residual may hold beside noise is left out of both alike: a constant
-//! in w where S has a root at 0, which F cannot see but for its beginning, and a level of y that was estimated, which
-//! is a ramp in w.
+//! Method: the residual is whitened with and without F (F is inverted exactly from sample to sample, `w = F^-1 v`), and an autoregression is
+//! fitted to the result. The variant with the larger marginal likelihood, less the BIC penalty of its coefficients, is used. Deterministic
+//! parts of the residual are removed in both variants: a constant in w if S has a root at 0, because F responds to it only initially, and an
+//! estimated level of y, which is a ramp in w.
 //!
 //! ```text
 //! cov(theta) = (J'J)^-1 J' V J (J'J)^-1,     (J'VJ) = sum_{k,l} R(k-l) s_k s_l',   R the autocovariance of v

@@ -52,7 +52,7 @@ pub struct LoopRecord {
     pub y: Vec<f64>,
     /// Hold of r between samples.
     pub r_hold: Hold,
-    /// What u does between samples. In a loop with a continuous controller it is not quite either of the two.
+    /// Hold of u between samples. With a continuous-time controller both choices are approximations.
     pub u_hold: Hold,
     /// Operating point.
     pub offsets: Offsets,

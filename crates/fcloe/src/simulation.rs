@@ -1,4 +1,4 @@
-//! The loop from its reference, and the sensitivities of its output, exactly.
+//! Exact simulation of the loop from its reference, with the sensitivities of its output.
 //!
 //! Equations. With two chains of `N = deg P = n + deg S` integrators, `x_i = p^i r/P` and `z_i = p^i y^/P`,
 //! ```text
@@ -6,12 +6,12 @@
 //! sigma_a_i = -S p^i/P y^                  = -sum_j s_j z_{i+j}                  (11)
 //! sigma_b_i =  S p^i/P u^ = R p^i (x - z)  =  sum_j r_j (x_{i+j} - z_{i+j})      (9), with S u^ = R (r - y^)
 //! ```
-//! so one chain after the other holds all of it, whatever the number of parameters, and u^, which jumps with r, is
-//! never differentiated. In open loop (R = 0, S = 1) u drives, `P = A`, `y^ = B x` and `sigma_b_i = x_i`. The highest
+//! so the states of two chains in series give all outputs and sensitivities for any number of parameters, and u^, which jumps with r, is
+//! not differentiated. In open loop (R = 0, S = 1) u is the input of the first chain, `P = A`, `y^ = B x` and `sigma_b_i = x_i`. The highest
 //! derivative, `x_N` or `z_N`, follows from the chain's own equation.
 //!
 //! The loop is linear, so one matrix exponential of order 2N per set of parameters moves it from sample to sample
-//! without error, for a drive that does what its hold says.
+//! without error if the drive follows its hold between samples.
 //!
 //! Start: all states 0, the loop at rest at the operating point.
 //!
@@ -44,7 +44,7 @@ impl Block {
         self.len
     }
 
-    /// Whether there are none.
+    /// Whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }

@@ -1,22 +1,22 @@
-//! The loop around the plant: the controller is simulated with it, from the reference.
+//! Simulation of plant and controller in a loop, from the reference.
 //!
-//! **Model**: `y = P u + v`, `u = C (r - y) + d`, limited as the controller does it; `v` any disturbance, `d` what was
-//! added to the command and is known: the measured command less the one that the controller gives on the measured
-//! reading. The loop runs on `r` and `d` alone, `ym = P um`, `um = C (r - ym) + d`, so that neither the model's output nor
-//! its derivatives hold any of the noise which came back through `u`. At the true parameters
+//! **Model**: `y = P u + v`, `u = C (r - y) + d`, with the limits of the controller; `v` is any disturbance, `d` a known
+//! signal that was added to the command: the measured command less the output of the controller for the measured reading. The loop is
+//! simulated from `r` and `d` only, `ym = P um`, `um = C (r - ym) + d`, so that neither the model's output nor its derivatives contain noise
+//! that is fed back through `u`. At the true parameters
 //! ```text
 //! y - ym = v / (1 + P C),   v = (1 + P C) (y - ym)
 //! ```
-//! An integral in `C` takes the slow part out of `y - ym`, and the information on static parameters with it. So what the loop did is
-//! undone: `y - ym + P0 (um - u)`, at every output, `P0` the plant linearised once at a first fit, is `v` itself, limits or not, of which a
-//! noise model is then made. Without limits this is the filter `1 + P0 C` of `y - ym`. The derivatives are filtered alike, and hold no
-//! noise: the estimate is the one of an instrumental variable, unbiased whatever the colour of `v` and whatever `P0`, which only the
-//! variance hangs on. The determinant of what makes `v` of `y` is one, so likelihoods compare.
+//! Integral action in `C` removes the slow part of `y - ym`, and with it the information on static parameters. So the action of the loop is
+//! removed: with `P0` the plant linearised once at a first fit, `y - ym + P0 (um - u)` at every output is `v` itself, also when limits act;
+//! the noise model is fitted to it. Without limits it equals `y - ym` filtered by `1 + P0 C`. The derivatives are filtered in the same way
+//! and contain no noise, so the estimate is an instrumental-variable estimate: unbiased for any spectrum of `v` and any `P0`, which affects
+//! the variance only. The determinant of the map from `y` to `v` is one, so likelihoods can be compared.
 //!
-//! **Assumptions**: `y[k]` is read before `u[k]` acts; the command is held; the reference is not constant; nothing of `v`
-//! is in `r`.
+//! **Assumptions**: `y[k]` is read before `u[k]` acts; the command is held; the reference is not constant; `r` is independent of
+//! `v`.
 //!
-//! **Cost**: a controller's step for every simulated sample, `O((p + 1) n^2)` for the filter of a row.
+//! **Cost**: one step of the controller for every simulated sample, `O((p + 1) n^2)` for the filter of a row.
 //!
 //! **References**: I. D. Landau, A. Karimi, Recursive algorithms for identification in closed loop, Automatica 33 (1997)
 //! 1499-1523; M. Gilson, P. Van den Hof, Instrumental variable methods for closed-loop system identification, Automatica

@@ -43,7 +43,7 @@ pub fn fit(setup: &Setup, options: &FitOptions) -> Result<Fit, Error> {
     coloured(setup, white, options.noise_order, options.stopping)
 }
 
-/// Fits from the given starts in the metric of a given noise ([`estimation::fit_from`]).
+/// Fits from the given starts, prewhitened by a given noise model ([`estimation::fit_from`]).
 ///
 /// # Errors
 /// Where no start gives a finite simulation.
@@ -57,7 +57,7 @@ pub fn fit_from(
     fit_onward(setup, starts, noise, stopping)
 }
 
-/// As [`fit_from`], from starts with additional data.
+/// As [`fit_from`], from starts that may contain the R factor of the residual and its Jacobian at the start ([`Start`]).
 ///
 /// # Errors
 /// As [`fit_from`].
@@ -92,7 +92,7 @@ fn done(setup: &Setup, fit: Result<Fit, NoFit>) -> Result<Fit, Error> {
     Ok(fit)
 }
 
-/// Estimates the noise's spectrum from a fit's residual and refits in that metric, until the two agree ([`estimation::coloured`]).
+/// Estimates a noise model from a fit's residual and refits, prewhitened by it, until the two agree ([`estimation::coloured`]).
 ///
 /// # Errors
 /// As [`fit_from`].

@@ -1,12 +1,12 @@
 //! Noise level of each measured output, estimated independently of model errors.
 //!
-//! The residual of a model that lacks something holds more than noise, and more at one output than at another. What the noise is shows in a
-//! linear prediction of the reading from all that is known at its instant: the model's own output and its past, the readings before it,
-//! the readings of the other outputs before it, the inputs. Its error is close to the noise as long as what the model lacks follows
-//! from these (L. Ljung, System Identification, 2nd ed., 1999, section 10.4: long ARX models).
+//! The residual of an incomplete model contains model errors in addition to noise, more at one output than at another. The noise is
+//! estimated as the error of a linear prediction of the reading from all signals that are known at its instant: the model's output and its
+//! past, earlier readings of this and of the other outputs, and the inputs. The prediction error is close to the noise if the model error
+//! can be predicted from these signals (L. Ljung, System Identification, 2nd ed., 1999, section 10.4: long ARX models).
 //!
-//! Coloured noise follows from its own past, the more the shorter the interval between readings. So that the errors of outputs with rates
-//! of their own are compared alike, each is predicted as far ahead as the slowest one's readings lie apart.
+//! The shorter the interval between readings, the better coloured noise is predicted from its own past. To make outputs with different
+//! sampling rates comparable, the prediction horizon of each is the sampling interval of the slowest output.
 
 use ct_signals::Record;
 use estimation::Triangle;

@@ -30,7 +30,7 @@ pub enum Error {
     },
     /// A signal is constant.
     #[error(
-        "{record}: \"{signal}\" stands at {value} throughout, so that nothing can be identified; record at least a step up and a step down"
+        "{record}: \"{signal}\" is constant at {value}, so that nothing can be identified; record at least a step up and a step down"
     )]
     Constant {
         /// Name of the record.
@@ -131,7 +131,7 @@ pub enum Error {
     },
     /// The controller's output is not the measured command.
     #[error(
-        "{record}: the measured command disagrees with the controller of the model file, R/S (r - y), by {} {unit} rms, {:.0} % of what it moves: \
+        "{record}: the measured command disagrees with the controller of the model file, R/S (r - y), by {} {unit} rms, {:.0} % of its variation: \
          check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
         significant(*.mismatch, 3),
         100.0 * .mismatch / .size

@@ -1,12 +1,12 @@
 //! Preparation of records with missing rows or samples of the input.
 //!
 //! As everywhere else ([`ct_signals::Gaps`]) the input is held through a gap of at most a tenth of the plant's fastest time constant, which
-//! a first fit says (SRIVC of the order that is asked for). At a longer gap the record is cut.
+//! is estimated by a first fit (SRIVC of the requested order). At a longer gap the record is cut.
 //!
 //! | methods | what they take |
 //! |---|---|
-//! | SRIVC, RIVC | the parts, each from a state of its own, with one offset and one noise |
-//! | all others, which begin at rest or from one state | the whole record: the input is held through the gap, whatever it was, and the readings in the gap and behind it are left out until the plant has forgotten it, down to 1 % by its slowest time constant |
+//! | SRIVC, RIVC | the parts, each with its own initial state, with a common offset and noise model |
+//! | all others, which begin at rest or from one state | the whole record: the input is held through the gap, and the readings in the gap and after it are left out until the response to the unknown input has decayed to 1 % (by the slowest time constant) |
 //!
 //! Missing readings of the output are no gaps: each method leaves them out in its own way.
 

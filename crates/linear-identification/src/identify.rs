@@ -11,8 +11,8 @@ use crate::{
 /// Identifies from one record.
 ///
 /// # Errors
-/// [`Error::Signals`] for a record that is too short, [`Error::Untold`] where it cannot tell the parameters, [`Error::Estimator`] where the
-/// recursion has stopped; those of [`mend`].
+/// [`Error::Signals`] for a record that is too short, [`Error::Untold`] where it does not determine the parameters, [`Error::Estimator`] where
+/// the recursion has stopped; those of [`mend`].
 pub fn identify(record: &Record, request: &Request) -> Result<Identification, Error> {
     let records = vec![record.clone()];
     let (mended, _) = mend(records, Vec::new(), request.order, request.integrator)?;
@@ -44,7 +44,7 @@ pub fn identify_mended(records: &[Mended], request: &Request) -> Result<Identifi
     let left_out = first.readings_left_out();
     if left_out > 0 && !request.method.is_refined() {
         found.warnings.push(format!(
-            "{} simulates through long gaps, from the input as it was held, and leaves out {left_out} readings behind them, until the effect of the gap has decayed; srivc and rivc restart with new initial states there, and lose none",
+            "{} simulates through long gaps with the input held at its last value, and does not use {left_out} readings after them, until the effect of the gap has decayed; srivc and rivc restart there with new initial states, and use all readings",
             request.method.id()
         ));
     }

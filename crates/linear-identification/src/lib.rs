@@ -12,7 +12,7 @@
 //!
 //! | method | what it does | use it where |
 //! |---|---|---|
-//! | [`Method::Fcloe`] | output error of the loop, over the whole record | always, to begin with: noise that circulates does not bias it, and it says its standard errors |
+//! | [`Method::Fcloe`] | output error of the loop, over the whole record | always, to begin with: noise that is fed back does not bias it, and it gives standard errors |
 //! | [`Method::RecursiveFcloe`] | the same, sample by sample, with a memory that does not fade | the plant drifts: it follows with a delay of that memory |
 //! | [`Method::Iv`] | instruments simulated in the loop | a check that needs no iteration |
 //! | [`Method::Ls`] | least squares | noise is low, or to see what noise does |
@@ -41,7 +41,7 @@
 //! `RECORDS=400 cargo test -p ctid --test all identify_missing -- --nocapture`.
 //!
 //! On 3000 samples every second of plants with a time constant of 20 s, and of 10 and 15 s, noise of a tenth of the output, white and
-//! coloured, 60 noises: stabilized-oe covers the truth with 1.96 standard errors in 88 to 98 % of them (`cargo test -p ctid --test all
+//! coloured, 60 noises: 1.96 standard errors of stabilized-oe contain the true value in 88 to 98 % of them (`cargo test -p ctid --test all
 //! identify::how_sure -- --nocapture`). ct-rls finds a_2 too small by more than 40 % with white noise (`cargo test -p ctid --test all
 //! identify::biases`). Where poles and zeros nearly cancel expect the output error too to be off by more than its standard errors.
 //!

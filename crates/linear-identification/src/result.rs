@@ -92,7 +92,7 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// Time from which the start is forgotten as far as possible: half the record.
+    /// Time from which the estimates are taken as settled: half the record.
     #[must_use]
     pub fn settled(&self) -> f64 {
         match (self.time.first(), self.time.last()) {

@@ -51,7 +51,7 @@ pub(crate) fn doubtful(parameters: &[Parameter], order: Order) -> Vec<String> {
         let error = parameter.std_error?;
         (parameter.value.abs() < 2.0 * error).then(|| {
             format!(
-                "{} cannot be told from 0: its standard error is {:.0} % of it; try --order {lower}",
+                "{} is not significantly different from 0: its standard error is {:.0} % of its value; try --order {lower}",
                 parameter.name,
                 100.0 * error / parameter.value.abs()
             )

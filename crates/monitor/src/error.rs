@@ -9,7 +9,7 @@ pub enum Error {
     Structure(#[from] plants::Error),
     /// An effect that is a function of the time since a record began.
     #[error(
-        "{effect} follows the time since a record began, and a monitored plant has no start time: remove it, the monitor looks for it by itself"
+        "{effect} is a function of the time since the record began, but a monitored plant has no such start time: remove it; the monitor searches for it itself"
     )]
     ByClock {
         /// The effect.
@@ -60,7 +60,7 @@ pub enum Error {
     },
     /// A state of another model.
     #[error(
-        "the state belongs to another model: {differences}; name another state file, or delete it to start again"
+        "the state belongs to another model: {differences}; use another state file, or delete this one to start again"
     )]
     OtherModel {
         /// The differences, in the words of the model file.

@@ -1,12 +1,13 @@
 //! Isolation: the effect of the catalogue, and its onset, that explains the latest rows.
 //!
-//! An effect that begins at row `k` is fitted to the rows of all outputs from `k` on by `greybox`, in the metric of the learned noise:
-//! every parameter of the plant as it was learned, the levels at `k` as the learned model has them, only the effect's own parameters free.
-//! Onsets lie on a grid that is finer towards now, and then between its neighbours. With the innovations `e` of the learned model,
+//! An effect that begins at row `k` is fitted by `greybox` to the rows of all outputs from `k` on, prewhitened by the learned noise model.
+//! The parameters of the learned plant and its levels at row `k` are fixed; only the effect's parameters are fitted. The onsets that are
+//! tried lie on a grid that is finer for recent rows, then between the neighbours of the best. With the innovations `e` of the learned model,
 //! ```text
 //! evidence = sum_o (sum_{j >= k} e_jo^2 - cost_o/sigma_o^2) - (parameters + 1) ln n
 //! ```
-//! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs `o`.
+//! is the fall of the Bayesian information criterion. The onset counts as a parameter; `n` is the number of stored rows times that of the
+//! outputs `o`.
 //! Effects within [`GROUP_MARGIN`] of the best cannot be distinguished yet.
 
 mod search;

@@ -91,7 +91,7 @@ pub enum Notice {
         to: f64,
         /// Number of missing rows.
         missing: u64,
-        /// Whether the command is assumed to have been held; otherwise the monitor waits for new levels.
+        /// Whether the command is assumed to have been held; otherwise the monitor waits until the levels have settled.
         bridged: bool,
     },
     /// The clock was set back, as 100 consecutive rows show: these rows are used from here on, as after a long gap.

@@ -18,7 +18,7 @@ pub(crate) trait Model: Send + Sync {
     fn advance(&mut self, hold: Hold, from: &Sample, to: &Sample);
     /// The states: the level of each vessel, of a plant.
     fn states(&self) -> Each<f64>;
-    /// Where what the command of a plant moves stands.
+    /// Position of the actuator of a plant.
     fn stands(&self) -> f64;
 }
 

@@ -25,7 +25,7 @@ pub enum Error {
     ShortNoise {
         /// Values that were given.
         values: usize,
-        /// Steps of the run and one more.
+        /// Number of values that are needed: the steps of the run plus one.
         needed: usize,
     },
     /// Steps over which the error is differenced.

@@ -21,7 +21,7 @@ pub enum Error {
         suggestion: String,
     },
     /// The structure already has the effect.
-    #[error("effect `{effect}` is on already: remove it once")]
+    #[error("effect `{effect}` is listed twice: delete one of them")]
     EffectTwice {
         /// The effect.
         effect: &'static str,

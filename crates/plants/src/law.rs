@@ -83,7 +83,7 @@ pub trait Law<T: Scalar>: Send + Sync {
     /// Vessel: changes the surface at a level \[area\].
     fn area(&self, _level: &T, _area: &mut T) {}
     /// Vessel: the time of a jump of the law, if it has one \[s\]. The step is cut at that time, and [`Law::switch_over`] is called between
-    /// the two parts: a comparison with the time could not tell the two sides of the cut apart.
+    /// the two parts: at the cut itself, a comparison with the time would not show which part is integrated.
     fn switch(&self) -> Option<T> {
         None
     }

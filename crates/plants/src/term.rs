@@ -307,7 +307,7 @@ impl Structure {
         if self.terms.iter().any(|on| on.name == term.name) {
             return Err(Error::Term {
                 term: term.name,
-                what: "it is on already: remove it once".to_string(),
+                what: "it is listed twice: delete one of them".to_string(),
             });
         }
         let mut with = self.clone();

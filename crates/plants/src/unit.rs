@@ -1,16 +1,16 @@
 //! Units of fitted parameters, built from the units of the record.
 
-/// A product of powers of a tank's units. The power of the level's unit counts in halves, because Torricelli's coefficient has a
+/// A product of powers of a tank's units. The exponent of the level's unit is stored in halves, because Torricelli's coefficient has a
 /// half-integer power.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Unit {
-    /// Twice the power of the level's unit.
+    /// Twice the exponent of the level's unit.
     pub level_halves: i8,
-    /// Power of the area's unit.
+    /// Exponent of the area's unit.
     pub area: i8,
-    /// Power of the input's unit.
+    /// Exponent of the input's unit.
     pub input: i8,
-    /// Power of the second.
+    /// Exponent of the second.
     pub time: i8,
 }
 

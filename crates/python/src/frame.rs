@@ -24,7 +24,7 @@ pub struct Content {
     pub csv: Vec<u8>,
 }
 
-/// Instants as numbers, or as dates in words.
+/// Instants as numbers, or as dates in text form.
 #[derive(FromPyObject)]
 enum Times<'py> {
     Numbers(PyReadonlyArray1<'py, f64>),

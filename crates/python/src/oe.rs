@@ -270,7 +270,7 @@ impl StabilizedOe {
         self.__copy__()
     }
 
-    /// As it stands, to be pickled; restored it goes on to the bit.
+    /// The state, for pickling; a restored estimator gives bit-identical results.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         Ok(PyBytes::new(py, &self.oe.bytes(self.kind)?))
     }

@@ -211,7 +211,7 @@ impl ContinuousRls {
         self.__copy__()
     }
 
-    /// As it stands, to be pickled; restored it goes on to the bit.
+    /// The state, for pickling; a restored estimator gives bit-identical results.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let others = Others {
             size: self.size,

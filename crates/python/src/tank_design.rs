@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use crate::tank::{KeptTank, NAME, options, parsed, problem};
 use crate::{bytes, error, work};
 
-/// The experiment that tells two effects apart best, from a plant and its records as [`crate::tank::TankFit`] is pickled: what
+/// The experiment that distinguishes two effects best, from a plant and its records, in the form in which [`crate::tank::TankFit`] is pickled: what
 /// `ctid design --json` writes, without its mark.
 #[pyfunction]
 #[pyo3(signature = (content, between, *, range, slew, duration, seed, effort, time_limit, progress=None))]

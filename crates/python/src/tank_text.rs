@@ -33,7 +33,7 @@ pub fn spec(file: &ModelFile, values: &BTreeMap<String, f64>) -> PyResult<ModelS
     }
     if file.known.disturbed_vessel(plant).is_some() {
         return Err(error::of_model(format!(
-            "the text of {} has no measured disturbance: write the balance as a model of your own",
+            "a model text of the plant {} cannot contain a measured disturbance: write the balance as a model of your own",
             plant.id()
         )));
     }

@@ -12,7 +12,7 @@ use crate::pass::{Instruments, Pass};
 const DEPENDENT: f64 = 1e-13;
 /// Errors of this share of the output are those of rounding.
 const ROUNDING: f64 = 1e-10;
-/// The noise of a record is taken for at least this share of the largest of all.
+/// Lower limit of the noise of a record, as a share of the largest noise of all records.
 const LEAST_NOISE: f64 = 1e-9;
 
 /// Sums over all records. Columns: what all records share, then of each record its own.

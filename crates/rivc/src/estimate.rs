@@ -11,15 +11,15 @@
 //! and filter, instruments and L are computed again until the estimates have converged. A delay that is estimated takes part by its
 //! derivative. Of several records each has a model of its noise, or a variance, of its own, and counts accordingly.
 //!
-//! Readings of the output may be missing, anywhere: their rows do not count, what the model says stands for them in the filters of y
-//! (`pass.rs`), L and R are those of autoregressions over the readings that are there, exactly ([`ArModel::fit`],
-//! [`ct_signals::Whitener`]). The limit is that of maximum likelihood from these readings. Where an input is not known for a while, the
-//! parts of the record are [`Data`] that continue: they share offset and noise, and begin with states of their own.
+//! Readings of the output may be missing anywhere. Their rows are not used; in the filters of y they are replaced by the model's output
+//! (`pass.rs`); L and R are those of autoregressions fitted exactly to the available readings ([`ArModel::fit`], [`ct_signals::Whitener`]).
+//! The estimates converge to those of maximum likelihood from these readings. If an input is not known for a while, the parts of the record
+//! are [`Data`] that continue: they share offset and noise model, and each has its own initial states.
 //!
-//! Assumptions: the plant is stable, but for an integrator; the noise owes nothing to the inputs, in a loop nothing to the reference; in a
-//! loop the input is what its hold says, as of a controller that is sampled: after a continuous one it is not, and the estimates are biased
-//! by what u does between the samples (closed-loop output error has no need of u). The starts find the right minimum; with noise of more
-//! power than the output they may not.
+//! Assumptions: the plant is stable, apart from an integrator; the noise is independent of the inputs, in a loop of the reference; in a
+//! loop the input between samples follows its hold, as with a sampled controller. With a continuous-time controller it does not, and the
+//! estimates are biased (closed-loop output error does not use u). The starts lead to the global minimum; with more noise than signal power
+//! they may not.
 //!
 //! Convergence: no proof for finite records; [`Estimate::converged`] says whether the estimates have converged. For white noise (SRIVC), or
 //! autoregressive noise (RIVC), the limit has the least possible variance in open loop, as far as y is a line between its samples.

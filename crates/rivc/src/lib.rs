@@ -10,7 +10,7 @@
 //! | The noise is coloured | [`Noise::Autoregressive`]: RIVC; with [`Noise::White`] the standard errors allow for it |
 //! | There is a delay, or an integrator | [`Structure::with_delay`], [`Structure::with_integrator`] |
 //! | The records are from a loop | [`Data::reference`]: the instruments come from it, and the controller need not be known |
-//! | What does the plant say of another record? | [`Plant::fitted`] |
+//! | Simulate the plant on another record | [`Plant::fitted`] |
 //! | Readings of the output are missing | they are NaN in [`Data::output`]; where inputs are not known for a while, [`Data::continues`] |
 //! | How well do I know it? | [`Parameter::std_error`], [`Estimate::covariance`] |
 //!
@@ -55,7 +55,7 @@
 //! # Figures
 //! | | | command |
 //! |---|---|---|
-//! | 95 % intervals of RIVC hold the truth, 1000 samples (in a loop 2000) at 20 dB, white, AR(1) and AR(2) noise, n = 2, delays of 3 and 3.4 samples, an integrator in a loop, records of unequal noise | in 92.5 to 97.2 % of 400 records for every parameter | `RECORDS=400 cargo test -p rivc --test all coverage -- --nocapture` |
+//! | 95 % intervals of RIVC contain the true value, 1000 samples (in a loop 2000) at 20 dB, white, AR(1) and AR(2) noise, n = 2, delays of 3 and 3.4 samples, an integrator in a loop, records of unequal noise | in 92.5 to 97.2 % of 400 records for every parameter | `RECORDS=400 cargo test -p rivc --test all coverage -- --nocapture` |
 //! | the same of SRIVC, coloured noise included | in 91.5 to 97.2 % | the same |
 //! | the same where 30 % of the readings are missing at random, and a block of 10, n = 2, open loop and loop, white, AR(1) and AR(2) noise | in 93.0 to 97.0 %, all converged | `RECORDS=400 cargo test -p rivc --test all coverage::missing -- --nocapture` |
 //! | a record in three parts besides, between which the input is not known, one of 20 samples | in 92.2 to 95.0 % | `RECORDS=400 cargo test -p rivc --test all coverage::parts -- --nocapture` |

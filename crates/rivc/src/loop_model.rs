@@ -1,10 +1,10 @@
-//! The input of a loop as its reference explains it: the first of two steps, which makes instruments without knowing the controller.
+//! The input of a loop, simulated from its reference: the first step of a two-step method that makes instruments without a known controller.
 //!
 //! Model: `u[k] = sum_i a_i u[k-i] + sum_i b_i r[k-i] + c + e[k]`, i to q, by least squares; the order q has the least `N log sum e^2 + k
-//! log N` of those that are stable. Its simulation from r alone is free of the noise, but for what k coefficients can fit of it, k/N of its
-//! power.
+//! log N` of those that are stable. Its simulation from r alone is free of noise, except for the share k/N of the noise power that k
+//! coefficients fit.
 //!
-//! Assumptions: r owes nothing to the noise; the loop is linear. A loop that is not, or noise that is, costs efficiency, and no bias.
+//! Assumptions: r is independent of the noise; the loop is linear. A nonlinear loop increases the variance, but causes no bias.
 //!
 //! Cost: O(N q^2).
 //!

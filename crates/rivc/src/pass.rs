@@ -7,13 +7,12 @@
 //! ```
 //! The column of a delay is `-sum_i beta_i p^{i+1} u_f(t - d)`, the derivative of the equation. y is interpolated linearly between samples.
 //! A missing reading is replaced in `y_f` by the model's output on the measured inputs, or by linear interpolation in a first regression
-//! without a model; the row is not used. At `E = A` the residual of every other row is `y - y^` whatever stands there, so that the
-//! equations hold where they are those of the readings that are there: those of output error (for white noise) or of generalised least
-//! squares over these readings, to which a missing one adds nothing.
+//! without a model; the row is not used. At `E = A` the residual of every other row is `y - y^` for any replacement, so that the
+//! estimates solve the equations of the available readings: those of output error (for white noise) or of generalised least squares.
 //!
-//! The instruments z are the same of an output that is simulated, and in a loop of an input that the reference explains. Where E is the A
-//! of that simulation, `p^n y_f - phi' x = y - y^` whatever y does between samples, so that the lines bias nothing once the estimates have
-//! converged.
+//! The instruments z are the regressors of the simulated output, in a loop with an input that is simulated from the reference. If E is the A
+//! of that simulation, `p^n y_f - phi' x = y - y^` for any course of y between samples, so that the linear interpolation causes no bias once
+//! the estimates have converged.
 
 use crate::bank::Bank;
 use crate::grid::{Path, Stretch};

@@ -32,8 +32,8 @@ impl Plant {
         }
     }
 
-    /// The simulated output of a record, from its inputs alone: offset and initial states are those that fit the measured output best
-    /// (least squares over the readings that are there). Before the first sample the inputs are taken to have stood.
+    /// The output of a record, simulated from its inputs only; offset and initial states are fitted to the measured output (least squares over
+    /// the available readings). The inputs are assumed constant before the first sample.
     ///
     /// # Errors
     /// [`Error::OrderZero`], [`Error::Improper`], [`Error::Length`], [`Error::NotFinite`], [`Error::NoReading`], [`Error::Time`];

@@ -73,7 +73,7 @@ const LARGEST: f64 = 1e100;
 /// # Ok::<(), stabilized_oe::Error>(())
 /// ```
 ///
-/// With the feature `serde` an estimator without rows is saved as it stands, and goes on to the bit when restored.
+/// With the feature `serde` an estimator without rows can be saved and restored; it continues with bit-identical results.
 #[derive(Clone, Debug)]
 pub struct StabilizedOe<const N: usize, const P: usize, G, D, const R: usize = 0> {
     gain: G,

@@ -1,18 +1,18 @@
-//! The scheme to start with: state variable filters, the same for input and output.
+//! The default scheme: state variable filters, the same for input and output.
 //!
 //! Model: with `x_f = lambda^n/(s + lambda)^n x` the model holds for the filtered signals as it does for the signals,
 //! `A y_f = B u_f`, and the filters have the derivatives as their states. The parallel model is driven by `u_f`, so that
 //! `e^(i) = y_f^(i) - y_m^(i)` for `i = 0..n`.
 //!
-//! A reading that is missing is replaced by that of the model, `sum_i e_i y_m^(i)/e_0` with E the filter's polynomial, and no step is made:
-//! `e` and its derivatives are then those of readings whose residual is 0 where there is none. The readings that are there owe nothing to
-//! it where the model is right, so that no bias comes of it; where it is not, the error that shows is smaller, and convergence slower.
+//! A missing reading is replaced by that of the model, `sum_i e_i y_m^(i)/e_0` with E the filter's polynomial, and the estimates are not
+//! updated: `e` and its derivatives are those of a record whose missing readings have a residual of 0. With the right model the replacement
+//! causes no bias; with a wrong one, it makes the error smaller and convergence slower.
 //!
-//! Assumption: the input is held between samples or runs on lines, the output runs on lines. Noise passes the filter: it no longer is
-//! white, and `c^` goes elsewhere; bounds on it matter all the same.
+//! Assumption: the input is held or interpolated linearly between samples, the output is interpolated linearly. Filtered noise is not white,
+//! and `c^` then converges to other values; bounds on it are needed all the same.
 //!
-//! Accuracy: of second order in the step for `m < n`. For `m = n` the highest derivative of `u_f` jumps with `u`, and the line that the
-//! model takes it for is of first order: 1 % for n = 1 and a step of a fortieth of the time constant.
+//! Accuracy: of second order in the step for `m < n`. For `m = n` the highest derivative of `u_f` jumps with `u`, and its linear
+//! interpolation in the model is of first order: 1 % for n = 1 and a step of a fortieth of the time constant.
 
 use ct_lti::{Hold, Start, StateVariableFilter};
 

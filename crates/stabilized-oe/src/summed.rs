@@ -93,7 +93,7 @@ impl<const N: usize, const P: usize> AdaptivePlusConstant<N, P> {
         })
     }
 
-    /// The adaptive part, with the estimates.
+    /// The adaptive part of the gain, which contains the estimates.
     pub fn blocks(&self) -> &BlockDiagonal<N, P> {
         &self.blocks
     }

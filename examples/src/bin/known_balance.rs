@@ -130,11 +130,11 @@ fn main() -> Result<(), ct_constrained::Error> {
     }
     println!();
     println!(
-        "The balance reduces the variance of the pumps' gains. The sign keeps the drain from running backwards: the penalty softly and"
+        "The balance reduces the variance of the pumps' gains. The sign constraint keeps the drain's flow from becoming negative: the penalty"
     );
     println!(
-        "for all estimates, also for early ones that later data would have corrected, which pushes a up; the projection"
+        "acts gradually and on all estimates, also on early ones that later data would have corrected, which biases a upwards; the projection"
     );
-    println!("once, at the end.");
+    println!("acts once, at the end.");
     Ok(())
 }

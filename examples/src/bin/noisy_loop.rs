@@ -1,8 +1,8 @@
 //! A plant in a loop with a slow disturbance: fitted from its own input, and as a whole loop from the reference.
 //!
-//! The controller answers the disturbance, so the input knows of it, and a fit that takes the input as given is biased, and its intervals
-//! contain the true value too seldom. The reference knows nothing of it. (A white disturbance would do no harm: what the input knows of it
-//! is its past, of which it keeps no trace.)
+//! The controller responds to the disturbance, so the input is correlated with it. A fit that takes the input as given is therefore biased,
+//! and its intervals contain the true value too seldom. The reference is independent of the disturbance. (A white disturbance does no harm:
+//! the input depends on past values of the disturbance only, and these are independent of the present one.)
 //!
 //! `cargo run --release -p ctid-examples --bin noisy_loop`
 
@@ -63,7 +63,9 @@ fn main() -> Result<(), Error> {
         let from_r = LoopRecord::closed_loop(1.0, r.clone(), Some(u), y, Offsets::Deviations);
         whole.add(from_r, &controller)?;
     }
-    println!("mean estimates over {RUNS} records, and how many 95 % intervals hold the truth\n");
+    println!(
+        "mean estimates over {RUNS} records, and how many 95 % intervals contain the true value\n"
+    );
     println!(
         "{:26} {:>8} {:>8} {:>12} {:>8}",
         "", "K", "hold", "tau [s]", "hold"

@@ -1,14 +1,15 @@
-//! How often what is hidden in a record of a model of `examples/models` is named:
+//! How often the diagnosis finds the effect that is hidden in a record of a model of `examples/models`:
 //!
 //! ```sh
 //! cargo run --release -p ctid-tests --example library_study -- --sample 60
 //! ```
-//! Every effect at every port, alone and in pairs, the candidates of a user's own beside decoys, nothing, and what neither the catalogue
-//! nor a candidate holds. The truth is the model's own text with parameters of its own and the effect; the noise is scaled so that what the
-//! refitted believed model leaves of the noise-free record is 1 or 3 times the noise (root mean square over the outputs). The believed
-//! parameters are up to 40 % off; some records come in two parts, miss cells, or have a slower output.
+//! Hidden are: every effect at every port, alone and in pairs; a candidate of the user's own, beside wrong candidates; nothing; and
+//! disturbances that neither the catalogue nor a candidate describes. The true model is the text with other parameters and the effect; the
+//! noise is scaled so that the residual of the refitted model without the effect, on the noise-free record, is 1 or 3 times the noise (root
+//! mean square over the outputs). The start values of the parameters are up to 40 % off; some records have two parts, missing cells, or an
+//! output that is sampled less often.
 //!
-//! Counted are records on which the noise that made them shows what is hidden. A miss is printed with a name that `--only` runs again.
+//! A record counts if, with its true noise model, it shows the hidden effect. A miss is printed with a name that `--only` runs again.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;

@@ -193,7 +193,7 @@ impl Job {
         }
     }
 
-    /// The record's own seed: it does not hang on what else is run.
+    /// The seed of the record; it does not depend on which other records are run.
     fn seed(&self) -> u64 {
         match self {
             Self::Effect {

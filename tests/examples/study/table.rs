@@ -18,7 +18,7 @@ const CONDITIONS: [(Drive, bool); 4] = [
     (Drive::Closed, true),
 ];
 
-/// A criterion that falls by more than this (BIC) tells two models apart.
+/// A criterion that falls by more than this (BIC) distinguishes two models.
 const MARGIN: f64 = 6.0;
 /// Upper edges of the histogram of seconds.
 const BELOW: [f64; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 30.0];

@@ -1,4 +1,5 @@
-//! Candidates as users of the models would write them: each may be what is hidden, and is a decoy where it is not.
+//! Candidates as users of the models would write them. A record may contain one of them as its hidden effect; otherwise it is a wrong
+//! candidate that the search has to reject.
 
 use std::collections::BTreeMap;
 

@@ -111,9 +111,9 @@ fn another_user_reads_and_writes_nothing_through_the_page() {
     use std::os::unix::process::CommandExt;
     use std::process::Command;
 
-    /// Nobody, on most systems; it need not have a name.
+    /// The user `nobody` on most systems; the number need not have a name.
     const OTHER: u32 = 65_534;
-    /// What he can read of the server's process, and then the answer to each request.
+    /// Prints what another user can read of the server's process, and then the answer to each request.
     const ASK: &str = "id -u; cat /proc/$2/cmdline /proc/$2/environ \"$3\" 2>/dev/null; port=$1; shift 3
         for request in \"$@\"; do exec 3<>/dev/tcp/127.0.0.1/$port; printf '%s' \"$request\" >&3; printf '\\n<answer>'; cat <&3; exec 3>&-; done";
 

@@ -1,4 +1,4 @@
-//! What somebody else has written meanwhile is not written over.
+//! A file that another program has changed meanwhile is not overwritten.
 
 use std::path::{Path, PathBuf};
 use std::sync::MutexGuard;

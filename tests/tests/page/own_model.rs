@@ -33,7 +33,7 @@ fn an_example_is_fitted_and_its_text_is_changed() {
     );
     assert!(browser.text("#own-parameters").contains("UA"));
     assert!(browser.text("#own-check").starts_with("CoupledHeaters"));
-    // Its ports are listed, and nothing sits there yet.
+    // Its ports are listed, without effects.
     assert_eq!(
         browser.evaluate(
             "[...document.querySelectorAll('#own-ports tbody th')].filter((one) => one.innerText === 'input').length"
@@ -220,7 +220,7 @@ fn a_model_of_ones_own_is_diagnosed_and_mended() {
         found.contains("lag(y) at the output y, which reads T (block)"),
         "{found}"
     );
-    // Where it sits among the ports.
+    // The row of its port in the table of ports.
     let sits = browser.evaluate(
         "[...document.querySelectorAll('#own-ports tbody tr')].filter((row) => row.lastChild.innerText.includes('found')).map((row) => row.children[0].innerText)",
     );

@@ -1,4 +1,4 @@
-//! A state variable filter as it stands, saved and restored: what it gives next is the same to the bit.
+//! Saving and restoring the state of a state variable filter: its next outputs are bit-identical.
 
 use alloc::vec::Vec;
 

@@ -67,7 +67,7 @@ fn against_a_fine_grid() {
         let g = TransferFunction::new(Polynomial::new(changed).unwrap(), p2).unwrap();
         let mut d = [0.0, 0.5, rng.random_range(-0.5..1.0)][case % 3];
         if case % 9 == 2 {
-            // The least value itself, give or take 1e-6.
+            // The least value itself, within 1e-6.
             let size = g.at_frequency(0.0).re.abs();
             let (mut below, mut above) = (-100.0, 100.0);
             for _ in 0..60 {

@@ -78,9 +78,9 @@ impl Candidate {
     /// The candidate with a factor before every term, which is zero if the effect is absent and one if it is present; `None` if the
     /// parameters of the candidate have such values themselves.
     ///
-    /// No values of resistance and capacity take an RC pair out of a model: only their limit does. The factor makes the score test
-    /// possible; it is not fitted, and stands in no model but that of the score. It is the last parameter, and may be negative where
-    /// another one may.
+    /// No finite values of resistance and capacitance remove an RC pair from a model: only their limit does. The factor makes the score test
+    /// possible; it is not fitted, and is used in the model of the score test only. It is the last parameter, and may be negative if another
+    /// one may.
     #[must_use]
     pub fn with_factor(&self, spec: &ModelSpec) -> Option<Self> {
         let mut roles = self.parameters.iter().map(|parameter| parameter.role);
@@ -215,8 +215,8 @@ fn identifier(id: &str) -> String {
 
 /// All effects that can act in a model, at all its ports.
 ///
-/// Not offered: effects in equations that only say that one state is the speed of another, but for a limit; an input to a balance in which
-/// it stands already; a flow that a fitted parameter scales, as the parameter's own effects are the same.
+/// Left out are: effects, except a limit, in equations that define one state as the derivative of another; an input to a balance that
+/// contains it already; the effects of a flow that a fitted parameter scales, because the effects of this parameter are the same.
 #[must_use]
 pub fn candidates(spec: &ModelSpec, visited: &Visited) -> Vec<Candidate> {
     candidates_keeping(spec, visited, &BTreeMap::new())

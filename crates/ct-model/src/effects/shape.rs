@@ -2,7 +2,7 @@
 //!
 //! `shape` depends on a state or an input, `course` on time. A function is a sum of bells (Gaussian radial basis) at equal distances over
 //! the visited range, as wide as their distance: linear in its parameters, smooth, and of any form that is not much narrower than a bell.
-//! These are no candidates of a search: one of them bends to whatever there is.
+//! They are not candidates of the search, because such a function can fit any error.
 //!
 //! **Reference**: S. Chen, S. A. Billings, P. M. Grant, Int. J. Control 55 (1992) 1051-1070 (radial basis functions in identification).
 

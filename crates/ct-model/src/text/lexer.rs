@@ -99,9 +99,9 @@ fn refused_character(rest: &str) -> String {
     let character = rest.chars().next().unwrap_or_default();
     let mend = match character {
         '.' => {
-            "a number begins with a digit (0.5), and names of packages and operators such as `.*` are outside the subset"
+            "a number begins with a digit (0.5), and names of packages and operators such as `.*` are not supported"
         }
-        '\'' => "names in quotes are outside the subset: use letters, digits and `_`",
+        '\'' => "names in quotes are not supported: use letters, digits and `_`",
         '!' | '&' | '|' => "write `not`, `and`, `or`, `<>`",
         _ => {
             "delete it; names have letters, digits and `_`, other characters are allowed in descriptions and comments"

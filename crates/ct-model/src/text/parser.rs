@@ -152,7 +152,7 @@ impl Parser<'_> {
         }
         if self.is_sign("[") || self.is_sign("{") {
             return self.error(format!(
-                "{found}: arrays are outside the subset; declare each element as a separate variable"
+                "{found}: arrays are not supported; declare each element as a separate variable"
             ));
         }
         if self.is_sign(":=") {
@@ -324,9 +324,8 @@ impl Parser<'_> {
 
     fn equation(&mut self) -> Result<Equation, TextError> {
         if self.is_name("if") {
-            return self.error(
-                "equations within `if` are outside the subset: write `x = if c then a else b;`",
-            );
+            return self
+                .error("equations within `if` are not supported: write `x = if c then a else b;`");
         }
         if let Word::Name(name) = self.word()
             && outside(name).is_some()

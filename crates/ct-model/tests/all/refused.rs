@@ -289,7 +289,7 @@ fn outside_the_subset() {
     refuses(
         "  Real q[3];",
         9,
-        "`[`: arrays are outside the subset",
+        "`[`: arrays are not supported",
         "a separate variable",
     );
     refuses("  Real q = {1, 2};", 12, "`{`: arrays", "");

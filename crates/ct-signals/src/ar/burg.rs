@@ -12,7 +12,7 @@ impl ArModel {
     ///
     /// NaN stands for a sample that is missing. Where none is, the fit is Burg's; where some are, it maximises the exact
     /// likelihood of those that are there, and the order is chosen by the same criterion with `N` their number. Of the
-    /// processes that a regular decimation cannot tell apart (every second sample only: of either sign), it is the
+    /// processes that a regular decimation does not distinguish (every second sample only: of either sign), it is the
     /// slower one. Missing samples at a segment's ends take no part.
     ///
     /// The mean is not removed. A signal that is 0 throughout, or whose squares underflow, gives white noise of sigma 0.

@@ -22,8 +22,7 @@ use crate::{Error, atomic, names};
 /// Adds an effect to a model file; `place` is a vessel or a pump, if there is a choice. Returns a description of the change, in one line.
 ///
 /// # Errors
-/// Where the effect is unknown, on already, or does not act on this plant or there; the file is
-/// then as it was.
+/// If the effect is unknown, is in the model already, or cannot act on this plant or at this place. The file is not changed then.
 pub fn add(path: &Path, effect: &str, place: Option<&str>) -> Result<String, Error> {
     let name = path.display().to_string();
     change(path, |text| {
@@ -119,7 +118,7 @@ pub(crate) fn change(
 /// Replaces the text `from` by a new one, or creates the file.
 ///
 /// # Errors
-/// [`Error::Changed`] where another text stands there.
+/// [`Error::Changed`] if the file has another text than `from`.
 pub(crate) fn replace(path: &Path, from: &str, text: &str) -> Result<(), Error> {
     let _turn = CHANGING.lock().unwrap_or_else(PoisonError::into_inner);
     let _lock = atomic::lock_beside(path);

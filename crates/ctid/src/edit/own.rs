@@ -152,7 +152,8 @@ pub(super) fn beside(path: &Path) -> impl Fn(&Path) -> Result<ModelSpec, Error> 
 /// The text of a model file with one more effect; with a result its numbers and its sizes are kept in `[effect."..."]`.
 ///
 /// # Errors
-/// Where nothing of this name can act in the model, it is on already and no result is given, or the result does not have it.
+/// If no effect of this name can act in the model, if the model contains it already and no result is given, or if the result does not
+/// contain it.
 pub(crate) fn with_effect(
     path: &Path,
     text: &str,

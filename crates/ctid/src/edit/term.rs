@@ -53,7 +53,7 @@ pub fn with_term(
                 )
             } else {
                 format!(
-                    "[term.{name}] is there already; give another name, delete the table, or `ctid add {name}` alone"
+                    "[term.{name}] exists already; give another name, delete the table, or `ctid add {name}` alone"
                 )
             },
         });

@@ -44,7 +44,7 @@ fn places_that_are_as_likely_are_not_told_apart() {
     };
     assert_eq!(
         scores(&[("upper", 1.0), ("lower", 0.31)]),
-        "upper tank 1.00, lower tank 0.31: cannot be told"
+        "upper tank 1.00, lower tank 0.31: not determined"
     );
     assert_eq!(
         scores(&[("T3", 1.0), ("T1", 0.04), ("T2", 1e-9)]),
@@ -52,7 +52,7 @@ fn places_that_are_as_likely_are_not_told_apart() {
     );
     assert_eq!(
         scores(&[("pump_1", 1.0), ("pump_2", 0.05)]),
-        "pump 1 1.00, pump 2 0.05: cannot be told"
+        "pump 1 1.00, pump 2 0.05: not determined"
     );
 }
 

@@ -72,7 +72,7 @@ impl fmt::Display for ExcitationWarning {
             } => write!(
                 f,
                 "{record}: the command makes a single step, from {} to {}: a gain and a time constant can be fitted to it, but not how they \
-                 change with the level or the command, and many effects cannot be told apart; record several steps of different sizes",
+                 change with the level or the command, and many effects cannot be distinguished; record several steps of different sizes",
                 numbers::significant(*before, 3),
                 value_with_unit(*after, unit),
             ),

@@ -140,7 +140,7 @@ impl<'a> Session<'a> {
             }
         }
         let text = format!(
-            "{INPUT}, row {}: the header comes again in another form, and the rows behind it are read as it says: {}",
+            "{INPUT}, row {}: another header follows in a different form, and the rows after it are read accordingly: {}",
             self.line,
             rows.order()
         );
@@ -166,7 +166,7 @@ impl<'a> Session<'a> {
         {
             if self.seen_before == 0 {
                 self.screen.say(&format!(
-                    "rows up to {} were processed before the state was saved, and are skipped; if the clock has been reset since then, give another file with --state",
+                    "rows up to {} were processed before the state was saved, and are skipped; if the clock has been reset since then, use another state file with --state FILE",
                     self.monitor.axis().at(last)
                 ));
             }

@@ -30,8 +30,8 @@ impl Session<'_> {
                     )
                 } else {
                     self.words(
-                        "the monitor waits for new levels",
-                        "the monitor waits for new states",
+                        "the monitor waits until the levels have settled",
+                        "the monitor waits until the states have settled",
                     )
                 };
                 let name = self
@@ -54,7 +54,7 @@ impl Session<'_> {
             Notice::ClockSetBack { from, to } => {
                 self.next_estimate = *to;
                 format!(
-                    "the time goes back {} and stays there: the rows are followed from here on; the monitor waits for new {}",
+                    "the clock was set back by {}: rows with the new time are used from here on; the monitor waits until the {} have settled",
                     axis.span(*from, *to),
                     self.words("levels", "states")
                 )

@@ -46,7 +46,9 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
     let not_ours = |what: String| {
         Error::file(
             path,
-            format!("{what}; give --state another name, or delete the file to start again"),
+            format!(
+                "{what}; use another state file with --state FILE, or delete this one to start again"
+            ),
         )
     };
     let metadata = match fs::metadata(path) {

@@ -61,7 +61,7 @@ pub struct Comparison {
 /// Fits the model and computes its errors. The seed, the time limit and the interruption flag of the options are used.
 ///
 /// # Errors
-/// Where nothing can be fitted, with the file that is to blame.
+/// If nothing can be fitted; the message names the file that causes it.
 pub fn compare(
     file: &OwnModelFile,
     records: &Records,

@@ -286,21 +286,21 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         Reader::Commands => (
             " (--input NAME=LOW..HIGH)",
             " (--duration)",
-            "; --effort thorough goes on longer",
+            "; --effort thorough searches longer",
         ),
         Reader::Page => ("", "", ""),
     };
     let decides = 100.0 * best.power.decides;
     all.push(match design.prospect {
         Prospect::Twins => format!(
-            "{} and {} give the same response in every experiment that was tried within these limits: no experiment of this kind tells them apart. Another sensor, or an inspection of the plant, may.",
+            "{} and {} give the same response in every experiment that was tried within these limits: no experiment of this kind distinguishes them. Another sensor, or an inspection of the plant, may.",
             words.placed(a),
             words.placed(b)
         ),
         Prospect::Decides => format!("Apply {applied}. It decides between {a} and {b} with a probability of {decides:.0} %."),
         Prospect::May => format!("Apply {applied}. It may decide between {a} and {b}: the probability is {decides:.0} %."),
         Prospect::Hardly => format!(
-            "Within these limits hardly anything decides between {a} and {b}; the best is {applied}, with a probability of {decides:.0} %. A wider range{wider} or a longer experiment{longer} shows more."
+            "Within these limits no experiment is likely to decide between {a} and {b}; the best is {applied}, with a probability of {decides:.0} %. A wider range{wider} or a longer experiment{longer} increases it."
         ),
     });
     if design

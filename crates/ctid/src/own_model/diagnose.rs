@@ -17,7 +17,7 @@ const LISTED: usize = 8;
 /// Searches the candidates.
 ///
 /// # Errors
-/// Where nothing can be fitted, with the file that is to blame.
+/// If nothing can be fitted; the message names the file that causes it.
 pub fn diagnose(
     file: &OwnModelFile,
     records: &Records,
@@ -79,7 +79,7 @@ pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<Strin
         if !others.is_empty() {
             let others: Vec<String> = others.iter().map(|id| words.placed(id)).collect();
             all.push(format!(
-                "Or it is {}: these records cannot tell them apart.",
+                "Or it is {}: these records do not distinguish them.",
                 others.join(", or ")
             ));
         }
@@ -186,7 +186,7 @@ fn said_of(left: &NotNoise) -> String {
              for example a disturbance in a band of frequencies, or an effect that is not among the candidates"
         ),
         NotNoise::Slow { output } => format!(
-            "the residual of {output} drifts too slowly to be noise in records of this length"
+            "the residual of {output} drifts: its correlation time is too long for the records to show whether it is noise"
         ),
     }
 }

@@ -100,7 +100,7 @@ pub(super) fn read(
 /// The effects of these identifiers, each with its kept values.
 ///
 /// # Errors
-/// In words where one cannot act in the model, or stands there twice.
+/// If an effect cannot act in the model, or is listed twice.
 pub(super) fn of_ids(
     spec: &ModelSpec,
     own: &BTreeMap<String, OwnCandidate>,

@@ -329,7 +329,7 @@ pub(super) fn convert(record: &str, channel: &mut Channel, about: &About) -> Res
 /// Conversion of a column's values to the unit of a signal; `None` if the units are equal or one of them is not known.
 ///
 /// # Errors
-/// In words where the units do not go together.
+/// If the units cannot be converted; the message says why.
 pub(crate) fn conversion(
     about: &About,
     column: &str,

@@ -52,7 +52,7 @@ impl FittedModel {
     /// Fits a model, with its effects in it, to records.
     ///
     /// # Errors
-    /// Where the records do not allow a fit, with the names of those that are to blame.
+    /// If the records do not allow a fit, with the names of those that cause it.
     pub fn fit(
         file: &OwnModelFile,
         records: Records,

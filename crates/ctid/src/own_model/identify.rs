@@ -325,17 +325,13 @@ impl OwnTransferFunction {
         }
         if !self.others.is_empty() {
             notes.push(format!(
-                "{} {} no part here: the identified model is right only if {} still",
+                "{} {} not used as an input: the identified model is right only if {} constant",
                 self.others.join(", "),
+                if self.others.len() == 1 { "is" } else { "are" },
                 if self.others.len() == 1 {
-                    "has"
+                    "it is"
                 } else {
-                    "have"
-                },
-                if self.others.len() == 1 {
-                    "it stands"
-                } else {
-                    "they stand"
+                    "they are"
                 },
             ));
         }

@@ -7,7 +7,7 @@
 //! | How far is it off? | [`FittedModel::fit`], then [`FittedModel::compare`] |
 //! | On other inputs? | [`FittedModel::simulate`], [`FittedModel::score`] |
 //! | What is it missing? | [`diagnose`], then [`OwnModelFile::with_effect`] |
-//! | Which experiment tells two effects apart? | [`fn@design`] |
+//! | Which experiment distinguishes two effects? | [`fn@design`] |
 //! | As text? | [`FittedModel::text`], [`text`](fn@text) |
 //!
 //! The commands of the program call these functions, so results agree to the last digit.

@@ -119,7 +119,7 @@ pub(super) fn simulated(
     .map_err(wrong)?;
     if states_from == StateSource::Text && begins_with_readings(record) && !spec.states.is_empty() {
         warnings.push(format!(
-            "the readings of {} do not determine the initial states, which begin as the text starts them",
+            "the readings of {} do not determine the initial states; those of the model text are used",
             record.name
         ));
     }

@@ -296,7 +296,7 @@ fn ranking(diagnosis: &Diagnosis) -> String {
             figure(
                 "scores",
                 "Fall of BIC with one effect added",
-                "Blue: added to the model; hatched: these data cannot tell it from an added one."
+                "Blue: added to the model; hatched: these data do not distinguish it from an added one."
             ),
             tables::scores(diagnosis)
         ),

@@ -8,7 +8,7 @@ const plots = (() => {
   const tight = () => touch || narrow.matches;
   let printing = false;
 
-  // Okabe and Ito's colours, told apart by colour-blind readers; lightened on a dark ground.
+  // Okabe and Ito's colours, which colour-blind readers can distinguish; lightened on a dark ground.
   const LIGHT = {
     text: "#1b1f26", faint: "#59616e", grid: "#e3e6eb", zero: "#a9b0bb", measured: "#1b1f26",
     failing: "#e69f00", passing: "#8794a6", ground: "#ffffff",

@@ -68,9 +68,12 @@ pub(super) fn groups(diagnosis: &Diagnosis) -> String {
                 .map(|other| code(other))
                 .collect();
             let finding = if others.is_empty() {
-                "told apart from every other effect".to_owned()
+                "distinguished from every other effect".to_owned()
             } else {
-                format!("these data cannot tell it from {}", others.join(", "))
+                format!(
+                    "these data do not distinguish it from {}",
+                    others.join(", ")
+                )
             };
             let tank = findings::tank(diagnosis, k)
                 .map_or(String::new(), |tank| format!(" ({})", escape(tank)));

@@ -58,7 +58,7 @@ fn every_step_and_every_record_is_there() {
     for sentence in sentences::of_diagnosis(&diagnosis) {
         assert!(page.contains(&text::prose(&sentence)));
     }
-    assert!(page.contains("cannot tell it from <code>pump_<wbr>nonlinearity</code>"));
+    assert!(page.contains("do not distinguish it from <code>pump_<wbr>nonlinearity</code>"));
     assert!(page.contains("<td class=\"number\" data-step=\"2\">0.550 ± 0.027</td>"));
 }
 
@@ -83,7 +83,7 @@ fn an_effect_is_added_in_its_own_tank_alone() {
             .collect()
     };
     assert_eq!((set("added"), set("equal")), (vec![0, 3], vec![4]));
-    assert!(page.contains("<li><code>overflow</code> (upper): told apart"));
+    assert!(page.contains("<li><code>overflow</code> (upper): distinguished"));
 }
 
 #[test]
@@ -123,8 +123,8 @@ fn a_partial_answer_shows_its_test_its_places_and_its_limit() {
         "<td class=\"number\">85 %</td><td>90 % where the residual is not noise; 50 % for a partial explanation</td>",
         "<td class=\"number\">86 %</td><td>not used for the verdict</td>",
         "<td class=\"number\">512</td><td>more than 6</td>",
-        "<li>what is fitted to one half of the record does not predict the other</li>",
-        "where it acts, with relative likelihood: upper tank 1.00, lower tank 0.31: cannot be told</li>",
+        "<li>fitted to one half of the record, it does not predict the other half</li>",
+        "where it acts, with relative likelihood: upper tank 1.00, lower tank 0.31: not determined</li>",
         "<h3>Two rankings</h3>",
         "<th scope=\"row\">Its offset</th>",
         "<p>Left out by the time limit of 20 s: swap steps between pairs of effects.</p>",

@@ -106,9 +106,9 @@ pub(super) fn with_error(value: f64, std_error: Option<f64>) -> String {
 pub(super) fn whiteness(p: f64) -> String {
     let finding = match p {
         p if !p.is_finite() => return "The whiteness of the residual was not tested.".to_owned(),
-        p if p >= 0.05 => "The residual cannot be told from white noise",
+        p if p >= 0.05 => "The residual cannot be distinguished from white noise",
         p if p >= 0.01 => "It is doubtful whether the residual is white noise",
-        _ => "The residual is not white noise: neighbouring samples err in the same way",
+        _ => "The residual is not white noise: its samples are correlated",
     };
     format!("{finding} (Ljung-Box test, {}).", p_value(p))
 }
@@ -117,9 +117,9 @@ pub(super) fn whiteness(p: f64) -> String {
 pub(super) fn input_test(p: f64) -> String {
     let finding = match p {
         p if !p.is_finite() => return "Residual against input was not tested.".to_owned(),
-        p if p >= 0.05 => "No trace of the input is left in the residual",
+        p if p >= 0.05 => "The residual does not depend significantly on the input",
         p if p >= 0.01 => "It is doubtful whether the residual depends on the input",
-        _ => "The input is still seen in the residual: the model misses part of how it acts",
+        _ => "The residual depends on the input: the model lacks part of its effect",
     };
     format!("{finding} (cross-correlation test, {}).", p_value(p))
 }
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn p_values_are_said_in_words() {
-        assert!(whiteness(0.4).contains("cannot be told from white noise"));
+        assert!(whiteness(0.4).contains("cannot be distinguished from white noise"));
         assert!(whiteness(0.0).contains("p < 0.001"));
         assert!(input_test(0.02).contains("doubtful"));
         assert!(input_test(f64::NAN).contains("not tested"));

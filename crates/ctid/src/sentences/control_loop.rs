@@ -10,7 +10,7 @@ pub(super) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
     let mismatch = known.mismatch.unwrap_or(f64::NAN);
     if known.simulated {
         return format!(
-            "The loop is simulated from its reference: so noise fed back through the command does not enter the model. The measured command agrees with the controller's to {mismatch:.4} {input_unit} rms."
+            "The loop is simulated from its reference, so noise that is fed back through the command does not enter the model. The measured command differs from that of the controller by {mismatch:.4} {input_unit} rms."
         );
     }
     // A result of an earlier version does not say why.
@@ -20,11 +20,11 @@ pub(super) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
     let why = match why {
         NotSimulated::UnknownController { lags } => {
             return format!(
-                "Feedback detected: the command depends on the last {lags} residuals (F test beside the command's own past, p {}), and no [controller] is in the model file; give it, and the reference, and the loop is simulated. {MEASURED}",
+                "Feedback detected: the command depends on the last {lags} residuals (F test beside the command's own past, p {}), and the model file has no [controller]; give the controller and the reference, so that the loop can be simulated. {MEASURED}",
                 chance(known.feedback_p.unwrap_or(f64::NAN))
             );
         }
-        NotSimulated::AsRequested => "as was asked for".to_string(),
+        NotSimulated::AsRequested => "as requested".to_string(),
         NotSimulated::MissingReadings { record } => format!(
             "readings are missing in {record}, so the controller cannot be checked against its commands"
         ),
@@ -42,7 +42,7 @@ pub(super) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
         }
         .to_string(),
         NotSimulated::OtherController { share } => format!(
-            "the measured command disagrees with the controller of the model file, R/S (r - y), by {mismatch:.3} {input_unit} rms, {:.0} % of what it moves: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
+            "the measured command disagrees with the controller of the model file, R/S (r - y), by {mismatch:.3} {input_unit} rms, {:.0} % of its variation: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
             100.0 * share
         ),
     };

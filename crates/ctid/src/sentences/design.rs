@@ -140,12 +140,12 @@ fn so_far(design: &Design) -> Vec<String> {
                 )
             };
             let edge = if alternative.at_the_edge {
-                ", and its size ends where its plausible range does"
+                ", and its size is at a bound of its plausible range"
             } else {
                 ""
             };
             said.push(format!(
-                "They do not support {}: {called}{edge}. An effect that is hardly present cannot be distinguished from others.",
+                "They do not support {}: {called}{edge}. A very small effect cannot be distinguished from others.",
                 named(alternative, domain)
             ));
         }
@@ -170,7 +170,7 @@ pub fn of_design(design: &Design) -> Vec<String> {
     };
     if design.twins() {
         said.push(format!(
-            "{} tells them apart: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters gives nearly the response of {}.",
+            "{} distinguishes them: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters gives nearly the response of {}.",
             if design.effort.left_out.is_empty() {
                 "No experiment within these limits"
             } else {
@@ -209,10 +209,10 @@ pub fn of_design(design: &Design) -> Vec<String> {
             significant(best.power.power, 2),
             reservation(best),
             match design.prospect {
-                _ if design.bic_ahead.abs() > GROUP_MARGIN => "it is not needed to tell them apart",
+                _ if design.bic_ahead.abs() > GROUP_MARGIN => "it is not needed to distinguish them",
                 Prospect::Decides => "apply it",
                 Prospect::May => "it is worth applying, and may leave the question open",
-                _ => "it will hardly do",
+                _ => "it is unlikely to decide",
             }
         ));
         if let Some(times) = design.times_as_long {

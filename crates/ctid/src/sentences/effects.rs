@@ -28,7 +28,7 @@ pub(super) fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
             let place = match diagnosis.places.get(k).map(Vec::as_slice) {
                 Some([best, other, ..]) if other.relative_likelihood > SAME_PLACE_LIKELIHOOD => {
                     format!(
-                        " ({} or the {} one: the place cannot be told)",
+                        " ({} or the {} one: the place is not determined)",
                         domain.place_words(effect, &best.place),
                         domain.vessel_words(&other.place).0
                     )
@@ -52,7 +52,7 @@ pub(super) fn of_effects(diagnosis: &Diagnosis, last: &Step) -> Vec<String> {
             if group.len() > 1 {
                 let group_named: Vec<String> = group.iter().map(named).collect();
                 format!(
-                    "{it_is} {}: these data cannot tell them apart; {effect}{place}{size} fits best.{doubt}{}",
+                    "{it_is} {}: these data do not distinguish them; {effect}{place}{size} fits best.{doubt}{}",
                     list(&group_named, "or"),
                     next_experiment(group, diagnosis.effects.len())
                 )

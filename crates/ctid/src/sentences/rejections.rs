@@ -16,31 +16,35 @@ fn of_rejection(rejection: &Rejection) -> String {
             of_time,
         } => {
             let of_time = if *of_time {
-                " of an effect that follows time alone"
+                " of a set with an effect that depends on time only"
             } else {
                 ""
             };
             return format!(
-                "explains {:.0} % of the excess error, {:.0} % required{of_time}",
+                "explains {:.0} % of the squared error above the noise; {:.0} % are required{of_time}",
                 100.0 * share,
                 100.0 * required,
             );
         }
         Rejection::NotSignificant => {
-            "several effects together are very flexible, and with a separate noise model the model without them is as probable"
+            "not significant: each with the noise model of its own residual, the model without these effects is as probable"
         }
-        Rejection::Innovations => "the changes from sample to sample contradict it",
+        Rejection::Innovations => {
+            "its innovations (one-step prediction errors) are larger than those of the model without it"
+        }
         Rejection::NotPredictive => {
-            "what is fitted to one half of the record does not predict the other"
+            "fitted to one half of the record, it does not predict the other half"
         }
         Rejection::FunctionOfTime => {
-            "with an effect that is a function of time, the set fits any disturbance"
+            "one of several effects is a function of time, so that the set fits any disturbance"
         }
         Rejection::RandomWalk => "a random walk explains as much",
-        Rejection::NotPhysical => "a size is at a bound, or a state is not physical",
+        Rejection::NotPhysical => {
+            "a parameter is at a bound, or a state has a value that is physically impossible"
+        }
         Rejection::LevelShift => "a single level shift of the reading explains more",
         Rejection::NarrowBand => {
-            "in a loop that is not simulated, a disturbance fed back through the command looks like a periodic effect"
+            "in a loop that is not simulated, a disturbance that the controller feeds back to the command looks like stiction with a narrow band"
         }
     };
     text.to_string()

@@ -22,11 +22,11 @@ pub(super) fn of(remark: &Remark, diagnosis: &Diagnosis) -> Option<String> {
             rms(rmse_per_output, &diagnosis.output_unit)
         ),
         Remark::EffectLimit { most, needed } => format!(
-            "The search was stopped at {most} {}: the data call for {needed}.",
+            "The search was stopped at {most} {}: the data require {needed}.",
             if *most == 1 { "effect" } else { "effects" }
         ),
         Remark::Terms { names } => format!(
-            "Beside {} the standard errors are too small: the shape of a term is taken as known, and may hold a part of what the plant's own parameters explain.",
+            "With {} in the model the standard errors are too small: the shape of a term is assumed known, but it may contain part of the influence of the plant's parameters.",
             list(names, "and")
         ),
         Remark::ColouredNoise { ratio } => format!(
@@ -80,12 +80,12 @@ pub(super) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
     let step = diagnosis.steps.last()?;
     (step.starts_agree < 2 && step.starts > 0).then(|| {
         format!(
-            "Of {} starts {} the minimum that is shown: there may be a better one, and other values of the parameters.",
+            "Of {} starts {} the minimum that is shown: there may be a better one with other parameter values.",
             step.starts,
             if step.starts_agree == 0 {
-                "no start around it came as low as"
+                "none reached"
             } else {
-                "one alone ended in"
+                "only one reached"
             }
         )
     })

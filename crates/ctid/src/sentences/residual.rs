@@ -62,7 +62,7 @@ pub(super) fn left_over(left: &NotNoise, step: &Step, diagnosis: &Diagnosis) -> 
             time_constant,
             ..
         } => format!(
-            "{residual} drifts: its correlation time of {} reaches the slowest time constant, {}; it may be a disturbance or {effect}",
+            "{residual} drifts: its correlation time ({}) exceeds the slowest time constant of the model ({}); it may be a disturbance or {effect}",
             if *correlation_time < record {
                 about(*correlation_time)
             } else {

@@ -14,7 +14,7 @@ fn effects_come_first_with_size_and_alternatives() {
     );
     assert!(
         said[1].starts_with(
-            "It is pump_deadzone or pump_nonlinearity: these data cannot tell them apart; pump_deadzone (u_dz = 0.550 ± 0.027 V) fits best."
+            "It is pump_deadzone or pump_nonlinearity: these data do not distinguish them; pump_deadzone (u_dz = 0.550 ± 0.027 V) fits best."
         ),
         "{}",
         said[1]
@@ -36,7 +36,7 @@ fn a_comparison_says_what_the_residual_shows() {
     assert!(
         said.starts_with("The model does not explain the data: the residual of ")
             && said.ends_with(
-                "drifts: its correlation time of longer than the record reaches the slowest time constant, 140 s; it may be a disturbance or an effect that the model lacks."
+                "drifts: its correlation time (longer than the record) exceeds the slowest time constant of the model (140 s); it may be a disturbance or an effect that the model lacks."
             ),
         "{said}"
     );
@@ -82,7 +82,7 @@ fn remarks_follow_the_verdict_in_their_order() {
     let rounding = position(
         "Nearly all readings are multiples of 0.300 V: rounding alone makes an error of 0.087 V rms, 50 % of",
     );
-    let stopped = position("The search was stopped at 1 effect: the data call for 2.");
+    let stopped = position("The search was stopped at 1 effect: the data require 2.");
     let coloured = position("The noise is coloured: an effect has to be about 2.3 times larger");
     assert!(
         rounding.is_some() && rounding < stopped && stopped < coloured,
@@ -136,7 +136,7 @@ fn the_order_of_remarks_does_not_depend_on_that_of_the_values() {
         ),
         position("On held-out data the simulation error is 3.0 times as large"),
         position("The noise is coloured"),
-        position("Beside spill the standard errors are too small"),
+        position("With spill in the model the standard errors are too small"),
         position("The search was stopped at 2 effects"),
         position("The loop is simulated from its reference"),
     ];
@@ -175,7 +175,7 @@ fn a_loop_that_is_not_simulated_says_why() {
         (
             NotSimulated::AsRequested,
             None,
-            ["as was asked for", "The model runs on the measured command"],
+            ["as requested", "The model runs on the measured command"],
         ),
         (
             NotSimulated::MissingReadings {
@@ -218,7 +218,7 @@ fn a_loop_that_is_not_simulated_says_why() {
             NotSimulated::OtherController { share: 0.3 },
             Some(0.25),
             [
-                "R/S (r - y), by 0.250 V rms, 30 % of what it moves",
+                "R/S (r - y), by 0.250 V rms, 30 % of its variation",
                 "check gain",
             ],
         ),

@@ -31,7 +31,7 @@ pub(super) fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> St
         .collect();
     if !others.is_empty() && unknown.variable == "time" {
         said += &format!(
-            " (or {}: the likelihood does not tell)",
+            " (or {}: the likelihood does not distinguish the places)",
             others.join(" or ")
         );
     }

@@ -170,7 +170,8 @@ async fn file(
                 let design = own.and_then(|own| own.design.as_ref());
                 let design = design.ok_or_else(|| missing("no experiment was designed yet"))?;
                 let text = design.record.clone();
-                let text = text.ok_or_else(|| missing("no experiment tells the two apart"))?;
+                let text =
+                    text.ok_or_else(|| missing("no experiment distinguishes the two effects"))?;
                 ("next.csv".to_string(), "text/csv; charset=utf-8", text)
             }
             Wanted::Experiment => {
@@ -178,7 +179,8 @@ async fn file(
                 let found = found.ok_or_else(|| missing("no experiment was designed yet"))?;
                 let (design, columns) = &found.found;
                 let text = Proposal::new(design.clone(), columns).record();
-                let text = text.ok_or_else(|| missing("no experiment tells the two apart"))?;
+                let text =
+                    text.ok_or_else(|| missing("no experiment distinguishes the two effects"))?;
                 ("next.csv".to_string(), "text/csv; charset=utf-8", text)
             }
         };

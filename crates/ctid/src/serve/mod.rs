@@ -17,8 +17,8 @@
 //! every request, so that page and commands can be mixed.
 //!
 //! # The requests
-//! Every tab has a session, named in the query; what is sent is JSON but for a record, what comes back is JSON but for a download. No
-//! parameter ever reaches the file system. Every address begins with the secret of the run, `/SECRET/api/state`, which the table leaves
+//! Every tab has a session, named in the query; requests are JSON except for a record, and answers are JSON except for a download. No
+//! parameter is used as a file path. Every address begins with the secret of the run, `/SECRET/api/state`, which the table leaves
 //! out. A refusal is `{"error": "..."}` with a status of 400 or more: one line with the correction, as the commands write it. What the page
 //! never sends, such as broken JSON, is refused in plain text.
 //!
@@ -48,7 +48,7 @@
 //! # What is bounded
 //! Eight tabs. 64 connections on which the secret was known, and 128 others whose request begins within ten seconds and which end with
 //! their one refusal; where there are more, the one that was idle for the longest time is closed. An answer that is not taken, and
-//! a body of which nothing more comes, for ten seconds end their connection; nobody waits for them. Of the bodies 256 MB are under way at
+//! a body of which nothing more comes, for ten seconds end their connection; no thread waits for them. Of the bodies 256 MB are under way at
 //! once. 64 MB of files and 20 records in a tab, 500 columns in a file, twelve fits in a tab. Over all tabs 512 MB of files, of what is
 //! read from them (at most four times as much) and of what was computed; the tab that was seen last may hold more, and is then alone. One
 //! computation in a tab, which takes a copy of what was read; it stops when another begins, when its tab is forgotten, and three minutes

@@ -270,7 +270,7 @@ impl Session {
     /// Replaces the displayed text by another model.
     ///
     /// # Errors
-    /// Where it is no model file, or another text stands there meanwhile; everything is then as it was.
+    /// If the text is not a model file, or the file has been changed meanwhile; nothing is changed then.
     pub(super) fn replace(&mut self, from: &str, text: String) -> Result<(), Error> {
         let name = self.model_name();
         model_file::parse(&name, &text)?;
@@ -357,7 +357,7 @@ impl Session {
         let what = match job.kind {
             Kind::Compare | Kind::Chain | Kind::Own => None,
             Kind::Diagnose => Some(("the search", "Diagnose")),
-            Kind::Design => Some(("the design of the experiment", "What would tell?")),
+            Kind::Design => Some(("the design of the experiment", "Design an experiment")),
         };
         self.stop();
         if let Some((what, button)) = what {

@@ -193,7 +193,7 @@ mod tests {
         let (id, session) = sessions.open();
         for (kind, button) in [
             (Kind::Diagnose, "Diagnose"),
-            (Kind::Design, "What would tell?"),
+            (Kind::Design, "Design an experiment"),
         ] {
             let job = job(kind);
             let (stop, version) = (job.stop.clone(), lock(&session).version);

@@ -304,7 +304,7 @@ mod tests {
         assert_eq!(told["groups"][0]["effect"], "overflow");
         assert_eq!(
             told["groups"][0]["places"],
-            "upper tank 1.00, lower tank 0.31: cannot be told"
+            "upper tank 1.00, lower tank 0.31: not determined"
         );
         assert_eq!(told["acceptance"]["rows"][0][1], "85 %");
         assert_eq!(

@@ -1,4 +1,4 @@
-//! `ctid simulate`: a model on inputs that nobody has measured its outputs for.
+//! `ctid simulate`: simulation of a model for inputs without measured outputs.
 //!
 //! | what | where |
 //! |---|---|

@@ -94,7 +94,7 @@ fn states(simulated: &Simulated) -> String {
         .collect();
     let from = match simulated.states_from {
         StateSource::Readings => "fitted to the first readings",
-        StateSource::Text => "as the text starts them",
+        StateSource::Text => "from the model text",
         StateSource::Rest => "at rest under the first inputs",
     };
     match &each[..] {

@@ -284,7 +284,7 @@ pub(crate) fn groups(diagnosis: &Diagnosis, look: Look) -> String {
     }
     let mut text = String::new();
     if !lines.is_empty() {
-        let heading = look.heading("What these data cannot tell apart");
+        let heading = look.heading("Effects that these data do not distinguish");
         text += &format!("{heading}\n{lines}\n");
     }
     let places = findings::places(diagnosis);

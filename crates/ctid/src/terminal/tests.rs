@@ -12,7 +12,7 @@ fn a_partial_answer_is_told_with_all_that_belongs_to_it() {
         "cascaded-tanks + sqrt_outflow, held-out error 0.55 V: offset 0.33, gain 0.26, shape 0.35 V",
         "+ overflow (upper), held-out error 0.22 V: offset 0.13, gain 0.10, shape 0.14 V",
         "Where + overflow (upper) fails",
-        "- overflow: upper tank 1.00, lower tank 0.31: cannot be told",
+        "- overflow: upper tank 1.00, lower tank 0.31: not determined",
         "1 overflow sensor_saturation 2 sensor_saturation overflow",
         "Left out by the time limit of 20 s: swap steps between pairs of effects.",
         "`--effort thorough`",

@@ -112,7 +112,7 @@ fn twins_are_said_to_be_twins_and_nothing_is_written() {
     );
     let said = text.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
-        said.contains("No experiment within these limits tells them apart"),
+        said.contains("No experiment within these limits distinguishes them"),
         "{text}"
     );
     assert!(said.contains("Step the pump and watch the jet"), "{text}");
@@ -170,7 +170,7 @@ fn what_does_not_go_together_is_one_line() {
         ),
         (
             "design a.csv --model tank.toml --between pump_lag pump_lag",
-            &["cannot be told from itself"],
+            &["cannot be distinguished from itself"],
         ),
         (
             "design a.csv --model tank.toml --between pump_lag",
@@ -222,7 +222,7 @@ fn what_does_not_go_together_is_one_line() {
         ),
         (
             &format!("{pair} --out notes.csv"),
-            &["notes.csv", "it is there already"],
+            &["notes.csv", "the file exists already"],
         ),
         (
             &format!("{pair} --out no/next.csv"),

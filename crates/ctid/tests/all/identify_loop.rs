@@ -314,7 +314,7 @@ fn no_condition_is_told_of_estimates_that_are_wrong() {
     let record = cut(&record(&first_order(), &controller(), None, 1), 1000);
     let found = found(&record, Method::RecursiveFcloe, order, LevelChoice::Zero);
     assert!(
-        found.warnings.iter().any(|w| w.contains("is not told")),
+        found.warnings.iter().any(|w| w.contains("is not reported")),
         "{:?} {:?}",
         found.warnings,
         found.parameters

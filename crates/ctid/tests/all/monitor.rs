@@ -177,7 +177,7 @@ fn a_header_that_comes_again_in_another_order_is_followed() {
     let outcome = fed(&place, "", &swapped);
     assert_eq!(outcome.code, Some(0), "{}", outcome.err);
     assert_eq!(outcome.out, plain.out, "{}", outcome.err);
-    let said = "row 702: the header comes again in another form, and the rows behind it are read as it says: a header: \"t [s]\" is the time, \"u\" the command, \"y [cm]\" the reading";
+    let said = "row 702: another header follows in a different form, and the rows after it are read accordingly: a header: \"t [s]\" is the time, \"u\" the command, \"y [cm]\" the reading";
     assert_says(&outcome, said);
 
     let other_unit =

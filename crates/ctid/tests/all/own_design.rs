@@ -114,7 +114,7 @@ fn options_that_do_not_go_together_are_refused() {
         ),
         (
             "--between delay(u) delay(u)",
-            "an effect cannot be told from itself",
+            "an effect cannot be distinguished from itself",
         ),
         ("--between delay(u) clag(u)", "clag(u)"),
     ] {

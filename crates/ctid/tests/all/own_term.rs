@@ -96,7 +96,7 @@ fn the_unknown_is_written_kept_and_taken_out() {
         let carries = !says(result, "does not hold for that record");
         assert_eq!(carries, by(result) <= 2.0, "{}", by(result));
     }
-    let small = "Beside my_wave the standard errors are too small";
+    let small = "With my_wave in the model the standard errors are too small";
     assert!(says(&after, small) && !says(&before, small));
     let parameters = after["steps"][0]["parameters"].as_array().unwrap();
     assert!(parameters.iter().any(|p| p["name"] == "my_wave.scale"));
@@ -121,7 +121,7 @@ fn the_unknown_is_written_kept_and_taken_out() {
     place.refuses(
         "add my_wave --from u.csv --model tank.toml",
         &[
-            "[term.my_wave] is there already",
+            "[term.my_wave] exists already",
             "or `ctid add my_wave` alone",
         ],
     );

@@ -108,7 +108,7 @@ fn new_inputs_are_simulated_with_a_band() {
     let place = place();
     let said = place.succeeds("simulate m.toml in.csv --fit a.csv b.csv --out y.csv --readings");
     assert!(
-        said.contains("fitted to a.csv, b.csv") && said.contains("as the text starts them"),
+        said.contains("fitted to a.csv, b.csv") && said.contains("from the model text"),
         "{said}"
     );
     let text = place.read("y.csv");
@@ -221,7 +221,7 @@ fn what_cannot_be_simulated_is_refused_in_one_line() {
     place.write("there.csv", "my own notes\n");
     place.refuses(
         "simulate m.toml in.csv --out there.csv",
-        &["there.csv", "it is there already"],
+        &["there.csv", "the file exists already"],
     );
     place.refuses(
         "simulate m.toml in.csv --out in.csv",

@@ -190,7 +190,7 @@ fn the_second_paper_is_reproduced_cell_by_cell() {
     assert!(place.json("b.json") == json);
 
     // An existing record may belong to another program.
-    place.refuses(words, &["a.csv", "it is there already"]);
+    place.refuses(words, &["a.csv", "the file exists already"]);
     place.refuses("tables baysse --runs 9", &["--runs is 9", "10 or more"]);
     place.refuses("tables --record b.csv", &["--record", "tables baysse"]);
 }

@@ -33,7 +33,9 @@ pub struct Limits {
 #[non_exhaustive]
 pub enum NoExperiment {
     /// The two effects are the same.
-    #[error("--between {effect} {effect}: an effect cannot be told from itself; name two")]
+    #[error(
+        "--between {effect} {effect}: an effect cannot be distinguished from itself; give two different effects"
+    )]
     SameEffect {
         /// The effect.
         effect: String,

@@ -33,7 +33,7 @@ use crate::node::{Context, FINE, Node};
 use crate::problem::{Limit, Options, Phase, Problem};
 use limits::Bounds;
 
-/// The slowest time constant for the sequences, as a share of an experiment's length: the process is not known before.
+/// The slowest time constant for which the sequences are designed, as a share of the experiment's length, since the process may not be known.
 const SLOWEST: f64 = 0.1;
 /// Experiments of a round of refits, and the most in all.
 const ROUND: usize = 4;

@@ -2,8 +2,8 @@
 //!
 //! First-order noise is an ARMA(1,1) process: noise with one correlation time, or the sum of such noise and white noise (a slow disturbance
 //! of the output beside a sensor's noise). Whitened by the process of the largest likelihood, its spectrum is flat. The error of a wrong
-//! model, and a disturbance in a band of frequencies, leave a spectrum with a hill or a valley, whatever the order of an autoregressive model
-//! that describes it as noise. The powers of bands of frequencies are compared with their mean (likelihood ratio of exponential variables).
+//! model, and a disturbance in a band of frequencies, leave a peak or a dip in the whitened spectrum, even if an autoregressive model of high
+//! order can describe it as noise. The powers of bands of frequencies are compared with their mean (likelihood ratio of exponential variables).
 //!
 //! **Reference**: C. W. J. Granger, M. J. Morris, J. Royal Statistical Society A 139 (1976) 246-257 (the sum of a first-order autoregression
 //! and white noise is ARMA(1,1)).

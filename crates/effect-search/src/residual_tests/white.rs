@@ -261,7 +261,7 @@ mod tests {
         assert!(from.abs_diff(500) < 10 && (to - from).abs_diff(20) < 15);
     }
 
-    /// A square wave beside which its sine has been named leaves harmonics; noise has none, whatever its colour.
+    /// A square wave of which only the sine was found leaves harmonics in the residual; noise has none, whatever its spectrum.
     #[test]
     fn harmonics_are_found_beside_a_named_period_and_not_in_noise() {
         let period = 90.0;

@@ -1,7 +1,7 @@
 //! The recursive estimator: Gauss-Newton along the record, for a loop or for open loop.
 //!
-//! Model: `A y = B u` in a loop with a known R/S, driven by r; theta may drift. The model's loop runs beside the plant's
-//! from r alone, so noise that circulates does not bias.
+//! Model: `A y = B u` in a loop with a known R/S, driven by r; theta may drift. The loop of the model is simulated in
+//! parallel from r alone, so noise that is fed back causes no bias.
 //!
 //! Equations: `theta' = P sigma eps`, `P' = eta P - P sigma sigma' P` with `sigma = S/P_f phi^` (Baysse, Carrillo,
 //! Habbadi, (12), (13); the recursion itself is cited there, not printed), sampled with sigma held, relative to a

@@ -9,7 +9,7 @@
 //! out too small by `(1 - e^{-lambda Ts})/(lambda Ts)`, without any noise: 93 for 110 at `lambda Ts = 0.36`.
 //!
 //! Bias: least squares is biased by noise, in the loop and without; the standard instruments only by noise that
-//! circulates in the loop, as they are simulated from the measured u. [`super::instruments`] simulates them from r.
+//! is fed back in the loop, as they are simulated from the measured u. [`super::instruments`] simulates them from r.
 
 use serde::{Deserialize, Serialize};
 

@@ -4,21 +4,22 @@
 //! ```text
 //! p^n y_f = -sum_{i<n} alpha_i p^i y_f + sum_i beta_i p^i u_f
 //! ```
-//! whose terms a [`StateVariableFilter`](ct_lti::StateVariableFilter) gives without differentiating anything. y is taken for lines between
-//! samples, u for what its hold says: a held u taken for lines, or y for steps, shifts it by half a step and tau by 15 %.
+//! whose terms a [`StateVariableFilter`](ct_lti::StateVariableFilter) gives without numerical differentiation. y is interpolated
+//! linearly between samples, u according to its hold. A held u that is interpolated linearly, or a y that is held, is shifted by half a
+//! step, and tau is biased by 15 %.
 //!
 //! Instruments: `[sum z phi']^-1 sum z p^n y_f`, with z the regressor of a model of the loop, driven by r, so that it
-//! owes nothing to the noise, circulating or not. In open loop it is driven by u.
+//! is independent of the noise, also of noise that is fed back. In open loop it is driven by u.
 //!
-//! SRIVC, in a loop CLSRIVC: the filter is renewed, `E = A^`, and the instruments with it, until the estimates rest. For white noise on the
-//! record that is the least possible variance (P. C. Young, A. Jakeman, International Journal of Control 31 (1980) 741-764, for open loop;
+//! SRIVC, in a loop CLSRIVC: the filter `E = A^` and the instruments are updated until the estimates converge. For white noise on the
+//! record this has the least possible variance (P. C. Young, A. Jakeman, International Journal of Control 31 (1980) 741-764, for open loop;
 //! M. Gilson, H. Garnier, P. C. Young, P. Van den Hof, in Identification of Continuous-time Models from Sampled Data, Springer 2008, ch. 5,
-//! for the loop). In a loop of a continuous controller there remains the error of what u does between samples.
+//! for the loop). With a continuous-time controller, an error remains because u changes between samples.
 //!
-//! Readings of y may be missing; their rows do not count. In least squares y runs on lines between its readings, and rows after long gaps
-//! are left out ([`ct_lti::ReadingFilter`]). With instruments what the model of the loop says stands for a missing reading in the filters
-//! of y: the instruments owe nothing to what the others hold beside it, so that the estimates are consistent, and for the filter `E = A^`
-//! the residual of a row has no part of what stands in other rows at all.
+//! Readings of y may be missing; their rows are not used. In least squares y is interpolated linearly between its readings, and rows after
+//! long gaps are left out ([`ct_lti::ReadingFilter`]). With instruments a missing reading is replaced in the filters of y by the simulated
+//! output of the loop. The instruments are independent of the error of this replacement, so the estimates are consistent, and for the
+//! filter `E = A^` the residual of a row does not depend on the replacements in other rows.
 //!
 //! Several records are taken together.
 

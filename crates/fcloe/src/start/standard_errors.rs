@@ -4,18 +4,18 @@
 //! ```text
 //! x^ - x = G^-1 sum z e,   G = sum z phi',   e = A/E w,   cov(x^) = G^-1 [sum_{k,l} R(k-l) z_k z_l'] G^-T
 //! ```
-//! whether w, the noise of y, circulates in the loop or stands on the record alone. w follows from e by the inverse of `A^/E` from sample
-//! to sample, an autoregression is fitted to it, and R is the autocovariance of that after `A^/E`: no autoregression of modest order stands
-//! for the slow zeros of A. theta follows from x by its derivatives.
+//! for noise w of y that is fed back in the loop, and for noise on the measurement only. w is computed from e with the inverse of `A^/E` from
+//! sample to sample, an autoregression is fitted to it, and R is the autocovariance of this noise model filtered by `A^/E`: an autoregression
+//! of moderate order cannot approximate the slow zeros of A. theta follows from x by its derivatives.
 //!
-//! Where readings are missing their rows are 0 in both sums, and w is known only where the filter is A^, where it is e itself.
+//! The rows of missing readings are 0 in both sums. With missing readings w is known only if the filter is A^; it is then equal to e.
 //!
-//! Assumptions: the noise is stationary, independent of what drives the instruments, and of one spectrum, counted in samples, in all
-//! records; the model's structure is right; the levels are exact, so that what is not known of them comes on top. Where the inverse of
-//! `A^/E` grows without bound the autoregression is that of e itself.
+//! Assumptions: the noise is stationary, independent of the signal that drives the instruments, and has the same AR coefficients in all
+//! records; the model's structure is right; the levels are exact, so their uncertainty is not included. If the inverse of `A^/E` is unstable,
+//! the autoregression is fitted to e itself.
 //!
-//! Figures, 400 runs for each of seven settings at 20 dB: the variance is 0.90 to 1.20 times that of the estimates where the filter is
-//! renewed, 0.94 to 1.8 times with one that stays. Intervals of 95 % contain the true value in 94 to 97 % for n = 1, in 86 % and more for n
+//! Figures, 400 runs for each of seven settings at 20 dB: the variance is 0.90 to 1.20 times that of the estimates if the filter is
+//! updated, 0.94 to 1.8 times with a fixed filter. Intervals of 95 % contain the true value in 94 to 97 % for n = 1, in 86 % and more for n
 //! = 2, where lines between samples bias the estimates, and contain no information about that bias where the plant has a direct term: y
 //! jumps then (`cargo test -p fcloe --test all coverage::instruments -- --nocapture`).
 //!

@@ -15,7 +15,8 @@ const REACH: f64 = 30.0;
 /// The scales of the noise have converged if none changes by more than this share.
 pub(super) const SETTLED: f64 = 0.02;
 
-/// Bounds of the text, and where it has none a factor of the value there: a fit that diverges says nothing. Nothing bounds a value of zero.
+/// Bounds of the text; without them plus and minus `factor` times the value, so that a fit cannot diverge. For a value of zero there are no
+/// such bounds.
 fn bounds_of(about: &About, value: f64, factor: f64) -> (f64, f64) {
     let reach = if value == 0.0 {
         f64::INFINITY

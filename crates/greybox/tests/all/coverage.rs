@@ -112,8 +112,8 @@ fn single_tank_whose_pump_has_a_dead_zone() {
     });
 }
 
-/// A fit by simulation error under noise that is not white: with the errors of a white residual the intervals are far
-/// too narrow, with the residual's own colour they are right.
+/// A fit by simulation error under noise that is not white: standard errors for a white residual give intervals that are far too narrow;
+/// with the noise model of the residual they are right.
 #[test]
 fn simulation_error_under_coloured_noise() {
     for rig in [Rig::single_tank(), Rig::cascaded_tanks()] {

@@ -366,9 +366,9 @@ fn most_records_of_every_effect_are_found_again() {
     let wanted = std::env::var("EFFECT").unwrap_or_default();
     let mut missed = Vec::new();
     for (name, hits) in table(&wanted, records) {
-        // The weakest is a leak in a tank whose level nobody measures (15 of 20): it pulls the believed level so far off that
-        // some fits do not find the way back.
-        // A limit near the least command in front of two tanks (4 of 10) leaves little of the command to tell their outflows by.
+        // The weakest is a leak in a tank whose level is not measured (15 of 20): it moves the simulated level so far that
+        // some fits do not converge to the true parameters.
+        // A limit near the least command in front of two tanks (4 of 10) leaves too little excitation to distinguish their outflows.
         let least = if name.starts_with("pump_saturation@0 cascaded-tanks [") {
             3
         } else {

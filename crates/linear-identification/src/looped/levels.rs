@@ -6,8 +6,8 @@ use serde::Serialize;
 use super::Task;
 use crate::{Error, Method, residual::limits};
 
-/// A loop is at rest in the first rows if there are enough rows with a constant drive, and neither output nor command would change by more
-/// than this share of its range at their present rate, in the time of the record's own memory.
+/// A loop is at rest in the first rows if the drive is constant in at least [`ROWS_AT_REST`] rows, and if output and command, at their rate
+/// of change there, would change by at most [`MOVES`] of their ranges within the memory of the record.
 const ROWS_AT_REST: usize = 6;
 const MOVES: f64 = 0.03;
 /// A difference below this number of standard errors is noise.

@@ -199,7 +199,7 @@ impl Task<'_> {
         let mut warnings = found.warnings;
         if self.request.levels == LevelChoice::Auto && found.levels_from == LevelChoice::Mean {
             warnings.push(
-                "the record does not begin at rest: its means were taken for the levels, which biases the estimates; --method fcloe estimates the levels, --levels says them"
+                "the record does not begin at rest: its mean values were used as the operating point, which biases the estimates; --method fcloe estimates the operating point, and --levels sets it"
                     .to_owned(),
             );
         }
@@ -262,7 +262,7 @@ impl Task<'_> {
     /// Reason why the end of a recursion is not reliable, if there is one: its loop was nearly unstable, or one model for the whole record
     /// has a much smaller simulation error.
     fn astray(&self, health: &LoopHealth, rmse: f64, deviation: f64, unit: &str) -> Option<String> {
-        let untold = "so condition (14) is not told";
+        let untold = "so condition (14) is not reported";
         if health.refused > 0 {
             return Some(format!(
                 "{} steps were refused, as the loop would not have been stable: the estimates are not to be trusted, {untold}; compare with --method fcloe",

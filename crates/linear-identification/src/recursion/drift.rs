@@ -1,21 +1,21 @@
 //! Test whether the estimates depend on the level. Near a single level any process is linear, so estimates that depend on the level show
 //! that the process is not linear, or not of this order.
 //!
-//! What the recursion says at a time belongs to the mean of the output as the recursion remembers it,
+//! An estimate at time t belongs to the mean of the output with the exponential weights of the recursion, with forgetting rate eta,
 //! ```text
 //! level(t) = int y e^{-eta (t - s)} ds / int e^{-eta (t - s)} ds
 //! ```
-//! The way of the level is cut into equal stretches, and the estimates of each are averaged.
+//! The range of this level is divided into [`STRETCHES`] equal intervals, and the estimates in each are averaged.
 //!
-//! That they are constant says something only where the level has moved: where the memory is a small part of the record, and what it
-//! remembers covers a good part of the output's range. A shorter record cannot tell.
+//! Constant estimates show linearity only if the level has moved: if the memory of the recursion is a small part of the record, and the
+//! level covers a large part of the output's range.
 
 use serde::Serialize;
 
 use super::scaled::Scaled;
 use crate::{Order, Trajectory};
 
-/// Stretches of the level.
+/// Number of intervals of the level.
 const STRETCHES: usize = 8;
 
 /// The estimates depend on the level if their values at both ends of the level's range differ by this number of standard errors.

@@ -178,7 +178,7 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
             && parameter.value.abs() < 2.0 * error
         {
             warnings.push(format!(
-                "{} cannot be told from 0: its standard error is {:.0} % of it; try a lower --order, or leave out what it belongs to",
+                "{} is not significantly different from 0: its standard error is {:.0} % of its value; try a lower --order, or leave out its input or term",
                 parameter.name,
                 100.0 * error / parameter.value.abs()
             ));

@@ -102,7 +102,8 @@ pub(crate) fn base<'a>(
 /// A start of a plant with effects: the plant is fitted without them, then effects are added one after the other, each time the one that
 /// lowers the error most.
 ///
-/// From random starts of all at once hardly any fit of several effects finds its way. `None`: the plant has no effects.
+/// From random starts of all parameters at once, fits of several effects rarely converge to the best minimum. `None`: the plant has no
+/// effects.
 fn one_by_one(setup: &Setup, seed: u64) -> Result<Option<Vec<f64>>, Error> {
     let mut remaining = setup.structure.effects().to_vec();
     if remaining.is_empty() {

@@ -1,7 +1,7 @@
 //! Records from a closed loop: the loop is simulated from its reference if its controller is known; otherwise a warning is given.
 //!
-//! The noise comes back through the command. A model that runs on the measured command is then wrong in a way that depends on the spectrum
-//! of the noise (`greybox`, `feedback.rs`); one whose loop runs on the reference is not.
+//! The noise is fed back through the command. A model that is simulated with the measured command is then biased, depending on the spectrum
+//! of the noise (`greybox`, `feedback.rs`); a model whose loop is simulated from the reference is not.
 
 use greybox::{Replay, Setup, coloured, fit_from};
 use plants::Variable;

@@ -1,22 +1,22 @@
 //! Test for undeclared feedback: whether the input depends on past residuals.
 //!
-//! **Regression**: the change of the input, `u[k] - u[k-1]`, on its own past and on the residual, which a controller has read,
+//! **Regression**: the change of the input, `u[k] - u[k-1]`, on its own past and on the residual, which a controller would have measured,
 //! ```text
 //! du[k] = c + a u[k-1] + sum_(i=1..p) b_i du[k-i] + sum_(j=0..L) g_j e[k-j] + g_(L+1) e[k-L-1] + w[k],
 //! ```
-//! and an F test of `g_0 = ... = g_L = 0` (Granger's causality from the residual to the input). The own past of the input is in the
-//! regression, so that a model that fails after each move of an autocorrelated input is not taken for a controller. The last lag of
+//! and an F test of `g_0 = ... = g_L = 0` (Granger's causality from the residual to the input). The past of the input is in the
+//! regression, so that a model error after each change of an autocorrelated input is not mistaken for feedback. The last lag of
 //! the residual is not tested: with it the test holds where both series are integrated (H. Y. Toda, T. Yamamoto, J. Econometrics 66
 //! (1995) 225-250).
 //!
-//! **Sign**: a controller counteracts, so the first response that is significant has the sign that moves the output back. Where a row's
-//! input acted before its output was read (the rain of the day before), the output predicts the input with the other sign, and without any
-//! controller. Where the record has a set point the sign is not asked for: the gain of a model that runs on the command of a loop may have
-//! the wrong one.
+//! **Sign**: a controller counteracts, so the first significant response has the sign that moves the output back. If a row's input
+//! acted before its output was read (the rain of the day before), the output predicts the input with the other sign, without any
+//! controller. If the record has a set point, the sign is not tested: the gain of a model that runs on the command of a loop may have the
+//! wrong sign.
 //!
-//! **Assumptions**: a controller acts at every sample. An input that is constant at most samples is none's, and one
-//! that its own past predicts exactly says nothing. Changes beyond five robust standard deviations are clipped: steps of a set
-//! point would drown the response to noise.
+//! **Assumptions**: a controller acts at every sample. An input that is constant at most samples is not that of a controller, and
+//! an input that its own past predicts exactly cannot be tested. Changes beyond five robust standard deviations are clipped: otherwise steps
+//! of a set point would dominate the response to noise.
 //!
 //! **Reference**: C. W. J. Granger, Investigating causal relations by econometric models and cross-spectral methods,
 //! Econometrica 37 (1969) 424-438.

@@ -36,7 +36,7 @@ impl Problem {
 }
 
 impl ProblemBuilder {
-    /// The effects that are on already.
+    /// The effects that the model contains already.
     pub fn effects(mut self, effects: impl Into<Vec<Placed>>) -> Self {
         self.problem.effects = effects.into();
         self

@@ -34,7 +34,9 @@ pub struct Limits {
 #[non_exhaustive]
 pub enum NoExperiment {
     /// The two effects are the same.
-    #[error("--between {effect} {effect}: an effect cannot be told from itself; name two")]
+    #[error(
+        "--between {effect} {effect}: an effect cannot be distinguished from itself; give two different effects"
+    )]
     SameEffect {
         /// The effect.
         effect: String,
@@ -159,7 +161,7 @@ pub enum NoExperiment {
         /// Width of the range.
         span: f64,
     },
-    /// The limit on the time has passed before anything could be said.
+    /// The time limit was reached before there was a result.
     #[error(
         "the time did not suffice to fit both effects and to try experiments; allow more (--effort thorough), or give fewer rows or a shorter --duration"
     )]

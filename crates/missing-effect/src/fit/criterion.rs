@@ -13,8 +13,8 @@ pub const GROUP_MARGIN: f64 = 6.0;
 
 /// Whether a set of effects lowers the deviance significantly, both with the same weighting, or each with its own.
 ///
-/// Chi-square, corrected (Bonferroni) for all that the search looked at, with a share of the risk for each effect: one that
-/// has a single start is not made to pay for another with many.
+/// Chi-square test, corrected (Bonferroni) for the number of effects that the search tried, and within an effect for its number of starts: an
+/// effect with a single start is not penalised for another one with many.
 pub(crate) fn beyond_chance(gained: &Node, lacking: &Node) -> bool {
     let free = |node: &Node| node.setup.free().len();
     let freedom = free(gained).saturating_sub(free(lacking)).max(1);

@@ -12,7 +12,7 @@ const LEAVES: [&str; 2] = ["overflow", "leak_at_height"];
 
 /// Starts of an extended model: the vector of the model, with the new effect's parameters on the grid of its starts.
 ///
-/// Parameters that the plant alone does not tell apart lie in one order or the other by chance. An effect in a vessel distinguishes them,
+/// Parameters that the plant alone does not distinguish lie in one order or the other by chance. An effect in a vessel distinguishes them,
 /// and from the wrong order no fit comes to the right one.
 pub(crate) fn grid(from: &Node, child: &Setup, placed: Placed) -> Vec<Vec<f64>> {
     let mut begun = vec![transfer(from, child)];

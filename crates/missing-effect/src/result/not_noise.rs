@@ -40,7 +40,7 @@ pub enum NotNoise {
         /// The record, by its name.
         record: String,
     },
-    /// It drifts: its correlation time reaches the slowest time constant of the process, so such noise can imitate any effect.
+    /// It drifts: its correlation time exceeds the slowest time constant of the model, so such noise can imitate any effect.
     Slow {
         /// The output, by its name.
         output: String,

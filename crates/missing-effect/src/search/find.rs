@@ -121,8 +121,8 @@ pub(crate) fn find<'a>(
     let by_simulation = slow_noise && !confirmed.added.is_empty();
     let mut prewhitened = None;
     if noise.order() > 0 && !base.setup.leaves_out("the prewhitened search") {
-        // The noise model is known now: the search is repeated with this weighting. A drifting residual needs this too: for the simulation
-        // error a slow noise looks like many effects, and the true one may not be among the grown sets. But with such a weighting the
+        // The noise model is known now: the search is repeated with this weighting. A drifting residual needs this too: in the simulation
+        // error slow noise resembles many effects, and the true one may not be among the sets that were built. But with such a weighting the
         // simulation may drift, and such sets are not accepted; and it contains little information about many effects.
         let breadth = Breadth {
             most: if by_simulation {
@@ -145,7 +145,7 @@ pub(crate) fn find<'a>(
                     residual_kind(node)
                 }
             },
-            &|done, total| tell("searching in the noise's metric", done, total),
+            &|done, total| tell("searching, prewhitened by the noise model", done, total),
         )?;
         let best = chosen(&coloured.sizes, &base);
         let other = confirm(refine(&best, &noise, &[])?, &noise)?;
@@ -156,7 +156,7 @@ pub(crate) fn find<'a>(
         }
         prewhitened = Some(coloured);
     }
-    if !by_simulation && !base.setup.leaves_out("the exchange of confirmed effects") {
+    if !by_simulation && !base.setup.leaves_out("swaps of confirmed effects") {
         confirmed = improve(confirmed, &noise)?;
     }
     Ok(Found {

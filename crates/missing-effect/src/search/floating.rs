@@ -102,7 +102,7 @@ impl<'a> Floating<'_, 'a> {
 
     /// Swaps one effect of a set for another, one at a time, as long as the criterion falls.
     fn exchanged(&self, mut node: Node<'a>) -> Result<Node<'a>, Error> {
-        while !node.setup.leaves_out("exchanges within sets of effects") {
+        while !node.setup.leaves_out("swaps within sets of effects") {
             let others = (0..node.added.len())
                 .into_par_iter()
                 .map(|position| {

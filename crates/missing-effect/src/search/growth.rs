@@ -1,7 +1,7 @@
 //! The joint search: effects interact, so several sets of effects are extended in parallel, and not one after the other.
 //!
 //! On the measured Cascaded Tanks data a pump dead zone alone lowers the error from 0.67 to 0.60 V and an overflow
-//! alone to 0.52 V, both together to 0.33 V: a search that stops at the first effect that does not pay misses such pairs.
+//! alone to 0.52 V, both together to 0.33 V: a search that stops when one more effect does not lower BIC misses such pairs.
 
 use greybox::Noise;
 use plants::Placed;

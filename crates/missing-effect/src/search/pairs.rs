@@ -1,13 +1,13 @@
 //! Joint scores of all pairs of effects, from the sensitivities of single ones.
 //!
-//! A pair may fit to the noise where neither of its effects does, and then neither is among the best single ones from which larger sets
-//! are grown. Each candidate is linearised once at its single refit and at the starts of the largest predicted fall; `d_i` is what it
-//! changes in the residual there, `E_i` its columns. A pair is then linear to first order,
+//! Two effects together may explain the data although neither does alone. Then neither is among the best single effects, from which larger
+//! sets are built. Each candidate is linearised once at its single refit, and at its starts with the largest predicted reduction; `d_i` is
+//! the change of the residual there, `E_i` the Jacobian of its parameters. The residual of a pair is then, to first order,
 //! ```text
 //! r_ij = r_0 + d_i + d_j - [J_0, E_i, E_j] s,
 //! ```
-//! and its least squares `s`, held within the bounds of the effects' parameters, cost one small solve: all inner products
-//! are taken once.
+//! and its least-squares step `s`, within the bounds of the effects' parameters, costs one small solve: all inner products are computed
+//! once.
 //!
 //! **Cost**: `O(N m^2)` for `m` columns of all candidates together, `O(p^3)` for a pair.
 

@@ -24,14 +24,14 @@ const OUT_OF_REACH: f64 = 0.5;
 
 /// Swap steps: the set with one of its effects replaced by each other candidate, refitted, best first.
 ///
-/// `singles`: what [`singles`](crate::fit::proposal::singles) gives in the same metric. It holds the exchanges of an only effect.
+/// `singles`: what [`singles`](crate::fit::proposal::singles) gives with the same noise model. It contains the swaps of a single effect.
 pub(crate) fn swaps<'a>(
     node: &Node<'a>,
     position: usize,
     noise: &Noise,
     singles: Option<&[Node<'a>]>,
 ) -> Result<Vec<Node<'a>>, Error> {
-    if node.setup.leaves_out("the exchange of confirmed effects") {
+    if node.setup.leaves_out("swaps of confirmed effects") {
         return Ok(Vec::new());
     }
     let lacking = without(node, position, noise, FINE)?;

@@ -13,8 +13,8 @@ use crate::{
 const SETTLING: f64 = 6.0;
 /// After an alarm the rows are evaluated again after these numbers of slowest time constants.
 const LOOKS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 12.0];
-/// At the evaluation with this number the tracker is released again: its derivatives are those of constant parameters, and are misleading
-/// while the effect of the change propagates through the plant.
+/// At the evaluations before this number the covariance of the tracker is increased again: its derivatives are those of constant parameters,
+/// and are wrong while the effect of the change propagates through the plant.
 const LET_GO: usize = 3;
 /// Least number of rows from the alarm to the first evaluation; each later one needs twice as many.
 const FEWEST: usize = 8;

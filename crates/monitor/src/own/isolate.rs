@@ -1,18 +1,17 @@
 //! Isolation at the ports of a user's own model: the effect of the catalogue, or the user's own candidate, and its onset, that explains the
 //! latest rows.
 //!
-//! An effect that begins at row `j` is fitted to the rows from `j` on, in the metric of the learned noise: every parameter of the model as
-//! it was learned, the states at `j` as the learned model has them, only the effect's own parameters free, and the initial values of the
-//! states that it brings. With `S` the sum of squares, in the noise's variance, of what is left of the rows from `j` on, without the effect
-//! and with it,
+//! An effect that begins at row `j` is fitted to the rows from `j` on, prewhitened by the learned noise model. The parameters of the learned
+//! model and its states at row `j` are fixed; only the effect's parameters and the initial values of the states that it adds are fitted.
+//! With `S` the sum of squares of the whitened residual over the noise variance, from row `j` on, without the effect and with it,
 //! ```text
 //! evidence = S_without - S_with - (parameters + 1) ln n
 //! ```
-//! is the fall of the Bayesian information criterion, the onset counted as a parameter, `n` the rows that are kept times the outputs.
-//! Onsets are those around the one that a change of unknown direction has ([`super::onset`]).
+//! is the fall of the Bayesian information criterion. The onset counts as a parameter; `n` is the number of stored rows times that of the
+//! outputs. The onsets that are tried lie around the one that was estimated without an assumption about the effect ([`super::onset`]).
 //!
-//! **Cost**: some ten simulations of the rows behind the onset for each effect, port and onset; of a candidate of the user's own up to a
-//! hundred.
+//! **Cost**, for each effect, port and onset, in simulations of the rows from the onset on: one for each start (2 to 18, with backlash
+//! 24), and at most 8 evaluations in each fit from the best [`STARTS`] starts; at most 40 in each fit of a candidate of the user's own.
 
 use std::collections::BTreeMap;
 

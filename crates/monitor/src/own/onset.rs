@@ -1,29 +1,31 @@
 //! Onset of a deviation for a user's own model: the onset of the single change that explains the latest rows best.
 //!
 //! A change of direction `i` (a watched parameter, or an offset of one output) by `d` that begins at row `j` adds `d s_i(k)` to the outputs
-//! from then on, `s_i` the derivative of the learned model that begins at the states of row `j`. With `s` whitened by the noise of the
-//! outputs and `e` the innovations of the learned model, both in standard deviations,
+//! from then on; `s_i` is the derivative of the learned model's outputs, simulated from the states at row `j`. With `s` whitened by the noise
+//! model of the outputs, and `e` the innovations of the learned model, both in standard deviations,
 //! ```text
 //! g(j) = max_i (sum_{k >= j} s_i(k) e(k))^2 / sum_{k >= j} s_i(k)^2
 //! ```
-//! is by how much the sum of squares falls with the best of them: the generalised likelihood ratio of a change of unknown onset, which is
-//! where it is largest (A. S. Willsky, H. L. Jones, IEEE Trans. Automatic Control 21 (1976) 108-112). It is linear in the change, whose
-//! beginning a large one shows right; what it does later it does not. So rows count until [`BEHIND`] time constants after the alarm.
+//! is the fall of the sum of squares with the best direction: the generalised likelihood ratio of a change at row `j`. The onset is the row
+//! at which it is largest (A. S. Willsky, H. L. Jones, IEEE Trans. Automatic Control 21 (1976) 108-112). The response is linearised in the
+//! change. For a large change this is accurate only soon after the onset, so rows later than [`BEHIND`] time constants after the alarm are
+//! not used.
 //!
-//! **Cost**: some 25 simulations with derivatives of at most the rows that are kept, for each look at an alarm.
+//! **Cost**: about 25 simulations with derivatives of at most the stored rows, each time an alarm is analysed.
 
 use ct_signals::Hold;
 
 use super::{OwnModel, simulation::running};
 use crate::{Each, isolate::Kept, learn::Learned};
 
-/// Onsets that are tried first, in slowest time constants before now; then those between the best one and its neighbours.
+/// Onsets that are tried first, in multiples of the slowest time constant before the latest row; then those between the best one and its
+/// neighbours.
 const ONSETS: [f64; 14] = [
     0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0,
 ];
 /// Rows are used until this number of slowest time constants after the alarm.
 const BEHIND: f64 = 1.0;
-/// An onset has at least so many rows after it.
+/// Least number of rows after an onset.
 const FEWEST: usize = 2;
 
 /// Onset \[s\] of the change after an alarm at `raised` \[s\]; `None` if the rows do not determine it.

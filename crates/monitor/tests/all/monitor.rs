@@ -283,7 +283,7 @@ fn the_estimates_follow_and_their_band_holds() {
     let mut monitor = new(model());
     let rows = tank.run();
     let changed = rows.iter().position(|row| row.time >= 4000.0).unwrap();
-    // Before the model is learned again: the alarm has released the tracker.
+    // Before the model is fitted again: the alarm has increased the covariance of the tracker.
     all(&mut monitor, &rows[..changed + 500]);
     let estimates = monitor.estimates();
     assert_eq!(estimates[1].name, "alpha");

@@ -32,7 +32,7 @@ pub struct Cell {
     pub band: Option<[f64; 2]>,
     /// Whether the figure is inside; `None` without a band.
     pub inside: Option<bool>,
-    /// Distance of the printed figure, give or take its rounding, from the band, as a share of the band's width; 0 if inside; `None`
+    /// Distance of the printed figure, allowing for its rounding, from the band, as a share of the band's width; 0 if inside; `None`
     /// without a printed figure or without a band with two ends.
     pub paper_outside: Option<f64>,
 }

@@ -22,7 +22,7 @@ pub use table_two::{Figure, Fits, SecondTable};
 use self::printed::MISPRINTS;
 use crate::{Error, Progress};
 
-/// The fewest runs of which variances can be told.
+/// Least number of runs for which variances are given.
 pub const FEWEST: usize = 10;
 
 /// The paper's iterations are counted to the first step that changes no parameter by more than this share.

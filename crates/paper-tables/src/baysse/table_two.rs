@@ -32,7 +32,7 @@ pub(super) fn assumptions() -> Vec<String> {
             rig.area, rig.alpha, rig.pump_gain, rig.level
         ),
         format!(
-            "The pump moves nothing below {} V. The paper says nothing of it; with it the secant H0/u0 is {:.2}, which the paper prints for K by instruments, without it {:.2}.",
+            "The pump has a dead zone of {} V, which the paper does not mention: with it the secant gain H0/u0 is {:.2}, as the paper prints for K by instrumental variables; without it, {:.2}.",
             rig.dead_zone,
             rig.level / rig.command_at_rest(),
             rig.level / (rig.command_at_rest() - rig.dead_zone),
@@ -49,9 +49,9 @@ pub(super) fn assumptions() -> Vec<String> {
             rig.bit,
             rig.samples()
         ),
-        "Instruments get the raw levels, as the paper's can only have had; the output error gets r and y less the operating point, and knows the filter.".to_owned(),
-        "Variances are those a fit says of itself, taking its residual for white, mean over the runs; for instruments, whose own are not known, from run to run.".to_owned(),
-        "Gain, time constant, dead zone, noise and reference were chosen to match the table; what is not chosen is that instruments find the secant, and that the output error does not.".to_owned(),
+        "Instrumental variables use the raw levels, as they must have in the paper; the output-error method uses r and y less the operating point, and its model contains the filter.".to_owned(),
+        "Variances are those that a fit estimates for a white residual, averaged over the runs; for instrumental variables they are the variances over the runs, since the paper's are not known.".to_owned(),
+        "Gain, time constant, dead zone, noise and reference were chosen to match the table. It is a result, not a choice, that instrumental variables estimate the secant gain and the output-error method does not.".to_owned(),
     ]
 }
 
@@ -62,7 +62,7 @@ pub struct SecondTable {
     pub rig: Rig,
     /// K (cm/V) and tau (s) of the tangent at the operating point.
     pub tangent: [f64; 2],
-    /// Instruments on raw levels.
+    /// Instrumental variables, on raw levels.
     pub instruments: Vec<[f64; 2]>,
     /// Closed-loop output error, iterated in theta.
     pub plain: Fits,
@@ -100,7 +100,7 @@ pub struct Figure {
     pub reference: Vec<f64>,
     /// Output of the rig, cm.
     pub measured: Vec<f64>,
-    /// Output of the loop simulated with the plant that instruments give, cm.
+    /// Output of the loop simulated with the plant from instrumental variables, cm.
     pub instruments: Vec<f64>,
     /// Level simulated with the plant from the output error, cm.
     pub output_error: Vec<f64>,

@@ -28,7 +28,7 @@ pub struct Cell {
     pub q95: f64,
     /// Share of the runs below the printed figure, 0 to 1.
     pub below: f64,
-    /// Whether the printed figure, give or take its rounding, is in the 5 to 95 % range.
+    /// Whether the printed figure, allowing for its rounding, is in the 5 to 95 % range.
     pub inside: bool,
 }
 

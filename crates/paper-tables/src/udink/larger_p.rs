@@ -1,4 +1,4 @@
-//! Table 1 with larger `P(0)`, of which the paper warns that it leads to numerical difficulties (section 6).
+//! Table 1 with larger `P(0)`. The paper warns that a large `P(0)` leads to numerical difficulties (section 6).
 
 use serde::Serialize;
 

@@ -32,7 +32,7 @@ use self::run::run_from;
 use crate::progress::in_parallel;
 use crate::{Error, Progress, Stage};
 
-/// The fewest runs of which a 5 to 95 % range can be told: of fewer, none lies beyond 5 %.
+/// Least number of runs for which a 5 to 95 % range is given: with fewer, no run lies beyond 5 %.
 pub const FEWEST: usize = 20;
 
 /// Tables 1 to 4 with many noises, and related results.

@@ -7,7 +7,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     id: "const_leak",
     place: Place::Vessel,
     by_clock: false,
-    physics: "A constant flow leaves the vessel beside the outlet: a leak, or a consumer that nobody recorded.",
+    physics: "A constant flow leaves the vessel beside the outlet: a leak, or a consumer that was not recorded.",
     general: Some("a constant unknown load acts on the process"),
     equation: "S dH/dt = ... - q0",
     applies: any_plant,

@@ -8,7 +8,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     id: "coupled_tank",
     place: Place::Vessel,
     by_clock: false,
-    physics: "Another body of water pushes back: a side tank fills and empties with an only tank; of two tanks the outflow of the upper one feels the lower level.",
+    physics: "A single tank exchanges water with a side tank; with two tanks in series, the lower level reduces the outflow of the upper tank.",
     general: None,
     equation: "one tank: S_b dH_b/dt = c (H - H_b), S dH/dt = ... - c (H - H_b), S_b = share S, c = S_b/T_b; two tanks: the head of the upper outflow is max(H_1 - b H_2, 0)",
     applies: first_vessel,
@@ -18,7 +18,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "K. J. Astrom, A.-B. Ostberg, A teaching laboratory for process control, IEEE Control Systems Magazine 6(5), 1986: coupled tanks.",
 };
 
-/// The last of several vessels has no vessel below that could reduce its outflow; an only vessel may have a side tank. Two coupled linear
+/// The last of several vessels has no vessel below that could reduce its outflow; a single vessel may have a side tank. Two coupled linear
 /// tanks are equivalent to two uncoupled linear tanks with other time constants, so no data can show the coupling. In tanks connected by
 /// valves the plant model has this coupling already.
 fn first_vessel(plant: Plant, vessel: usize) -> bool {
@@ -36,7 +36,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
         starts: vec![start],
     };
     if site.is_above_another() {
-        return vec![coupling("backflow", "share of the lower level that the upper outflow feels", 0.95, 0.05)];
+        return vec![coupling("backflow", "share of the lower level that reduces the head of the upper outflow", 0.95, 0.05)];
     }
     let (sample, duration) = (site.scales.sample_interval, site.duration());
     vec![

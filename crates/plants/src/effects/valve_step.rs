@@ -7,7 +7,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     id: "valve_step",
     place: Place::Vessel,
     by_clock: true,
-    physics: "At one instant the outlet changes: somebody turned the valve, or something lodged in it.",
+    physics: "At one instant the outlet changes: the valve was turned, or something lodged in it.",
     general: Some("the loss coefficient changes at one instant"),
     equation: "Q_out(t) = (1 + s) Q_out from t_s on",
     applies: any_plant,

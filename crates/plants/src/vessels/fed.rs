@@ -1,5 +1,5 @@
-//! A measured disturbance that flows into the lower of two vessels in series. A disturbance that flows into the upper vessel, or into an
-//! only vessel, is a part of that vessel's [inflow](crate::inflow).
+//! A measured disturbance that flows into the lower of two vessels in series. A disturbance that flows into the upper vessel, or into a
+//! single vessel, is a part of that vessel's [inflow](crate::inflow).
 //!
 //! The balance of the lower vessel contains the disturbance ([`Vessels::balance`]). For linear vessels without effects, superposition is
 //! exact: the response of one lag to the disturbance is added to the response to the pump.

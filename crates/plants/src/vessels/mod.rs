@@ -73,7 +73,7 @@ pub(crate) struct Vessels<T: Scalar, const N: usize> {
     pub(crate) levels: Levels<T, N>,
     /// The exact solution, for linear vessels.
     linear: Option<LinearFlow<T>>,
-    /// A side tank of an only vessel; its level comes after the vessel's in `levels`.
+    /// A side tank of a single vessel; its level comes after the vessel's in `levels`.
     side: Option<Side<T>>,
     /// Number of state variables: the levels of the vessels and of the side tank.
     states: usize,

@@ -281,6 +281,6 @@ fn what_cannot_be_is_refused() {
         once.with_term(good)
             .unwrap_err()
             .to_string()
-            .contains("on already")
+            .contains("listed twice")
     );
 }

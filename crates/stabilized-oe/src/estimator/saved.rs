@@ -1,4 +1,4 @@
-//! An estimator as it stands, saved and restored: after that the next updates give the same numbers to the bit.
+//! Saving and restoring the state of an estimator: the next updates give bit-identical results.
 //!
 //! Rows are settings, and not written: an estimator that has some is none of the types that are saved. Default bounds follow from the
 //! shortest step so far.

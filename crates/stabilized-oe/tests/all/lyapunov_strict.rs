@@ -272,7 +272,7 @@ fn check<const N: usize, const P: usize, const U: usize, G: Proven<N, P>>(
         let (after, information) = estimator.gain().v(&theta, &c);
         let lost = fallen(innovation.epsilon, innovation.s, weights, case.dt);
         let expected = (-weights.eta() * case.dt).exp() * before - lost;
-        // the estimates are known to some units in the last place, and so far V is blurred
+        // bound on the rounding error of V: the estimates are exact to some units in the last place
         let estimates = Gain::theta(estimator.gain()).norm() + estimator.filter().norm();
         let unit = 16.0 * f64::EPSILON * (theta.norm() + c.norm() + estimates);
         let blur = 2.0 * unit * (information * before).sqrt() + unit * unit * information;

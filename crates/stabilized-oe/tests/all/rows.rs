@@ -53,7 +53,8 @@ fn pair(c: f64, gamma: f64, eta: [f64; 2]) -> [Weights; 2] {
     eta.map(|eta| Weights::new(c, gamma, eta).unwrap())
 }
 
-/// The difference after a row alone over 0.8 s, in `steps`; forgetting is in the data's step, which is without data here.
+/// Relative error after 0.8 s in which only a row acts, for each number of `steps`. Forgetting is part of the step for data, which is called
+/// without data here.
 fn row_alone(rng: &mut ChaCha8Rng, weights: [Weights; 2], w: f64, steps: &[u32]) -> Vec<f64> {
     let begin = start(rng);
     let (row, entry) = row(rng, w, weights);

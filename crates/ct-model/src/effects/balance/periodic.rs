@@ -30,7 +30,7 @@ end periodic;
             ]),
         ),
     ],
-    physics: "A periodic flow into and out of the balance: a consumer that switches, day and night, a rotating imbalance.",
+    physics: "A term of the balance that varies with a fixed period: a load that switches on and off, the daily cycle, a rotating unbalance.",
     confused_with: &["hidden_state(x)"],
     confirm: "Log what runs nearby: what has this period?",
     symptoms: &["oscillates", "hum", "rhythm", "day and night"],

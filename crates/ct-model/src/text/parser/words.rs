@@ -65,15 +65,13 @@ pub(super) const KEYWORDS: [&str; 58] = [
 /// Words outside the subset, with the correction.
 pub(super) fn outside(word: &str) -> Option<&'static str> {
     Some(match word {
-        "connect" => "connections are outside the subset: write the equations that it stands for",
-        "when" | "elsewhen" => {
-            "`when` is outside the subset: write an expression with `if` or `time`"
-        }
-        "for" | "while" | "loop" => "loops are outside the subset: write every equation",
-        "algorithm" => "algorithms are outside the subset: write equations under `equation`",
+        "connect" => "connections are not supported: write the equations that it stands for",
+        "when" | "elsewhen" => "`when` is not supported: write an expression with `if` or `time`",
+        "for" | "while" | "loop" => "loops are not supported: write every equation",
+        "algorithm" => "algorithms are not supported: write equations under `equation`",
         "initial" => "`equation` has to follow it: write `initial equation`",
         "extends" | "import" | "within" | "redeclare" | "replaceable" | "constrainedby" => {
-            "a model is one text: write in it what it takes from others"
+            "a model is a single text: write into it the parts that it takes from other models"
         }
         "package" | "block" | "class" | "record" | "connector" | "function" | "type"
         | "partial" | "encapsulated" | "expandable" | "operator" | "external" => {
@@ -82,9 +80,9 @@ pub(super) fn outside(word: &str) -> Option<&'static str> {
         "Integer" | "Boolean" | "String" | "enumeration" | "discrete" => {
             "every variable is a `Real`"
         }
-        "annotation" => "annotations are outside the subset: delete it",
+        "annotation" => "annotations are not supported: delete it",
         "protected" | "public" | "inner" | "outer" | "flow" | "stream" | "each" => {
-            "it means nothing in a single model: delete the word"
+            "it has no meaning in a single model: delete the word"
         }
         "assert" | "terminate" | "reinit" => {
             "it does not compute a variable: delete it, or write bounds with min and max"

@@ -158,7 +158,7 @@ impl Builder<'_> {
                 let Some(function) = Function::ALL.into_iter().find(|f| f.name() == name) else {
                     let all: Vec<&str> = Function::ALL.iter().map(|f| f.name()).collect();
                     let what = format!(
-                        "{} is no function of the subset: {}, delay, noEvent and smooth are",
+                        "{} is not a supported function; supported are {}, delay, noEvent and smooth",
                         shown(name),
                         all.join(", ")
                     );

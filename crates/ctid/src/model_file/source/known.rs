@@ -254,7 +254,7 @@ impl Source<'_> {
     }
 }
 
-/// The only vessel of a plant, as `disturbance` names it.
+/// Name of the vessel of a plant with a single vessel, in `disturbance`.
 const ONLY: &str = "tank";
 
 /// Allowed values of `disturbance`, in quotes.

@@ -137,7 +137,7 @@ impl<'a> Session<'a> {
         if file.columns.time.is_none() && seconds != time_unit {
             if self.restored {
                 return Err(Error::Usage(format!(
-                    "the saved state has a time in units of {time_unit} s, but the rows have one of {seconds} s; convert the rows, or name another --state"
+                    "the saved state has a time in units of {time_unit} s, but the rows have one of {seconds} s; convert the rows, or use another state file with --state FILE"
                 )));
             }
             if let Believed::Own(_, _, unit) = &mut self.model {
@@ -160,7 +160,7 @@ impl<'a> Session<'a> {
                 )
             };
             return Err(Error::Usage(format!(
-                "the saved state is in {}, but the rows are in {}; convert the rows, or name another --state",
+                "the saved state is in {}, but the rows are in {}; convert the rows, or use another state file with --state FILE",
                 named(saved),
                 named(units)
             )));
@@ -221,7 +221,7 @@ impl<'a> Session<'a> {
         refused(
             self,
             format!(
-                "the times are {now}, and the saved state has {then}; write them as before, or name another --state"
+                "the times are {now}, and the saved state has {then}; write them as before, or use another state file with --state FILE"
             ),
         )
     }

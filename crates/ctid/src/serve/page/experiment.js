@@ -1,4 +1,4 @@
-// The experiment that tells two effects apart.
+// The experiment that distinguishes two effects.
 import { $, fill, figure, make, plot, table, units } from "./dom.js";
 import * as server from "./server.js";
 
@@ -12,7 +12,7 @@ const limit = (id) => {
   return text ? Number(text) : null;
 };
 
-/** Asks for the experiment that tells two effects of a group apart, within what the plant allows. */
+/** Asks for the experiment that distinguishes two effects of a group, within what the plant allows. */
 export async function ask(what, fail) {
   question = what;
   try {

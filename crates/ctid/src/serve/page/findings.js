@@ -1,4 +1,4 @@
-// What a diagnosis found: the effects that are missing, each with what cannot be told from it, and the ranking.
+// What a diagnosis found: the effects that are missing, each with the effects that cannot be distinguished from it, and the ranking.
 import { $, button, fill, make, named, table, units } from "./dom.js";
 import * as experiment from "./experiment.js";
 import * as server from "./server.js";
@@ -17,7 +17,7 @@ export function start(fail) {
 
 const isOn = (state, effect) => state.effects.some((one) => one.effect === effect);
 
-/** Takes an effect in the place of one that these data cannot tell from it: both together would not be determined. */
+/** Takes an effect in the place of one that these data do not distinguish from it: both together would not be determined. */
 function instead(on, effect, place, fail, id) {
   const press = async () => {
     try {
@@ -45,7 +45,7 @@ function group(state, one, k, fail) {
     const place = state.diagnosis.ranking.find((score) => score.effect === other)?.place ?? null;
     return make("li", {}, make("code", {}, other), " ",
       choice(other, place, `add-other-${k}-${other}`),
-      button("What would tell?", { id: `tell-${k}-${other}`, ariaLabel: `Which experiment distinguishes ${one.effect} from ${other}?` },
+      button("Design an experiment", { id: `tell-${k}-${other}`, ariaLabel: `Which experiment distinguishes ${one.effect} from ${other}?` },
         () => experiment.ask({ group: k, between: [one.effect, other] }, fail)));
   });
   return make("li", { className: "found" },
@@ -53,7 +53,7 @@ function group(state, one, k, fail) {
     make("p", { className: "figures" }, one.size ? make("span", {}, units(one.size)) : null, one.rmse ? make("span", {}, "error then ", make("b", {}, units(one.rmse))) : null),
     one.sentence ? make("p", {}, units(one.sentence)) : null,
     one.places ? make("p", {}, `Where it acts, with relative likelihood: ${one.places}.`) : null,
-    others.length ? [make("p", { className: "caption" }, "These data cannot tell it from:"), make("ul", { className: "others" }, others)] : null);
+    others.length ? [make("p", { className: "caption" }, "These data do not distinguish it from:"), make("ul", { className: "others" }, others)] : null);
 }
 
 function row(state, one, k, widest, fail) {

@@ -129,7 +129,7 @@ function chosenWords() {
   fill($("held-out-parts"), units(fit.held_out_error));
   table($("parameters"), [["Parameter"], ["Estimate", true], ["± standard error", true], ["Unit"]],
     fit.parameters.map((one) => [make("code", {}, one.name), one.value, one.error ?? "–", units(one.unit)]));
-  $("parameters-caption").textContent = `${fit.starts_agree === 0 ? `None of ${fit.starts} starts around it came as low` : `${fit.starts_agree} of ${fit.starts} starts ended in this minimum`}. –: the data do not determine it, or it is at a bound.`;
+  $("parameters-caption").textContent = `${fit.starts_agree === 0 ? `None of ${fit.starts} starts around it reached it` : `${fit.starts_agree} of ${fit.starts} starts ended in this minimum`}. –: the data do not determine it, or it is at a bound.`;
 }
 
 function choose(k) {

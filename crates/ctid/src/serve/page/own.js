@@ -135,7 +135,7 @@ const toggle = (own, effect, id) => {
   return button(on ? "Remove" : "Add", { id, className: on ? "added" : "primary", ariaLabel: `${on ? "Remove" : "Add"} ${effect}` }, press);
 };
 
-/** What a diagnosis found: the effects, each with its port in words, and what cannot be told from it. */
+/** What a diagnosis found: the effects, each with its port in words, and the effects that cannot be distinguished from it. */
 function findings(own) {
   const found = own.diagnosis;
   const line = (one, id) => make("div", { className: "head" }, make("code", { className: "name" }, one.placed), toggle(own, one.effect, id));
@@ -153,8 +153,8 @@ function findings(own) {
       line(one, `own-found-${k}`),
       make("p", { className: "figures" }, one.sizes.map((size) => make("span", {}, units(size)))),
       make("p", {}, `${one.physics}.`),
-      one.others.length ? [make("p", { className: "caption" }, "These records cannot tell it from:"), make("ul", { className: "others" }, one.others.map((other, l) => make("li", {}, line(other, `own-other-${k}-${l}`),
-        button("What would tell?", { id: `own-tell-${k}-${l}`, ariaLabel: `Which experiment distinguishes ${one.effect} from ${other.effect}?` }, () => experiment.ask({ group: k, between: [one.effect, other.effect] }, fail)))))] : null))) : null,
+      one.others.length ? [make("p", { className: "caption" }, "These records do not distinguish it from:"), make("ul", { className: "others" }, one.others.map((other, l) => make("li", {}, line(other, `own-other-${k}-${l}`),
+        button("Design an experiment", { id: `own-tell-${k}-${l}`, ariaLabel: `Which experiment distinguishes ${one.effect} from ${other.effect}?` }, () => experiment.ask({ group: k, between: [one.effect, other.effect] }, fail)))))] : null))) : null,
     found.sentences.map((sentence) => make("p", {}, units(sentence))),
     make("div", { className: "scroll", tabIndex: 0, role: "region", "aria-label": "How the error fell" }, errors),
     make("p", { className: "caption" }, `${found.candidates} candidates in ${found.seconds.toFixed(1)} s. Simulation error, root mean square.`));

@@ -24,7 +24,7 @@ function limits(signals) {
 
 const inputs = ({ own }) => (own?.signals || []).filter(({ role }) => role === "input");
 
-/** Asks for the experiment that tells two effects of a group apart, within what the plant allows. */
+/** Asks for the experiment that distinguishes two effects of a group, within what the plant allows. */
 export async function ask(what, fail) {
   question = what;
   try {

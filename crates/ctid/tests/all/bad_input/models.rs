@@ -47,7 +47,11 @@ fn an_effect_that_is_no_list() {
 fn an_effect_twice() {
     model_refused(
         model_with("effects = []", "effects = [\"overflow\", \"overflow\"]"),
-        &["bad.toml:2: ", "`overflow` is on already", "remove it once"],
+        &[
+            "bad.toml:2: ",
+            "`overflow` is listed twice",
+            "delete one of them",
+        ],
     );
 }
 

@@ -223,7 +223,7 @@ fn numbers_beyond_all_measure() {
         Rows::new().each(0, |t| 1e-40 * t).text(),
         &[
             "bad.csv, column \"t [s]\"",
-            "the time steps by 2e-40 s",
+            "the sampling interval is 2e-40 s",
             "check the column and its unit",
         ],
     );

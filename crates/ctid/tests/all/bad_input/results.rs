@@ -84,7 +84,7 @@ fn a_result_onto_a_foreign_file() {
             place.refuses(
                 &format!("{command} tour.csv --model tour.toml {result}"),
                 &[
-                    "it is there already, and ctid did not write it",
+                    "the file exists already, and ctid did not write it",
                     "choose another name or delete it",
                 ],
             );

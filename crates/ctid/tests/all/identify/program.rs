@@ -164,6 +164,6 @@ fn a_record_that_stands_still_is_refused() {
     record.inputs[0].values.fill(1.5);
     let request = Request::new(Method::CtRls, FIRST.order());
     let error = identify(&record, &request).unwrap_err().to_string();
-    assert!(error.contains("\"u\" stands at 1.5"), "{error}");
+    assert!(error.contains("\"u\" is constant at 1.5"), "{error}");
     assert!(error.contains("record at least a step"), "{error}");
 }

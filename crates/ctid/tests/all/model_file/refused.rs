@@ -33,8 +33,8 @@ fn an_unknown_effect() {
 fn an_effect_twice() {
     refuses(
         "plant = \"single-tank\"\neffects = [\"overflow\", \"overflow\"]",
-        "tank.toml:2: effect `overflow` is on already",
-        "remove it once",
+        "tank.toml:2: effect `overflow` is listed twice",
+        "delete one of them",
     );
 }
 

@@ -106,7 +106,7 @@ fn a_state_in_which_a_digit_has_changed_is_refused() {
         assert_eq!(outcome.code, Some(2));
         assert_says(
             &outcome,
-            "s.json: it is damaged: its numbers do not agree with its checksum; give --state another name, or delete the file to start again",
+            "s.json: it is damaged: its numbers do not agree with its checksum; use another state file with --state FILE, or delete this one to start again",
         );
     }
 }

@@ -60,7 +60,7 @@ fn a_state_goes_on_where_it_was() {
     refused(
         "--state s.json",
         "0,1,2,3\n",
-        "the state belongs to another model: area: 154 then, 155 now; name another state file",
+        "the state belongs to another model: area: 154 then, 155 now; use another state file",
     );
 }
 

@@ -71,7 +71,7 @@ fn what_cannot_be_exported_is_refused_in_one_line() {
     place.write("mine.mo", "// mine\n");
     place.refuses(
         "export m.toml --modelica mine.mo",
-        &["mine.mo", "it is there already"],
+        &["mine.mo", "the file exists already"],
     );
     place.refuses("export m.toml", &["--modelica", "--csv"]);
     place.refuses("export m.toml --csv c.csv", &["DATA.csv"]);

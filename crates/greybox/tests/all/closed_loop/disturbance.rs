@@ -125,9 +125,7 @@ fn coloured_noise_biases_the_measured_command_and_not_the_loop() {
     let measured = over_records(&rig, 0.9, false, false);
     let simulated = over_records(&rig, 0.9, true, false);
     let in_colour = over_records(&rig, 0.9, true, true);
-    println!(
-        "measured {measured:.3?}, loop {simulated:.3?}, loop in the noise's metric {in_colour:.3?}"
-    );
+    println!("measured {measured:.3?}, loop {simulated:.3?}, loop, prewhitened {in_colour:.3?}");
     assert!(
         measured
             .iter()

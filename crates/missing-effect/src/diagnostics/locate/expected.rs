@@ -7,8 +7,8 @@
 //! samples for one that is independent   1 + 2 sum_h (1 - h/n) rho(h)^2              (the variance of a mean square)
 //! E |X_k|^2/n                           r(0) + 2 sum_h (1 - h/n) r(h) cos(2 pi h k/n)   (a line of the periodogram)
 //! ```
-//! both exact for Gaussian noise, the second with what leaks from other frequencies. Sums of squares are then taken for
-//! chi-square with as many degrees of freedom as have their variance.
+//! both exact for Gaussian noise, the second including leakage from other frequencies. Sums of squares are then treated as
+//! chi-square variables with the number of degrees of freedom that gives their variance.
 //!
 //! **Reference**: M. B. Priestley, Spectral Analysis and Time Series (1981), 5.3.3 and 6.2.2.
 

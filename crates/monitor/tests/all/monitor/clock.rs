@@ -42,7 +42,7 @@ fn gaps_are_said_and_bridged_or_waited_out() {
     assert!(matches!(monitor.progress(), Progress::Watching { .. }));
 }
 
-/// A row whose time lies far ahead, or a clock that starts again, makes the monitor deaf for a hundred rows and no longer.
+/// After a row whose time lies far ahead, or a clock that is reset, the monitor ignores at most a hundred rows.
 #[test]
 fn a_clock_that_goes_back_is_followed() {
     let rows = Tank {
@@ -126,7 +126,7 @@ fn a_plant_that_is_sampled_much_faster_than_it_moves_is_watched_in_blocks() {
     );
 }
 
-/// The promise is in rows: that of a block of rows is as many blocks.
+/// The mean time between false alarms is specified in rows; with blocks of rows it is the same number of blocks.
 #[test]
 fn false_alarms_are_promised_in_rows_whatever_the_blocks() {
     let rows = Tank {

@@ -122,7 +122,8 @@ pub fn placements(plant: Plant) -> Vec<Placed> {
         .collect()
 }
 
-/// Effects whose output is a staircase of some parameter: its slope at a point says nothing, so they carry that of a chord.
+/// Effects whose output is a staircase function of some parameter. Its derivative at a point is useless, so they return the slope of a
+/// secant.
 pub const STEPPED: [&str; 2] = ["stiction_backlash", "coarse_quantisation"];
 
 /// An effect that begins with a root at a level: a Runge-Kutta step across the level is of order one and a half, and a difference across it

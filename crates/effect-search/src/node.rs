@@ -82,19 +82,9 @@ impl Context<'_> {
 
     /// A model against the fitted records.
     pub fn setup<'b>(&'b self, model: &'b Model) -> Result<ModelSetup<'b>, Error> {
-        self.setup_with(model, BTreeMap::new())
-    }
-
-    /// A model against the fitted records, with further parameters that are not fitted.
-    fn setup_with<'b>(
-        &'b self,
-        model: &'b Model,
-        further: BTreeMap<String, f64>,
-    ) -> Result<ModelSetup<'b>, Error> {
         let problem = self.problem;
         // Effects of the model file may have fixed parameters too, but not all sets contain these effects.
-        let mut known = of_model(model, &problem.known);
-        known.extend(further);
+        let known = of_model(model, &problem.known);
         let priors = of_model(model, &problem.priors);
         let setup = ModelSetup::new(model, &problem.records, &known, problem.time_unit)?;
         let setup = setup.with_tolerance(self.tolerance);
@@ -180,21 +170,12 @@ impl Context<'_> {
 
     /// Minimum of a model that is fitted from its own starts with white noise.
     pub fn own_minimum(&self, model: &Model) -> Result<Vec<f64>, Error> {
-        self.own_minimum_with(model, BTreeMap::new())
-    }
-
-    /// [`Self::own_minimum`] with further parameters that are not fitted.
-    pub fn own_minimum_with(
-        &self,
-        model: &Model,
-        further: BTreeMap<String, f64>,
-    ) -> Result<Vec<f64>, Error> {
         let options = FitOptions {
             starts: self.thresholds.own_starts,
             stopping: ROUGH,
             ..FitOptions::default()
         };
-        Ok(self.setup_with(model, further)?.fit(&options)?.x)
+        Ok(self.setup(model)?.fit(&options)?.x)
     }
 
     /// The vector of a set as a start of another set: additional parameters have their start values.

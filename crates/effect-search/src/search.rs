@@ -63,12 +63,7 @@ impl Context<'_> {
 
     /// The best single effects fitted again from their own starts. If the believed model has no minimum within its bounds, the fits of
     /// single effects start at its end point, which may be unfavourable. `known`: fits of single effects with another weighting.
-    fn refit_from_own_starts(
-        &self,
-        nodes: &mut [Node],
-        (trials, known): (&[Trial], &[Node]),
-        noise: &Noise,
-    ) {
+    fn refit_from_own_starts(&self, nodes: &mut [Node], known: &[Node], noise: &Noise) {
         nodes
             .par_iter_mut()
             .take(self.thresholds.own_start_refits)
@@ -76,13 +71,13 @@ impl Context<'_> {
                 if self.limit.passed() {
                     return;
                 }
-                let starts = match known.iter().find(|known| known.added == node.added) {
-                    Some(known) => vec![known.fit.x.clone()],
-                    None => self.own_minima(node, trials),
+                let start = match known.iter().find(|known| known.added == node.added) {
+                    Some(known) => Ok(known.fit.x.clone()),
+                    None => self.own_minimum(&node.model),
                 };
                 let added = node.added.clone();
                 let model = node.model.clone();
-                let again = self.fitted(added, model, starts, noise, ROUGH);
+                let again = start.and_then(|x| self.fitted(added, model, vec![x], noise, ROUGH));
                 if let Ok(again) = again
                     && again.fit.cost < node.fit.cost
                 {
@@ -90,31 +85,6 @@ impl Context<'_> {
                 }
             });
         sort_by_criterion(nodes);
-    }
-
-    /// Minima of a set with one effect from its own starts: those of all parameters together and, for an effect with a threshold, those with
-    /// the effect held at each of its starts. Away from its threshold an effect has no derivative by it, so that a fit does not find it.
-    fn own_minima(&self, node: &Node, trials: &[Trial]) -> Vec<Vec<f64>> {
-        let mut minima: Vec<Vec<f64>> = self.own_minimum(&node.model).into_iter().collect();
-        let Some(&last) = node.added.last() else {
-            return minima;
-        };
-        let candidate = &self.candidates[last];
-        let trial = trials.iter().find(|trial| trial.candidate == last);
-        if let Some(trial) = trial.filter(|_| !candidate.is_smooth()) {
-            let parameters = node.spec().parameters.iter();
-            let own = parameters.enumerate().filter_map(|(at, parameter)| {
-                let name = &parameter.about.name;
-                let own = candidate.parameters.iter().any(|own| own.name == *name);
-                own.then(|| (at, name.clone()))
-            });
-            let own: Vec<(usize, String)> = own.collect();
-            minima.extend(trial.starts.iter().filter_map(|start| {
-                let held = own.iter().map(|(at, name)| (name.clone(), start[*at]));
-                self.own_minimum_with(&node.model, held.collect()).ok()
-            }));
-        }
-        minima
     }
 
     /// The search of sets up to a given number of effects. `of`: positions of the candidates; `known`: fits of single effects with another
@@ -130,7 +100,7 @@ impl Context<'_> {
         let best = &trials[..trials.len().min(self.thresholds.first_refits)];
         let mut singles = self.refits(&base, best, noise);
         if self.is_open(&base) {
-            self.refit_from_own_starts(&mut singles, (&trials, known), noise);
+            self.refit_from_own_starts(&mut singles, known, noise);
         }
         let mut beam: Vec<Node> = Vec::new();
         if max_effects > 0 {

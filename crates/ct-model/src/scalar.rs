@@ -110,10 +110,11 @@ impl<const N: usize> Dual<N> {
     /// `f(self)` with the value `re` and the derivative `slope` of `f`.
     #[inline(always)]
     fn chain(self, re: f64, slope: f64) -> Self {
-        Self {
-            re,
-            eps: std::array::from_fn(|i| self.eps[i] * slope),
+        let mut eps = [0.0; N];
+        for i in 0..N {
+            eps[i] = self.eps[i] * slope;
         }
+        Self { re, eps }
     }
 }
 
@@ -163,13 +164,10 @@ impl<const N: usize> Scalar for Dual<N> {
     }
     #[inline]
     fn with_slopes<const K: usize>(value: f64, of: [(Self, f64); K]) -> Self {
-        let mut eps = match of.first() {
-            Some((by, slope)) => std::array::from_fn(|i| by.eps[i] * slope),
-            None => [0.0; N],
-        };
-        for (by, slope) in of.iter().skip(1) {
-            for (eps, by) in eps.iter_mut().zip(&by.eps) {
-                *eps += by * slope;
+        let mut eps = [0.0; N];
+        for (by, slope) in &of {
+            for i in 0..N {
+                eps[i] += by.eps[i] * slope;
             }
         }
         Self { re: value, eps }
@@ -190,10 +188,11 @@ macro_rules! operator {
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
                 let ($a, $b) = (&self, &other);
-                Self {
-                    re: $re,
-                    eps: std::array::from_fn(|$i| $eps),
+                let mut eps = [0.0; N];
+                for $i in 0..N {
+                    eps[$i] = $eps;
                 }
+                Self { re: $re, eps }
             }
         }
     };
@@ -210,10 +209,11 @@ impl<const N: usize> Div for Dual<N> {
     fn div(self, other: Self) -> Self {
         let re = self.re / other.re;
         let inverse = 1.0 / other.re;
-        Self {
-            re,
-            eps: std::array::from_fn(|i| (self.eps[i] - re * other.eps[i]) * inverse),
+        let mut eps = [0.0; N];
+        for i in 0..N {
+            eps[i] = (self.eps[i] - re * other.eps[i]) * inverse;
         }
+        Self { re, eps }
     }
 }
 

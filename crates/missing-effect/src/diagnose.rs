@@ -172,6 +172,8 @@ fn diagnose_whole(
                 };
                 course = test.course(&tested.node)?;
                 groups = test.groups(course.last())?;
+                // In the order of the error ladder.
+                acceptance.effects = ids(&course.last().added);
                 refused = None;
                 partial = true;
             }

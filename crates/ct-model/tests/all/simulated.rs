@@ -394,3 +394,44 @@ fn exact_and_small_steps_agree() {
         assert!(off < 1e-10, "row {k}: {off:e}");
     }
 }
+
+#[test]
+fn the_error_follows_the_tolerance() {
+    let Case {
+        model,
+        time,
+        inputs,
+        ..
+    } = cut_out();
+    let parameters = model.parameters();
+    let initial = model.starts(&parameters);
+    let run = |tolerance: Option<f64>| {
+        let mut simulation = Simulation::new(&model, &parameters, &initial, 0.0);
+        if let Some(tolerance) = tolerance {
+            simulation = simulation.with_tolerance(tolerance);
+        }
+        let mut y = vec![0.0; model.spec().outputs.len()];
+        let rows = (0..time.len()).map(|k| {
+            simulation.read(&inputs[k], &mut y);
+            if k + 1 < time.len() {
+                simulation
+                    .advance(&inputs[k], &inputs[k], time[k + 1])
+                    .unwrap();
+            }
+            y.clone()
+        });
+        rows.collect::<Vec<_>>()
+    };
+    let fine = run(Some(1e-13));
+    let error = |rows: &[Vec<f64>]| {
+        let pairs = rows.iter().zip(&fine);
+        let worst = pairs.map(|(row, fine)| (row[0] - fine[0]).abs());
+        worst.fold(0.0, f64::max) / Case::range(&fine, 0)
+    };
+    assert_eq!(run(None), run(Some(ct_model::TOLERANCE)));
+    let errors = [1e-4, 1e-7, 1e-10].map(|tolerance| error(&run(Some(tolerance))));
+    for (error, most) in errors.into_iter().zip([1e-2, 1e-5, 1e-8]) {
+        assert!(error < most, "{errors:?}");
+    }
+    assert!(errors[0] > 1e3 * errors[2], "{errors:?}");
+}

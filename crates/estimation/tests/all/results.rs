@@ -1,8 +1,8 @@
 //! A fit is written as JSON and read again, and results cross threads.
 
 use estimation::{
-    Error, Fit, Noise, Residuals, Robust, Sample, Squares, Stopping, Triangle, coloured, fit_from,
-    prewhitened,
+    Error, Fit, Noise, Residuals, Robust, Sample, Squares, Start, Stopping, Triangle, coloured,
+    fit_from, fit_from_best, prewhitened,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -104,3 +104,66 @@ const _: () = {
     crosses::<Triangle>();
     crosses::<Error>();
 };
+
+/// `y = sin(x_0 t)`: each multiple of the frequency is a local minimum.
+struct Sine(Vec<f64>, std::sync::atomic::AtomicUsize);
+
+impl Residuals for Sine {
+    fn free(&self) -> &[usize] {
+        &[0]
+    }
+    fn bounds(&self) -> &[(f64, f64)] {
+        &[(0.01, 10.0)]
+    }
+    fn samples(&self) -> &[usize] {
+        std::slice::from_ref(&400)
+    }
+    fn each_row(&self, x: &[f64], mut each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
+        self.1.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        for (k, y) in self.0.iter().enumerate() {
+            let t = 0.1 * k as f64;
+            let sample = Sample {
+                output: 0,
+                first: k == 0,
+                missing: false,
+            };
+            let (sin, cos) = (x[0] * t).sin_cos();
+            each(sample, &mut [t * cos, y - sin]).then_some(())?;
+        }
+        Some(())
+    }
+    fn each_residual(
+        &self,
+        x: &[f64],
+        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        self.each_row(x, |sample, row| each(sample, &mut row[1..]))
+    }
+}
+
+#[test]
+fn only_starts_near_the_best_continue() {
+    let y: Vec<f64> = (0..400)
+        .map(|k| (0.13 * f64::from(k)).sin() + 1e-3 * f64::from(k * 7919 % 13))
+        .collect();
+    let stopping = Stopping {
+        evaluations: 120,
+        cost: 1e-12,
+    };
+    let starts = || -> Vec<Start> {
+        let all = (1..=40).map(|k| vec![0.1 * f64::from(k)].into());
+        all.collect()
+    };
+    let of = |fit: fn(&Sine, Vec<Start>, &Noise, Stopping) -> Result<Fit, Error>| {
+        let sine = Sine(y.clone(), 0.into());
+        let fit = fit(&sine, starts(), &Noise::white(1), stopping).unwrap();
+        (fit, sine.1.into_inner())
+    };
+    let (all, evaluations) = of(|a, b, c, d| fit_from(a, b, c, d));
+    let (best, fewer) = of(|a, b, c, d| fit_from_best(a, b, c, d));
+    assert!((best.x[0] - 1.3).abs() < 1e-3, "{:?}", best.x);
+    assert!((best.x[0] - all.x[0]).abs() < 1e-9);
+    // The starts that were given up count, and none of them agrees.
+    assert_eq!((best.starts, best.agree), (40, all.agree));
+    assert!(fewer <= evaluations + 2, "{fewer} instead of {evaluations}");
+}

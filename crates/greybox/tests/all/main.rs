@@ -18,3 +18,4 @@ mod sandwich;
 mod support;
 mod threads;
 mod three_tank;
+mod tolerance;

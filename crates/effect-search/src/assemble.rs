@@ -14,6 +14,7 @@ use crate::search::Grown;
 use crate::{Error, held_out};
 
 /// A result.
+#[derive(Clone)]
 pub(crate) struct Finding<'a> {
     /// The believed model.
     pub base: &'a Node,

@@ -91,7 +91,7 @@ pub(crate) fn begin<'a>(
         let fit = setup.fit(&fit_options)?;
         let visited = visited(problem, &setup, &fit)?;
         let noise = setup.output_noise(&fit.x);
-        let tolerance = noise.map(|noise| setup.sufficient_tolerance(&noise));
+        let tolerance = noise.map(|noise| setup.sufficient_tolerance(&fit.x, &noise));
         (fit, visited, tolerance)
     };
     context.tolerance = tolerance.unwrap_or(ct_model::TOLERANCE);

@@ -174,27 +174,28 @@ pub fn diagnose(
         _ => None,
     };
     let (seconds, left_out) = (context.limit.seconds(), context.limit.left_out());
-    let context = Context {
-        limit: context.limit.of_report(),
-        tolerance: ct_model::TOLERANCE,
-        ..context
+    let report = |tolerance: f64, finding: Finding| {
+        let context = Context {
+            limit: context.limit.of_report(),
+            tolerance,
+            ..context.clone()
+        };
+        assemble(&context, &grown, finding)
     };
-    assemble(
-        &context,
-        &grown,
-        Finding {
-            base: &base,
-            last: &confirmed,
-            own: &last_fit,
-            unknown,
-            verdict,
-            groups,
-            not_noise,
-            share,
-            seconds,
-            left_out,
-        },
-    )
+    let finding = Finding {
+        base: &base,
+        last: &confirmed,
+        own: &last_fit,
+        unknown,
+        verdict,
+        groups,
+        not_noise,
+        share,
+        seconds,
+        left_out,
+    };
+    // A state that grows may use more steps than there may be with this tolerance.
+    report(ct_model::TOLERANCE, finding.clone()).or_else(|_| report(context.tolerance, finding))
 }
 
 /// The search with prewhitened fits, if the noise model is not white.

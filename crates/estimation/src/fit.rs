@@ -17,6 +17,8 @@ use crate::{
 
 /// Two results are the same minimum if twice the logarithm of their likelihood ratio is below this.
 const SAME_MINIMUM: f64 = 0.1;
+/// Largest relative distance of a converged fit from its minimum, in multiples of [`Stopping::cost`].
+const UNFINISHED: f64 = 100.0;
 /// Evaluations of each of many starts, after which only the best continue, ...
 const FIRST_EVALUATIONS: usize = 30;
 /// ... those whose cost is at most this multiple of the best one's: about twice its simulation error.
@@ -244,25 +246,33 @@ pub fn fit_from_best(
     stopping: Stopping,
 ) -> Result<Fit, Error> {
     let count = starts.len();
+    if count < 2 || stopping.evaluations <= FIRST_EVALUATIONS {
+        return fit_from(model, starts, noise, stopping);
+    }
     let first = Stopping {
-        evaluations: stopping.evaluations.min(FIRST_EVALUATIONS),
+        evaluations: FIRST_EVALUATIONS,
         ..stopping
     };
-    let ends = minima(model, starts, noise, first);
+    let mut ends = minima(model, starts, noise, first);
+    // After the time limit only the first start is used.
+    ends.sort_by(|a, b| a.1.triangle.cost().total_cmp(&b.1.triangle.cost()));
     let most = WORSE * least_cost(&ends);
     let near = ends.into_iter().filter_map(|(x, minimum)| {
-        let start = Start {
+        let triangle = minimum.triangle;
+        (triangle.cost() <= most).then_some(Start {
             x,
-            triangle: Some(minimum.triangle),
-        };
-        let triangle = start.triangle.as_ref()?;
-        (triangle.cost() <= most).then_some(start)
+            triangle: Some(triangle),
+        })
     });
     let near: Vec<Start> = near.collect();
     if near.is_empty() {
         return Err(Error::NoFiniteStart { starts: count });
     }
-    let mut fit = fit_from(model, near, noise, stopping)?;
+    let rest = Stopping {
+        evaluations: stopping.evaluations - FIRST_EVALUATIONS,
+        ..stopping
+    };
+    let mut fit = fit_from(model, near, noise, rest)?;
     fit.starts = count;
     Ok(fit)
 }
@@ -281,9 +291,12 @@ pub fn fit_from(
     let count = starts.len();
     let minima = minima(model, starts, noise, stopping);
     let best = least_cost(&minima);
-    // Results with nearly equal likelihood count as one minimum.
+    // Results with nearly equal likelihood, or that more evaluations would make equal, count as one minimum.
     let samples: usize = model.samples().iter().sum();
-    let same = best * (SAME_MINIMUM / samples as f64).exp();
+    let same = best
+        * (SAME_MINIMUM / samples as f64)
+            .max(UNFINISHED * stopping.cost)
+            .exp();
     let agree = minima
         .iter()
         .filter(|(_, minimum)| minimum.triangle.cost() <= same)

@@ -49,8 +49,8 @@ const WEIGHTINGS: usize = 3;
 const START_TOLERANCE: f64 = 1e-7;
 /// ... and the least relative fall of their cost.
 const START_COST: f64 = 1e-6;
-/// Tolerance of a step, as a share of the noise: over a record, the errors of the steps are then small beside the noise.
-const OF_NOISE: f64 = 1e-4;
+/// Largest change of an output by the tolerance of the simulation, as a share of its noise.
+const OF_NOISE: f64 = 1e-2;
 
 impl<'a> ModelSetup<'a> {
     /// Adds a time limit: once it has passed, or `interrupt` is set, fits take no further steps.
@@ -86,7 +86,7 @@ impl<'a> ModelSetup<'a> {
         let known: BTreeMap<String, f64> = known.zip(x.iter().copied()).collect();
         let mut setup = ModelSetup::new(self.model, records, &known, self.time_unit)?;
         setup.clock = self.clock.with_records(records);
-        Ok(setup.limited_as(self))
+        Ok(setup.with_tolerance(self.tolerance).limited_as(self))
     }
 
     /// The model, clock and fitted parameters with other records, without priors.
@@ -100,7 +100,7 @@ impl<'a> ModelSetup<'a> {
         let known = self.known();
         let mut setup = ModelSetup::new(self.model, records, &known, self.time_unit)?;
         setup.clock = self.clock.with_records(records);
-        Ok(setup.limited_as(self))
+        Ok(setup.with_tolerance(self.tolerance).limited_as(self))
     }
 
     /// Parameters that are not fitted.
@@ -183,23 +183,30 @@ impl<'a> ModelSetup<'a> {
         Self { tolerance, ..self }
     }
 
-    /// The tolerance that is sufficient for fits in this noise, the standard deviation at each output: the errors of the simulation are
-    /// small beside it.
+    /// The largest tolerance, up to 1e-7, with which the outputs change by at most a hundredth of their noise, the standard deviation at each
+    /// output: that of [`ct_model::TOLERANCE`] where no larger one is sufficient, or the simulation is not finite.
     #[must_use]
-    pub fn sufficient_tolerance(&self, noise: &[f64]) -> f64 {
-        let largest = |o: usize| {
-            let all = self
-                .records
-                .iter()
-                .flat_map(move |r| r.outputs[o].present());
-            all.fold(0.0, |largest: f64, y| largest.max(y.abs()))
+    pub fn sufficient_tolerance(&self, x: &[f64], noise: &[f64]) -> f64 {
+        let with = |tolerance: f64| self.clone().with_tolerance(tolerance).simulate(x);
+        let Some(exact) = with(ct_model::TOLERANCE) else {
+            return ct_model::TOLERANCE;
         };
-        let shares = noise
-            .iter()
-            .enumerate()
-            .map(|(o, noise)| noise / largest(o));
-        let least = shares.filter(|share| share.is_finite()).fold(1.0, f64::min);
-        (OF_NOISE * least).clamp(ct_model::TOLERANCE, START_TOLERANCE)
+        let is_sufficient = |found: Vec<Vec<f64>>| {
+            let series = found.iter().zip(&exact).zip(noise.iter().cycle());
+            let mut changes = series.flat_map(|((found, exact), noise)| {
+                let pairs = found.iter().zip(exact);
+                pairs.map(move |(found, exact)| (found - exact).abs() / noise)
+            });
+            changes.all(|change| change <= OF_NOISE)
+        };
+        let mut tolerance = START_TOLERANCE;
+        while tolerance > 2.0 * ct_model::TOLERANCE {
+            if with(tolerance).is_some_and(is_sufficient) {
+                return tolerance;
+            }
+            tolerance /= 10.0;
+        }
+        ct_model::TOLERANCE
     }
 
     /// Standard deviation of the noise of each output, from a linear prediction from the past, which is nearly independent of model errors;
@@ -329,9 +336,21 @@ impl<'a> ModelSetup<'a> {
             };
         }
         setup.tolerance = self.tolerance;
-        let end = vec![fit.x.clone().into()];
-        let exact = estimation::fit_from(&setup, end, &white, options.stopping)?;
-        Ok(exact.continuing(&fit))
+        let end: Start = fit.x.clone().into();
+        let exact = estimation::fit_from(&setup, vec![end.clone()], &white, options.stopping);
+        match exact {
+            Ok(exact) => Ok(exact.continuing(&fit)),
+            // A state that grows may use more steps than there may be.
+            Err(_) => {
+                let from = std::iter::once(end).chain(starts).collect();
+                Ok(estimation::fit_from(
+                    &setup,
+                    from,
+                    &white,
+                    options.stopping,
+                )?)
+            }
+        }
     }
 
     /// The uncertainty of a fit under the noise of its residual, of order zero to `order` at each output ([`estimation::robust`]):

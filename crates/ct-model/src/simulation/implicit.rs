@@ -34,8 +34,8 @@ const NEWTON_STEPS: usize = 15;
 /// Values have converged below this share of the tolerance; derivatives converge one iteration later.
 const CONVERGED: f64 = 1e-3;
 
-/// Perturbation for finite differences, in tolerances: about 1e-7 of a state's size.
-const DIFFERENCE: f64 = 1e3;
+/// Perturbation for finite differences, as a share of a state's size.
+const DIFFERENCE: f64 = 1e-7;
 
 /// Number of columns of the Jacobian that are computed together, as derivatives of one dual.
 const LANES: usize = 4;
@@ -85,11 +85,11 @@ impl Jacobian {
         work: &mut Step<T>,
         drive: &Drive<'_, T>,
         (time, x): (T, &[T]),
-        scale: &[f64],
+        (scale, tolerance): (&[f64], f64),
     ) {
         let mut moved = x.to_vec();
         for (j, scale) in scale.iter().enumerate() {
-            let by = DIFFERENCE * scale;
+            let by = DIFFERENCE * scale / tolerance;
             moved[j] = x[j] + by;
             drive.load(tape, work, time, &moved);
             work.evaluate_slopes(tape, drive);
@@ -117,7 +117,7 @@ pub(super) fn step<T: Scalar>(
     jacobian: &mut Jacobian,
     drive: &Drive<'_, T>,
     (time, x, h): (T, &[T], T),
-    scale: &[f64],
+    (scale, tolerance): (&[f64], f64),
 ) -> Option<f64> {
     let n = x.len();
     drive.load(tape, work, time, x);
@@ -127,7 +127,7 @@ pub(super) fn step<T: Scalar>(
     if work.sliding.is_empty() {
         jacobian.compute(tape, &work.registers);
     } else {
-        jacobian.compute_sliding(tape, work, drive, (time, x), scale);
+        jacobian.compute_sliding(tape, work, drive, (time, x), (scale, tolerance));
     }
     let newton = DMatrix::identity(n, n) - &jacobian.matrix * (GAMMA * h.value());
     let inverse = newton.try_inverse()?;

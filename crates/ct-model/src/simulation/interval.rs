@@ -295,7 +295,8 @@ impl<T: Scalar> SimulationState<T> {
         let at = (self.time, &self.state[..], h);
         match (&mut self.jacobian, self.method) {
             (Some(jacobian), Method::Implicit) => {
-                implicit::step(tape, &mut self.work, jacobian, &drive, at, &self.scale)
+                let scale = (&self.scale[..], self.tolerance);
+                implicit::step(tape, &mut self.work, jacobian, &drive, at, scale)
                     .unwrap_or(f64::NAN)
             }
             _ => {

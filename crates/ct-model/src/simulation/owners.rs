@@ -4,6 +4,9 @@ use std::sync::Arc;
 
 use super::{Method, Model, NoSolution, SimulationNumber, SimulationState};
 
+/// Below this, rounding alone would exceed the tolerance of a step.
+const LEAST_TOLERANCE: f64 = 1e-14;
+
 /// A simulation in progress, which borrows its model.
 ///
 /// No memory is allocated from sample to sample, except for the past of delayed expressions.
@@ -25,11 +28,11 @@ impl<'a, T: SimulationNumber> Simulation<'a, T> {
         }
     }
 
-    /// Sets the tolerance of a step, as a share of the largest absolute value that a state has had ([`TOLERANCE`](super::TOLERANCE) if it is
-    /// not set). Exact steps of linear models do not depend on it.
+    /// Sets the tolerance of a step, as a share of the largest absolute value that a state has had: [`TOLERANCE`](super::TOLERANCE) if it is
+    /// not set, and at least 1e-14. Exact steps of linear models do not depend on it.
     #[must_use]
     pub fn with_tolerance(mut self, tolerance: f64) -> Self {
-        self.state.tolerance = tolerance;
+        self.state.tolerance = tolerance.max(LEAST_TOLERANCE);
         self
     }
 

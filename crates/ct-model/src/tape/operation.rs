@@ -56,6 +56,10 @@ pub(super) fn run<T: Scalar>(
     extended: bool,
 ) {
     for &(operation, to) in operations {
+        debug_assert!(
+            to < values.len(),
+            "an operation reads only what is before its result"
+        );
         let (before, after) = values.split_at_mut(to);
         if let Some(to) = after.first_mut() {
             operation.write(before, to, extended);

@@ -178,7 +178,12 @@ fn expressions() {
     refuses("  Real q = if x > 0 then 1;", 27, "`;` where `else`", "");
     refuses("  Real q = (x + 1;", 18, "`;` where `)`", "");
     refuses("  Real q = x +;", 15, "`;` where a number", "");
-    refuses("  Real q = sinh(x);", 12, "`sinh` is no function", "tanh");
+    refuses(
+        "  Real q = sinh(x);",
+        12,
+        "`sinh` is not a supported function",
+        "tanh",
+    );
     refuses(
         "  Real q = sin(x, x);",
         12,
@@ -306,7 +311,12 @@ fn outside_the_subset() {
         "packages",
     );
     refuses("  Resistor r;", 3, "`Resistor` is no type", "`Real`");
-    refuses("  extends Base;", 3, "`extends`: a model is one text", "");
+    refuses(
+        "  extends Base;",
+        3,
+        "`extends`: a model is a single text",
+        "",
+    );
     refuses(
         "  annotation(x=1);",
         3,

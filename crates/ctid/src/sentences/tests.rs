@@ -141,7 +141,7 @@ fn the_order_of_remarks_does_not_depend_on_that_of_the_values() {
         position("The loop is simulated from its reference"),
     ];
     assert!(order.is_sorted(), "{order:?}: {said:#?}");
-    assert!(said[order[7]].contains("to 0.0123 V rms"));
+    assert!(said[order[7]].contains("by 0.0123 V rms"));
 }
 
 /// A result that an earlier version wrote has no reason.

@@ -165,5 +165,6 @@ fn only_starts_near_the_best_continue() {
     assert!((best.x[0] - all.x[0]).abs() < 1e-9);
     // The starts that were given up count, and none of them agrees.
     assert_eq!((best.starts, best.agree), (40, all.agree));
-    assert!(fewer <= evaluations + 2, "{fewer} instead of {evaluations}");
+    assert!(best.agree > 1 && best.agree < 10, "{}", best.agree);
+    assert!(2 * fewer < evaluations, "{fewer} instead of {evaluations}");
 }

@@ -1,5 +1,10 @@
 //! Numbers that a simulation runs on: plain `f64`, or forward duals that carry exact derivatives.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "iterators over two or three arrays take many times as long to compile"
+)]
+
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Number type of the simulator. Comparisons use [`Scalar::value`]: the value alone selects a branch, and the derivative is that of the
@@ -174,7 +179,8 @@ impl<const N: usize> Scalar for Dual<N> {
     }
 }
 
-/// The operators build the result in one pass: modifying a copy by value would cost a `memcpy` each.
+/// The operators build the result in one pass, by a loop: modifying a copy by value would cost a `memcpy` each, and closures for
+/// `array::from_fn` most of the time to compile the crate.
 macro_rules! operator {
     ($trait:ident, $method:ident, |$a:ident, $b:ident| $re:expr, |$i:ident| $eps:expr) => {
         #[allow(

@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use ct_model::{Dual, Given, Model, ModelSpec, Scalar, Simulation, SimulationNumber};
+use ct_model::{Dual, Given, Model, ModelSpec, Scalar, Simulation, SimulationNumber, TOLERANCE};
 use plants::{Command, Known, Plant, Scales, Simulator, SimulatorNumber, Structure};
 
 const SAMPLES: usize = 1000;
@@ -75,8 +75,16 @@ fn kernel<T: SimulatorNumber>(
     Some(sum)
 }
 
+/// Error of a kernel's step, and the tolerance of a text with the same error.
+const OF_KERNELS: f64 = 1e-7;
+
 /// The fitted parameters are `theta`, the others those of the model.
-fn text<T: SimulationNumber>(model: &Model, interval: f64, theta: &[T], levels: &[T]) -> Option<T> {
+fn text<T: SimulationNumber>(
+    model: &Model,
+    (interval, tolerance): (f64, f64),
+    theta: &[T],
+    levels: &[T],
+) -> Option<T> {
     let spec = model.spec();
     let mut fitted = theta.iter().copied();
     let parameters: Vec<T> = spec
@@ -87,7 +95,8 @@ fn text<T: SimulationNumber>(model: &Model, interval: f64, theta: &[T], levels: 
             _ => Some(T::constant(parameter.value)),
         })
         .collect::<Option<_>>()?;
-    let mut simulation = Simulation::new(model, &parameters, levels, 0.0);
+    let simulation = Simulation::new(model, &parameters, levels, 0.0);
+    let mut simulation = simulation.with_tolerance(tolerance);
     let mut read = vec![T::constant(0.0); spec.outputs.len()];
     let mut sum = T::constant(0.0);
     for k in 0..SAMPLES {
@@ -133,15 +142,18 @@ fn plants_both_ways(criterion: &mut Criterion) {
         group.bench_function("kernel, f64", |b| {
             b.iter(|| kernel(black_box(&structure), rig, rig.theta, rig.levels));
         });
-        group.bench_function("text, f64", |b| {
-            b.iter(|| text(black_box(&model), rig.interval, rig.theta, rig.levels));
-        });
         group.bench_function("kernel, 8 derivatives", |b| {
             b.iter(|| kernel(black_box(&structure), rig, &theta, &levels));
         });
-        group.bench_function("text, 8 derivatives", |b| {
-            b.iter(|| text(black_box(&model), rig.interval, &theta, &levels));
-        });
+        for tolerance in [OF_KERNELS, TOLERANCE] {
+            let steps = (rig.interval, tolerance);
+            group.bench_function(format!("text to {tolerance:e}, f64"), |b| {
+                b.iter(|| text(black_box(&model), steps, rig.theta, rig.levels));
+            });
+            group.bench_function(format!("text to {tolerance:e}, 8 derivatives"), |b| {
+                b.iter(|| text(black_box(&model), steps, &theta, &levels));
+            });
+        }
         group.finish();
     }
 }
@@ -188,10 +200,10 @@ fn others(criterion: &mut Criterion) {
         let levels = model.starts(&theta);
         let (d8, l8) = (duals::<8>(&theta, 0), duals::<8>(&levels, theta.len()));
         group.bench_function(format!("{name}, f64"), |b| {
-            b.iter(|| text(black_box(&model), interval, &theta, &levels));
+            b.iter(|| text(black_box(&model), (interval, TOLERANCE), &theta, &levels));
         });
         group.bench_function(format!("{name}, 8 derivatives"), |b| {
-            b.iter(|| text(black_box(&model), interval, &d8, &l8));
+            b.iter(|| text(black_box(&model), (interval, TOLERANCE), &d8, &l8));
         });
     }
     group.finish();

@@ -234,8 +234,8 @@ impl Fit {
     }
 }
 
-/// [`fit_from`], but after [`FIRST_EVALUATIONS`] only the starts whose cost is at most [`WORSE`] times the best continue: a start far from
-/// any minimum would use all evaluations, and seldom end in the best one.
+/// [`fit_from`], but after 30 evaluations only the starts whose cost is at most four times the best continue: a start far from any minimum
+/// would use all evaluations, and seldom end in the best one.
 ///
 /// # Errors
 /// As [`fit_from`].

@@ -398,7 +398,7 @@ fn exact_and_small_steps_agree() {
 #[test]
 fn the_error_follows_the_tolerance() {
     // A motor whose friction has a sharp bend, with many steps in each interval.
-    let model = support::model(
+    let model = crate::support::model(
         "model Motor
   parameter Real gain = 100;
   parameter Real b = 2;

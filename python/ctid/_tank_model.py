@@ -174,7 +174,7 @@ class TankModel(Model):
         time_unit: float = 1.0,
         units: tuple[str, str] | None = None,
     ) -> Monitor:
-        """The plant beside a running one, as `ctid monitor` watches it; see `Model.monitor`. It learns its values from the first rows.
+        """A monitor that runs the model beside the running plant, as `ctid monitor` watches it; see `Model.monitor`. It learns its values from the first rows.
 
         `units`: of the command and of the readings, such as `("V", "cm")`; without them those of the fitted records or of the columns. The signals
         of the rows are the columns; without them `u` and `y`, of several levels `level_upper` and `level_lower`. Raises `ModelError`.

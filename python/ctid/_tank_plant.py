@@ -27,7 +27,7 @@ def linearized(tank: _ctid.Tank, values: Mapping[str, float], at: Mapping[str, f
 def monitored(
     tank: _ctid.Tank, units: tuple[str, str], false_alarm_every: float, learn: int, time_unit: float
 ) -> Monitor:
-    """A plant beside a running one; `units` are those of the command and of the readings."""
+    """A monitor that runs the model beside the running plant; `units`: of the command and of the readings."""
     if time_unit != 1.0:
         raise ModelError(f"{tank.name}: the time of a plant is in s, leave time_unit out")
     return Monitor(tank.monitor(units, float(false_alarm_every), int(learn)))

@@ -45,7 +45,7 @@ const DEPENDENT: f64 = 1e-13;
 /// Rounding error of a step, as a share of its length.
 const WAY: f64 = 16.0 * f64::EPSILON;
 
-/// Steps for each row and parameter before the search is stopped; a few in all are usual.
+/// Largest number of iterations of the active-set method, times the number of constraints and parameters; a few iterations in all are usual.
 const STEPS: usize = 20;
 
 /// Moves the estimates to the nearest point that satisfies all `rows`; weights have no influence. Returns whether the estimates changed.
@@ -172,7 +172,8 @@ struct Active {
     lambda: f64,
 }
 
-/// The row that is violated most for its size, its side and its excess; not finite where that is beyond the floating-point range.
+/// The constraint with the largest violation relative to the size of its terms: its index, the sign of the violated bound, and the
+/// violation, which is infinite if it overflows.
 fn most_violated<const P: usize, const N: usize>(
     rows: &[Interval<P>; N],
     theta: &SVector<f64, P>,

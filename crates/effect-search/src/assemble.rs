@@ -60,8 +60,8 @@ pub(crate) fn assemble(
         }
     };
     let floors: Vec<f64> = own.noise.iter().map(level).collect();
-    // Outputs are weighted by their noise. Errors are compared with a single weighting, that of the simulation error; the last model is
-    // weighted by its own noise model if its residual is noise.
+    // All models of the error ladder are fitted with white noise, each output scaled by its noise, so that their errors are comparable. The
+    // last model is fitted again with its own noise model if its residual is noise.
     let white = Noise::white(outputs.len());
     let weighted = Context {
         scales: (outputs.len() > 1).then(|| floors.clone()),

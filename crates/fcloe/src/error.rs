@@ -98,7 +98,7 @@ pub enum Error {
     },
     /// A record without u for a regression.
     #[error(
-        "{record}: there is no input u, which a regression needs in closed loop too; give it, or start from a plant of your own"
+        "{record}: there is no input u, which the regression for the initial model needs in closed loop too; add it, or give an initial model"
     )]
     RegressionWithoutInput {
         /// The record's name.

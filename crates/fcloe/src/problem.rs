@@ -47,9 +47,9 @@ struct Prepared {
     lacks_readings: bool,
     /// The operating point of the two.
     levels: Levels,
-    /// First of the record's two columns, if its offsets are estimated.
+    /// Index of the parameter that is the offset of drive in this record, if offsets are estimated; the offset of y follows it.
     column: Option<usize>,
-    /// Spread of drive and y.
+    /// Standard deviations of drive and y.
     spread: [f64; 2],
 }
 

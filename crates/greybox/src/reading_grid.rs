@@ -27,7 +27,8 @@ const QUANTILES: [f64; 6] = [0.0, 0.02, 0.1, 0.25, 0.5, 0.75];
 const DIVISORS: u32 = 12;
 /// Two readings are the same level within this share of the largest reading.
 const SAME: f64 = 1e-10;
-/// A candidate may be off by this share of itself, as differences of printed numbers are.
+/// Largest relative error of a candidate step before it is refined by least squares: readings in a file are rounded to their digits, and so are
+/// their differences.
 const PRINTED: f64 = 0.04;
 /// A grid is coarse where its step is at least this part of the median change from one reading to the next. Rounding then adds
 /// more than 1 % to the noise's variance.

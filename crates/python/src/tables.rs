@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::work;
 
-/// Output of `ctid tables udink --json`, without its mark.
+/// Output of `ctid tables udink --json`, without the entry `written_by`.
 #[pyfunction]
 pub fn udink_tables(py: Python<'_>, runs: usize, seed: u64) -> PyResult<String> {
     let settings = udink::Settings::default();

@@ -81,7 +81,7 @@ impl Tank {
         crate::linear::linearize(py, tank_text::spec(&self.file, &values)?, &at)
     }
 
-    /// The plant beside a running one.
+    /// A monitor that runs the model beside the running plant.
     fn monitor(
         &self,
         units: (String, String),

@@ -72,7 +72,7 @@ pub(super) fn instance(
         flows: Vec::new(),
         action: Action::Add(Vec::new()),
     };
-    // Parameters first, then the constants of the equations; a pure number is written into its expression.
+    // The parameters that are fitted come first, then the constants that the equations name; numbers stay in the expressions.
     let mut own: Vec<Expression> = small.parameters.iter().map(|p| signed(p.value)).collect();
     for constants in [false, true] {
         for (i, parameter) in small.parameters.iter().enumerate() {

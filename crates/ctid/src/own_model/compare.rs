@@ -1,4 +1,4 @@
-//! Fit of a user's own model to records, and its errors.
+//! `ctid compare` for a user's own model: the fit, and the simulation errors on fitted and held-out records.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -108,7 +108,7 @@ pub(crate) fn said(file: &OwnModelFile, design: &Design, look: Look) -> String {
     text
 }
 
-/// The two effects on the existing records.
+/// Table of the two effects, fitted to the existing records: sizes and fall of the criterion.
 fn alternatives(design: &Design, look: Look) -> String {
     let title = format!(
         "{} or {}, on the existing records, weighted by their noise",

@@ -108,11 +108,16 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
             "The residual of the model is not noise: {}. No candidate explains it.",
             said_of(left)
         )),
-        (Some(left), _) => all.push(format!("What remains is not noise: {}.", said_of(left))),
+        (Some(left), _) => all.push(format!(
+            "The residual of the model with these effects is not noise: {}.",
+            said_of(left)
+        )),
         (None, Verdict::Adequate) => {
             all.push("The residual of the model looks like noise.".to_string())
         }
-        (None, _) => all.push("What remains looks like noise.".to_string()),
+        (None, _) => {
+            all.push("The residual of the model with these effects looks like noise.".to_string())
+        }
     }
     let many = Thresholds::DEFAULT.many_effects;
     if diagnosis.effects.len() >= many {

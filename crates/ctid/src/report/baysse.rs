@@ -86,7 +86,7 @@ fn figure_three() -> String {
     section(
         "figure-3",
         "Figure 3, drawn again",
-        "The emulated rig, the first of the noises. Each estimate is put into the loop, which is then simulated from the set point alone.",
+        "The emulated rig, the first noise realisation. Each estimate is put into the loop, which is then simulated from the set point alone.",
         &figure("outputs", "Output measured and simulated", ""),
     )
 }
@@ -160,7 +160,7 @@ fn misprints(study: &Study) -> String {
     let misprints = items(&study.misprints);
     section(
         "misprints",
-        "What cannot be as it is printed",
+        "Probable misprints of the paper",
         "",
         &format!("<ul>\n{misprints}</ul>\n"),
     )

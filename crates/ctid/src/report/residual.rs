@@ -176,7 +176,7 @@ pub(super) fn residual_tests(diagnosis: &Diagnosis) -> String {
             "<div class=\"pairs\">{}{}</div>\n",
             figure_with(
                 "autocorrelation",
-                "Residual against its own past",
+                "Autocorrelation of the residual",
                 &format!(
                     "<span id=\"whiteness\">{}</span>",
                     said(|tests| text::whiteness(tests.whiteness_p))

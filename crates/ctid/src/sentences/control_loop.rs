@@ -3,7 +3,7 @@
 use missing_effect::{ControlLoop, NotSimulated};
 
 /// Consequence of running a model on the measured command of a loop.
-const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and scores are biased; the standard errors are enlarged for this.";
+const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and values of the criterion are biased; the standard errors are enlarged to allow for this.";
 
 /// Description of the loop; `input_unit`: unit of the command.
 pub(super) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {

@@ -121,7 +121,7 @@ fn so_far(design: &Design) -> Vec<String> {
         )
     } else {
         format!(
-            "The existing records leave it open: {} fits best, the criterion of {} is higher by {ahead} alone.",
+            "The existing records leave it open: {} fits best, the criterion of {} is higher by only {ahead}.",
             sized(first, domain),
             sized(second, domain)
         )
@@ -135,7 +135,7 @@ fn so_far(design: &Design) -> Vec<String> {
                 )
             } else {
                 format!(
-                    "it lowers the criterion by {:.0} alone",
+                    "it lowers the criterion by only {:.0}",
                     alternative.bic_gain
                 )
             };
@@ -170,7 +170,7 @@ pub fn of_design(design: &Design) -> Vec<String> {
     };
     if design.twins() {
         said.push(format!(
-            "{} distinguishes them: in the best of {} the criterion is expected to differ by {} alone, because {} with other parameters gives nearly the response of {}.",
+            "{} distinguishes them: in the best of {} experiments the criterion is expected to differ by only {}, because {} with other parameters gives nearly the response of {}.",
             if design.effort.left_out.is_empty() {
                 "No experiment within these limits"
             } else {

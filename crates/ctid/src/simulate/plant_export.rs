@@ -60,7 +60,7 @@ fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> 
     Some(commented(&head, &spec))
 }
 
-/// Fits a plant with its effects to records.
+/// Fits a plant with its effects to records, and returns the curves and, where the plant can be written so, its Modelica text.
 ///
 /// # Errors
 /// One line that names the file, the place and the correction.

@@ -26,7 +26,7 @@ pub(crate) fn text(study: &Study, look: Look) -> String {
             study.assumptions.clone(),
         ),
         (
-            "What cannot be as it is printed",
+            "Probable misprints of the paper",
             study.misprints.iter().map(ToString::to_string).collect(),
         ),
     ] {

@@ -101,8 +101,9 @@ fn summary(study: &Study, look: Look) -> String {
             inside, of, failed, ..
         } = comparison;
         let lost = match failed {
-            0 => "no run was lost".to_owned(),
-            lost => format!("{lost} runs were lost"),
+            0 => "no run failed".to_owned(),
+            1 => "1 run failed".to_owned(),
+            lost => format!("{lost} runs failed"),
         };
         text += &look.paragraph(
             "  ",

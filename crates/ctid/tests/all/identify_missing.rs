@@ -14,7 +14,7 @@ type Measure<'a> = &'a dyn Fn(&[(f64, f64)]) -> f64;
 
 const ROWS: usize = 1500;
 
-/// Noise of a tenth of the output, signals about their levels of rest.
+/// With noise, and signals about zero.
 const NOISY: Plant = Plant {
     rest: (0.0, 0.0),
     noise: 0.2,

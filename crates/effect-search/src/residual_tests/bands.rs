@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-/// Bands of so many spectral lines. The lowest has `lowest` lines, each higher one as many as all below it; lines that do not fill another band
-/// belong to the last one.
+/// Divides a number of spectral lines into bands. The lowest has `lowest` lines, each higher one as many as all below it; lines that do not
+/// fill another band belong to the last one.
 pub fn bands(lines: usize, lowest: usize) -> impl Iterator<Item = Range<usize>> {
     let (mut from, mut to) = (0, lowest);
     std::iter::from_fn(move || {

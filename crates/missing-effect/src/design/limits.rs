@@ -82,7 +82,7 @@ pub enum NoExperiment {
         low: f64,
         /// As given.
         high: f64,
-        /// Largest distance of either end from zero.
+        /// Largest permitted absolute value of either end of the range: a million times the largest value of the records.
         most: f64,
     },
     /// The range exceeds the plant's limits.

@@ -8,7 +8,7 @@ use super::node::Node;
 pub(crate) const BIC_MARGIN: f64 = 6.0;
 /// ... and if chance would cause such a fall less often than this, over all candidates.
 const FALSE_CLAIM: f64 = 0.003;
-/// An alternative to another effect is within this distance of its criterion.
+/// Two effects are reported as alternatives if their BIC differs by less than this.
 pub const GROUP_MARGIN: f64 = 6.0;
 
 /// Whether a set of effects lowers the deviance significantly, both with the same weighting, or each with its own.

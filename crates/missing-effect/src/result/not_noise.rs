@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum NotNoise {
-    /// It depends on the command.
+    /// The residual depends on the command.
     Input {
         /// The output, by its name.
         output: String,
         /// The record, by its name.
         record: String,
     },
-    /// It has a period.
+    /// The residual has a period.
     Period {
         /// The output, by its name.
         output: String,
@@ -22,7 +22,7 @@ pub enum NotNoise {
         /// Length of the period \[s\], positive.
         period: f64,
     },
-    /// It changes abruptly.
+    /// The residual changes abruptly: a jump or a short pulse.
     Instant {
         /// The output, by its name.
         output: String,
@@ -33,14 +33,14 @@ pub enum NotNoise {
         /// End of the change \[s, the record's time\]; equal to `from` if the change lasts.
         to: f64,
     },
-    /// It depends on the level of the model.
+    /// The residual depends on the level of the model.
     Level {
         /// The output, by its name.
         output: String,
         /// The record, by its name.
         record: String,
     },
-    /// It drifts: its correlation time exceeds the slowest time constant of the model, so such noise can imitate any effect.
+    /// The residual drifts: its correlation time exceeds the slowest time constant of the model, so such noise can imitate any effect.
     Slow {
         /// The output, by its name.
         output: String,

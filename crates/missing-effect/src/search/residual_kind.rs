@@ -24,11 +24,11 @@ pub(crate) enum ResidualKind {
     Noise,
 }
 
-/// Residual of a set: noise, if no further effect has a predicted reduction above its penalty, with the noise model of the set's own
-/// residual.
+/// Kind of the residual of a set of effects: noise if no residual test rejects this and no further effect has a predicted reduction above its
+/// penalty; structure if the time is over.
 ///
-/// The noise model is that of the set's own residual, so that coloured noise does not prolong the search. Other sets with the same error
-/// are found later, by swap steps.
+/// The noise model is that of the set's own residual, so that autocorrelated noise does not prolong the search. Other sets with the same
+/// error are found later, by swap steps.
 pub(crate) fn residual_kind(node: &Node) -> Result<ResidualKind, Error> {
     if node.setup.out_of_time() {
         return Ok(ResidualKind::Structure);

@@ -40,7 +40,7 @@ impl<'a> Session<'a> {
                 if named =>
             {
                 return Err(Error::Usage(format!(
-                    "{INPUT}, row {}: no header, and [columns] of {} names columns by it; {HEADER_FIRST}",
+                    "{INPUT}, row {}: no header, and [columns] of {} names columns by their headings; {HEADER_FIRST}",
                     self.line,
                     self.arguments.model.display()
                 )));

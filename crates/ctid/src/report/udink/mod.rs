@@ -70,8 +70,8 @@ fn responses() -> String {
     section(
         "responses",
         "Figure 1, drawn again",
-        "The responses of table 3: the first of the noises, with Euler's rule. Dashed: the true values, K = 1 and tau = 10 s. \
-         E is the criterion: the squared relative errors of both, added up over time.",
+        "The responses of table 3 for the first noise realisation, with Euler's rule. Dashed: the true values, K = 1 and tau = 10 s. \
+         E is the criterion: the sum over time of the squared relative errors of K and tau.",
         &figure("responses", "Output, estimates and criterion", ""),
     )
 }
@@ -302,7 +302,7 @@ fn gains(gains: &Gains) -> String {
         figure(
             "gains",
             "With noise: largest error of a parameter over time",
-            "Relative to the true value, which is 1. The first of the noises; lines end where runs are lost. Thin: Euler's rule.",
+            "Relative to the true value, which is 1. The first noise realisation; lines end where runs fail. Thin: Euler's rule.",
         ),
         table(
             "Three gains, two rules, with bounds on c and without",

@@ -159,8 +159,8 @@ fn only_starts_near_the_best_continue() {
         let fit = fit(&sine, starts(), &Noise::white(1), stopping).unwrap();
         (fit, sine.1.into_inner())
     };
-    let (all, evaluations) = of(|a, b, c, d| fit_from(a, b, c, d));
-    let (best, fewer) = of(|a, b, c, d| fit_from_best(a, b, c, d));
+    let (all, evaluations) = of(fit_from);
+    let (best, fewer) = of(fit_from_best);
     assert!((best.x[0] - 1.3).abs() < 1e-3, "{:?}", best.x);
     assert!((best.x[0] - all.x[0]).abs() < 1e-9);
     // The starts that were given up count, and none of them agrees.

@@ -320,13 +320,13 @@ fn outside_the_subset() {
     refuses(
         "  annotation(x=1);",
         3,
-        "`annotation`: annotations are outside",
+        "`annotation`: annotations are not supported",
         "delete",
     );
     refuses(
         "  protected Real q = x;",
         3,
-        "`protected`: it means nothing",
+        "`protected`: it has no meaning",
         "delete",
     );
     refuses(
@@ -352,7 +352,11 @@ fn outside_the_subset() {
         "6:2: `connect`: connections",
         "equations",
     );
-    equation(" when u > 1 then\n", "6:2: `when`: `when` is outside", "if");
+    equation(
+        " when u > 1 then\n",
+        "6:2: `when`: `when` is not supported",
+        "if",
+    );
     equation(" if u > 1 then\n", "6:2: equations within `if`", "x = if c");
     equation(
         " for i in 1:3 loop\n",

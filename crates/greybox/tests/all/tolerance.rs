@@ -48,7 +48,7 @@ fn what_is_sufficient_for_the_noise_hardly_changes_the_cost() {
     let mut x = TRUE.to_vec();
     x.extend([0.0, 1e4, 1e4]);
     let mut found = Vec::new();
-    for sd in [[3.0, 3.0], [3.0, 1e-3], [3e-3, 3.0], [1e-9, 1e-9]] {
+    for sd in [[3.0, 3.0], [3.0, 1e-6], [3e-3, 3.0], [1e-9, 1e-9]] {
         let records = [record(&simulated, &u, sd, &mut rng)];
         let setup = ModelSetup::new(&model, &records, &BTreeMap::new(), 1.0).unwrap();
         let sufficient = setup.sufficient_tolerance(&x, &sd);
@@ -62,7 +62,7 @@ fn what_is_sufficient_for_the_noise_hardly_changes_the_cost() {
     }
     // Less noise in either output requires smaller steps, whatever the size of the states.
     assert_eq!((found[0], found[3]), (1e-7, TOLERANCE));
-    assert!(found[1] < 1e-7 && found[2] <= 1e-7, "{found:?}");
+    assert!(found[1] < 1e-7 && found[2] < 1e-7, "{found:?}");
 }
 
 #[test]

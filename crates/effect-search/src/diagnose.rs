@@ -194,7 +194,7 @@ pub fn diagnose(
         seconds,
         left_out,
     };
-    // A state that grows may use more steps than there may be with this tolerance.
+    // With this tolerance a state that grows may need more steps than a simulation may take.
     report(ct_model::TOLERANCE, finding.clone()).or_else(|_| report(context.tolerance, finding))
 }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use self::end::End;
 pub use self::prewhitened::{coloured, noise_of, prewhitened};
 pub use self::starts::Start;
-use self::starts::{least_cost, minima};
+use self::starts::{free_bounds, least_cost, minima};
 use crate::{
     Error, Noise, Residuals, Stop, Stopping, Triangle, levenberg_marquardt::held,
     prior::free_priors,
@@ -254,7 +254,7 @@ pub fn fit_from_best(
         ..stopping
     };
     let mut ends = minima(model, starts, noise, first);
-    // After the time limit only the first start is used.
+    // After the time limit a fit uses only its first start, which has to be the best.
     ends.sort_by(|a, b| a.1.triangle.cost().total_cmp(&b.1.triangle.cost()));
     let most = WORSE * least_cost(&ends);
     let near = ends.into_iter().filter_map(|(x, minimum)| {
@@ -306,7 +306,7 @@ pub fn fit_from(
         .find(|(_, minimum)| minimum.triangle.cost() <= best)
         .ok_or(Error::NoFiniteStart { starts: count })?;
     let free = model.free();
-    let bounds: Vec<(f64, f64)> = free.iter().map(|&i| model.bounds()[i]).collect();
+    let bounds = free_bounds(model);
     let inside: Vec<usize> = (0..free.len())
         .filter(|&j| {
             // A parameter without influence on any sample has no standard error, such as the initial state of a lag with time constant

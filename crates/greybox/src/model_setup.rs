@@ -292,7 +292,8 @@ impl<'a> ModelSetup<'a> {
     }
 
     /// Fits from many starts. Outputs are weighted by their noise, estimated from the part of the residual that its past does not predict:
-    /// a model error at one output does not increase the weight of the others.
+    /// a model error at one output does not increase the weight of the others. All starts are simulated with a tolerance of at least 1e-7; the
+    /// best end is fitted again with that of the setup.
     ///
     /// # Errors
     /// Where no start gives a finite simulation.
@@ -340,7 +341,7 @@ impl<'a> ModelSetup<'a> {
         let exact = estimation::fit_from(&setup, vec![end.clone()], &white, options.stopping);
         match exact {
             Ok(exact) => Ok(exact.continuing(&fit)),
-            // A state that grows may use more steps than there may be.
+            // With this tolerance a state that grows may need more steps than a simulation may take.
             Err(_) => {
                 let from = std::iter::once(end).chain(starts).collect();
                 Ok(estimation::fit_from(

@@ -15,4 +15,5 @@ mod shared;
 mod simulated;
 mod support;
 mod threads;
+mod tolerance;
 mod units;

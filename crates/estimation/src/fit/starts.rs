@@ -56,6 +56,12 @@ fn begun(model: &impl Residuals, given: &[f64], noise: &Noise) -> Vec<f64> {
     }
 }
 
+/// Bounds of the entries that are fitted.
+pub(super) fn free_bounds(model: &impl Residuals) -> Vec<(f64, f64)> {
+    let free = model.free().iter();
+    free.map(|&i| model.bounds()[i]).collect()
+}
+
 /// Ends of the iterations from all starts, in parallel: the whole vector, and the minimum. Those that are not finite at the start are left out.
 pub(super) fn minima(
     model: &impl Residuals,
@@ -64,7 +70,7 @@ pub(super) fn minima(
     stopping: Stopping,
 ) -> Vec<(Vec<f64>, Minimum)> {
     let free = model.free();
-    let bounds: Vec<(f64, f64)> = free.iter().map(|&i| model.bounds()[i]).collect();
+    let bounds = free_bounds(model);
     starts
         .into_par_iter()
         .enumerate()

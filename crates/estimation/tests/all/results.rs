@@ -105,7 +105,7 @@ const _: () = {
     crosses::<Error>();
 };
 
-/// `y = sin(x_0 t)`: each multiple of the frequency is a local minimum.
+/// `y = sin(x_0 t)`, whose cost has many local minima; and the number of evaluations.
 struct Sine(Vec<f64>, std::sync::atomic::AtomicUsize);
 
 impl Residuals for Sine {

@@ -9,6 +9,7 @@ use estimation::{Fit, Noise};
 use greybox::{Robust, not_determined, weighted_rms};
 
 use crate::node::{Context, FINE, Node};
+use crate::quantisation::quantisation;
 use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 use crate::search::Grown;
 use crate::{Error, held_out};
@@ -78,6 +79,11 @@ pub(crate) fn assemble(
         .iter()
         .map(|node| step(context, base, node, &floors))
         .collect::<Result<Vec<_>, Error>>()?;
+    let last_rmse = ladder
+        .last()
+        .map_or(&last.fit, |node| &node.fit)
+        .rmse
+        .clone();
     let named = |values: &[f64]| -> BTreeMap<String, f64> {
         let names = outputs.iter().map(|y| y.name.clone());
         names.zip(values.iter().copied()).collect()
@@ -132,6 +138,7 @@ pub(crate) fn assemble(
         steps,
         share: share.filter(|_| !order.is_empty()),
         not_noise,
+        quantisation: quantisation(&problem.records, &last_rmse),
         unknown,
         noise: noise.collect(),
         singles,

@@ -11,7 +11,7 @@ use ct_model::effects::{
 };
 use ct_model::{Model, ModelSpec};
 use estimation::{Fit, Noise, Residuals, within};
-use greybox::{FitOptions, ModelSetup};
+use greybox::{FitOptions, ModelSetup, possible_reading_steps};
 
 use crate::Error;
 use crate::node::{Context, FINE, Node};
@@ -71,8 +71,12 @@ pub(crate) fn begin<'a>(
     options: &Options<'a>,
     limit: Limit<'a>,
 ) -> Result<(Context<'a>, Node), Error> {
+    let outputs = 0..problem.spec.outputs.len();
+    let reading_steps = outputs
+        .map(|o| possible_reading_steps(&problem.records, o, options.thresholds.kept_starts));
     let mut context = Context {
         problem,
+        reading_steps: reading_steps.collect(),
         candidates: Vec::new(),
         shapes: Vec::new(),
         scales: None,

@@ -31,6 +31,8 @@ pub(crate) struct Context<'a> {
     pub scales: Option<Vec<f64>>,
     /// Relative tolerance of simulations ([`ModelSetup::sufficient_tolerance`]).
     pub tolerance: f64,
+    /// Quantisation steps that the readings of each output suggest ([`possible_reading_steps`](greybox::possible_reading_steps)).
+    pub reading_steps: Vec<Vec<f64>>,
     pub candidates: Vec<Candidate>,
     /// Smooth functions, for the shape of the error that no candidate explains.
     pub shapes: Vec<Candidate>,

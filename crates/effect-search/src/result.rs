@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::quantisation::Quantisation;
 use crate::residual_tests::NotNoise;
 use crate::unknown::Unknown;
 
@@ -122,6 +123,9 @@ pub struct Diagnosis {
     pub share: Option<f64>,
     /// Structure in the residual of the last model that is not noise.
     pub not_noise: Option<NotNoise>,
+    /// Outputs whose readings are rounded, if rounding causes a large part of the last residual.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub quantisation: Vec<Quantisation>,
     /// The unexplained error of the last model; `None` if its residual is noise.
     pub unknown: Option<Unknown>,
     /// The noise of each output, of the last model's residual.

@@ -10,7 +10,7 @@
 use std::sync::Arc;
 
 use ct_model::Model;
-use ct_model::effects::{Role, best_of_each_choice};
+use ct_model::effects::{Port, Role, best_of_each_choice};
 use estimation::{Noise, Residuals, Rows, Triangle, linearise, within};
 use rayon::prelude::*;
 
@@ -58,6 +58,8 @@ struct Place {
 
 /// The effect whose starts come from the spectrum of the residual.
 const PERIODIC: &str = "periodic";
+/// The effect whose step comes from the readings: the error has a narrow minimum there, which no grid of starts meets.
+const QUANTISATION: &str = "quantisation";
 /// The effect whose instant is refined between its starts.
 const STEP: &str = "step";
 /// Distances from the best instants at which further starts are scored, round by round, as shares of the longest record.
@@ -188,6 +190,16 @@ impl Context<'_> {
             for period in self.periods(node)? {
                 let mut x = first.clone();
                 x[at] = within(period, setup.bounds()[at]);
+                starts.insert(0, x);
+            }
+        }
+        if let (Some(at), Port::Output(output)) = (own_place(QUANTISATION, "step"), candidate.port)
+            && let Some(first) = starts.first()
+        {
+            let first = first.clone();
+            for step in &self.reading_steps[output] {
+                let mut x = first.clone();
+                x[at] = within(*step, setup.bounds()[at]);
                 starts.insert(0, x);
             }
         }

@@ -31,7 +31,7 @@ pub use model_setup::ModelSetup;
 pub use not_determined::not_determined;
 pub use prediction::{FitUncertainty, InitialStates, output_errors};
 pub use reading_grid::{ReadingGrid, reading_grid};
-pub use reading_step::exact_reading_step;
+pub use reading_step::{exact_reading_step, possible_reading_steps};
 pub use setup::{LoopRun, PriorValue, Setup, Simulated, at_rest, commands, weighted_rms};
 pub use starts::{levels_from_readings, random_starts, starts_around};
 pub use steady_state::steady_state;

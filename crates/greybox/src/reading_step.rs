@@ -8,8 +8,12 @@ use crate::reading_grid;
 /// Least agreement of the readings with multiples: the mean of `cos(2 pi y/D)`, one for exact multiples. With white noise of a tenth of the
 /// step, 0.82.
 const ALIGNED: f64 = 0.8;
+/// Least alignment of a possible step, in standard deviations of that of readings on no grid.
+const NOTICED: f64 = 2.5;
 /// The most steps between the least and the largest reading that are looked for.
 const MOST_STEPS: f64 = 100.0;
+/// The same for starts of fits, which a false step costs time only.
+const MOST_POSSIBLE_STEPS: f64 = 1000.0;
 /// The least number of steps: fewer distinct levels would always fit.
 const FEWEST_STEPS: f64 = 4.0;
 /// Number of readings in the first test.
@@ -27,37 +31,36 @@ pub fn exact_reading_step(records: &[Record], output: usize) -> Option<f64> {
     grid.map(|grid| grid.step)
 }
 
+/// Quantisation steps that the readings of an output suggest, the largest alignment first, at most `most` \[output unit\]; noise of up to 0.3
+/// steps may be added after the quantisation. They are starts of fits: a fit has to show which of them is one.
+#[must_use]
+pub fn possible_reading_steps(records: &[Record], output: usize, most: usize) -> Vec<f64> {
+    let all = readings(records, output);
+    let Some(mut looked) = FirstLook::of(&all, MOST_POSSIBLE_STEPS) else {
+        return Vec::new();
+    };
+    let chance = (2.0 * looked.readings as f64).sqrt().recip();
+    looked
+        .maxima
+        .retain(|(alignment, _)| *alignment > NOTICED * chance);
+    looked.maxima.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut steps: Vec<f64> = exact_reading_step(records, output).into_iter().collect();
+    let best = looked.maxima.iter().take(most);
+    steps.extend(best.map(|(_, steps)| 1.0 / climb(*steps, looked.grid, &all)));
+    steps.truncate(most);
+    steps
+}
+
 /// Quantisation step if noise is added after the quantisation.
 fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
-    let all = || {
-        records
-            .iter()
-            .flat_map(|record| record.outputs[output].present())
-    };
-    let count = all().count();
-    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
-        (low.min(y), high.max(y))
-    });
-    let (span, reach) = (high - low, low.abs().max(high.abs()));
-    if !(span > 0.0 && reach.is_finite()) {
-        return None;
-    }
-    let all: Vec<f64> = all().collect();
-    let some: Vec<f64> = all
-        .iter()
-        .copied()
-        .step_by(count.div_ceil(FIRST_LOOK))
-        .collect();
-    // The phase of the largest reading changes by an eighth from one number of steps to the next, so no peak is missed.
-    let grid = 0.125 / reach;
-    let count = ((MOST_STEPS - FEWEST_STEPS) / span / grid).min(1e5) as usize;
-    let at = |k: usize| FEWEST_STEPS / span + grid * k as f64;
-    let coarse: Vec<f64> = (0..count).map(|k| aligned(at(k), &some)).collect();
+    let all = readings(records, output);
+    let looked = FirstLook::of(&all, MOST_STEPS)?;
     // Readings on multiples of D are also on multiples of D/2, so the first (largest) step is the result.
-    let tried = (1..count.saturating_sub(1))
-        .filter(|&k| coarse[k] > 0.5 * ALIGNED)
-        .filter(|&k| coarse[k] >= coarse[k - 1] && coarse[k] >= coarse[k + 1])
-        .map(|k| climb(at(k), grid, &all));
+    let tried = looked
+        .maxima
+        .iter()
+        .filter(|(alignment, _)| *alignment > 0.5 * ALIGNED)
+        .map(|(_, steps)| climb(*steps, looked.grid, &all));
     let mut tried = tried.map(|steps| (aligned(steps, &all), steps));
     let first = tried.find(|(alignment, _)| *alignment > ALIGNED)?;
     // A neighbouring frequency with one step more or less over the range has a high alignment too, but a lower one.
@@ -67,6 +70,52 @@ fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
         |best, next| if next.0 > best.0 { next } else { best },
     );
     Some(1.0 / best.1)
+}
+
+fn readings(records: &[Record], output: usize) -> Vec<f64> {
+    let records = records.iter();
+    let present = records.flat_map(|record| record.outputs[output].present());
+    present.collect()
+}
+
+/// Alignment of some of the readings over the number of steps in one unit of the reading.
+struct FirstLook {
+    /// Number of readings.
+    readings: usize,
+    /// Distance of two numbers of steps.
+    grid: f64,
+    /// Maxima: the alignment, and the number of steps, which rises.
+    maxima: Vec<(f64, f64)>,
+}
+
+impl FirstLook {
+    /// For at most `most_steps` over the range of the readings; `None` if they have no range.
+    fn of(all: &[f64], most_steps: f64) -> Option<Self> {
+        let (low, high) = all
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
+                (low.min(*y), high.max(*y))
+            });
+        let (span, reach) = (high - low, low.abs().max(high.abs()));
+        if !(span > 0.0 && reach.is_finite()) {
+            return None;
+        }
+        let every = all.len().div_ceil(FIRST_LOOK);
+        let some: Vec<f64> = all.iter().copied().step_by(every).collect();
+        // The phase of the largest reading changes by an eighth from one number of steps to the next, so no peak is missed.
+        let grid = 0.125 / reach;
+        let count = ((most_steps - FEWEST_STEPS) / span / grid).min(1e5) as usize;
+        let at = |k: usize| FEWEST_STEPS / span + grid * k as f64;
+        let coarse: Vec<f64> = (0..count).map(|k| aligned(at(k), &some)).collect();
+        let maxima = (1..count.saturating_sub(1))
+            .filter(|&k| coarse[k] >= coarse[k - 1] && coarse[k] >= coarse[k + 1])
+            .map(|k| (coarse[k], at(k)));
+        Some(Self {
+            readings: some.len(),
+            grid,
+            maxima: maxima.collect(),
+        })
+    }
 }
 
 /// Agreement of readings with multiples of one over `steps`.
@@ -94,7 +143,9 @@ fn climb(steps: f64, reach: f64, readings: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ct_signals::Channel;
+    use ct_signals::{Channel, noise};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
 
     fn record(reading: impl Fn(f64) -> f64) -> Record {
         let y: Vec<f64> = (0..900)
@@ -120,6 +171,22 @@ mod tests {
                 let found = reading_step(&[wave], 0).unwrap();
                 assert!((found - step).abs() < 1e-3 * step, "{found} of {step}");
             }
+        }
+    }
+
+    #[test]
+    fn a_step_is_possible_in_noise_of_0_3_steps() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for step in [0.5, 1.3] {
+            let mut wave = record(|y| step * (y / step).round());
+            let noise = noise::white(wave.len(), 0.3 * step, &mut rng);
+            for (y, e) in wave.outputs[0].values.iter_mut().zip(noise) {
+                *y += e;
+            }
+            assert_eq!(reading_step(std::slice::from_ref(&wave), 0), None);
+            let possible = possible_reading_steps(&[wave], 0, 4);
+            let near = |found: &f64| (found - step).abs() < 0.02 * step;
+            assert!(possible.iter().any(near), "{possible:?} without {step}");
         }
     }
 

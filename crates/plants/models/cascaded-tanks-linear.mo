@@ -7,7 +7,8 @@ model CascadedTanksLinear "two first-order lags in series about an operating poi
   input Real u "command";
   Real level_upper(start=10);
   output Real level_lower(start=10);
+  Real outflow = level_lower - offset;
 equation
   tau1*der(level_upper) = K*u - level_upper;
-  tau2*der(level_lower) = level_upper - (level_lower - offset);
+  tau2*der(level_lower) = level_upper - outflow;
 end CascadedTanksLinear;

@@ -5,6 +5,7 @@ model SingleTankLinear "one first-order lag about an operating point"
   parameter Real offset = 1.5 "level at a command of zero";
   input Real u "command";
   output Real level(start=10);
+  Real outflow = level - offset;
 equation
-  tau*der(level) = K*u - (level - offset);
+  tau*der(level) = K*u - outflow;
 end SingleTankLinear;

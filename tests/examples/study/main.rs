@@ -5,6 +5,7 @@
 //! are drawn at random; pairs of effects; records that miss nothing, also under integrated noise; and disturbances that the
 //! catalogue does not hold. `--records 2 --pairs 2` is a quick run. Every record has a seed of its own, whatever else is run.
 
+mod as_text;
 mod mark;
 mod record;
 mod table;
@@ -73,6 +74,10 @@ struct Arguments {
     /// effect.
     #[arg(long)]
     mark: bool,
+    /// The plants are diagnosed as models written as text, on the measured command; the effects have their names in the catalogue of
+    /// tanks.
+    #[arg(long)]
+    text: bool,
     /// Writes every record's outcome.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -134,7 +139,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .threads
         .or_else(|| std::thread::available_parallelism().ok().map(usize::from))
         .unwrap_or(1);
-    let outcomes = each(&jobs, threads, arguments.samples, arguments.mark)?;
+    let outcomes = each(&jobs, threads, &arguments)?;
 
     let seconds = begun.elapsed().as_secs_f64();
     let took = format!(
@@ -181,8 +186,7 @@ fn chosen(names: &[String]) -> Result<Vec<&'static EffectInfo>, String> {
 fn each(
     jobs: &[Job],
     threads: usize,
-    samples: usize,
-    mark: bool,
+    arguments: &Arguments,
 ) -> Result<Vec<Outcome>, Box<dyn Error>> {
     let bar = ProgressBar::new(jobs.len() as u64).with_style(ProgressStyle::with_template(
         "{bar:40} {pos}/{len} {elapsed} (left: {eta}) {msg}",
@@ -197,7 +201,8 @@ fn each(
                 loop {
                     let at = next.fetch_add(1, Ordering::Relaxed);
                     let Some(job) = jobs.get(at) else { break };
-                    let outcome = pool.install(|| job.run(samples, mark));
+                    let outcome =
+                        pool.install(|| job.run(arguments.samples, arguments.mark, arguments.text));
                     bar.set_message(job.name());
                     bar.inc(1);
                     if let Ok(mut done) = done.lock() {

@@ -13,7 +13,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
-use crate::mark;
+use crate::{as_text, mark};
 
 /// Correlation of the coloured noise from sample to sample, in turn.
 const COLOURS: [f64; 2] = [0.8, 0.95];
@@ -228,7 +228,7 @@ impl Job {
     }
 
     /// Makes the record and diagnoses it.
-    pub fn run(&self, samples: usize, wants_mark: bool) -> Outcome {
+    pub fn run(&self, samples: usize, wants_mark: bool, text: bool) -> Outcome {
         let refused = |why: String| Outcome {
             answer: None,
             refused: Some(why),
@@ -237,6 +237,15 @@ impl Job {
             return refused("the effect can be given this size in none of the plants drawn".into());
         };
         let problem = problem(&rig, rig.run(&mut ChaCha8Rng::seed_from_u64(self.seed())));
+        if text {
+            return match as_text::diagnosed(&rig, &problem) {
+                Err(why) => refused(why.to_string()),
+                Ok(found) => Outcome {
+                    answer: Some(text_answer(&rig, &found)),
+                    refused: None,
+                },
+            };
+        }
         match diagnose(&problem, &Options::default(), &|_| {}) {
             Err(why) => refused(why.to_string()),
             Ok(found) => {
@@ -375,6 +384,32 @@ fn answer(rig: &Rig, found: &Diagnosis) -> Answer {
         mark: None,
         pair_falls: None,
         feedback: claims_feedback(found),
+        seconds: found.seconds,
+    }
+}
+
+/// The answer with the plant as text, with the names of the catalogue of tanks.
+fn text_answer(rig: &Rig, found: &effect_search::Diagnosis) -> Answer {
+    let names = |ids: &[String]| -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for id in ids {
+            let name = as_text::tank_name(id, rig.plant);
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    };
+    Answer {
+        plant: rig.plant.id(),
+        drive: rig.drive,
+        hidden: rig.missing().iter().map(|(id, ..)| *id).collect(),
+        verdict: as_text::verdict(found.verdict),
+        effects: names(&found.effects),
+        groups: found.groups.iter().map(|group| names(group)).collect(),
+        mark: None,
+        pair_falls: None,
+        feedback: false,
         seconds: found.seconds,
     }
 }

@@ -295,9 +295,9 @@ fn ports_of(
                 _ => None,
             };
             let values = ports.values.iter().filter_map(of);
-            values
-                .flat_map(|value| signals.iter().map(move |x| Port::Dependence(value, *x)))
-                .collect()
+            let dependences =
+                values.flat_map(|value| signals.iter().map(move |x| Port::Dependence(value, *x)));
+            dependences.chain(spec.measured_capacities()).collect()
         }
         Place::BalanceAndSignal => {
             let signals = signals();

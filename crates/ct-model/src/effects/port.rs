@@ -85,6 +85,20 @@ impl ModelSpec {
         }
     }
 
+    /// Coefficients of derivatives that are measured, each with its own state: a measured cross-section or heat capacity is exact at one
+    /// value of the state and may differ at others. Coefficients that occur elsewhere too are left out.
+    pub(super) fn measured_capacities(&self) -> impl Iterator<Item = Port> {
+        let of = |x: usize| match self.states[x].coefficient {
+            Some(Expression::Variable(p @ Variable::Parameter(k)))
+                if self.parameters[k].given == Given::Measured && self.occurrences(p) == 1 =>
+            {
+                Some(Port::Dependence(p, Variable::State(x)))
+            }
+            _ => None,
+        };
+        (0..self.states.len()).filter_map(of)
+    }
+
     /// The state whose derivative a state is: the position of a speed.
     pub(super) fn speed_of(&self, position: usize) -> Option<usize> {
         let state = &self.states[position];
@@ -180,5 +194,44 @@ fn factors_of<'a>(expression: &'a Expression, all: &mut Vec<&'a Expression>) {
         }
         Expression::Binary(Operator::Divide, a, _) | Expression::Negative(a) => factors_of(a, all),
         other => all.push(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_measured_capacity_varies_with_its_own_state_only() {
+        let tanks = |upper: &str, lower: &str| {
+            let measured = ["A", "B"].into_iter();
+            let used = measured.filter(|name| upper.contains(name) || lower.contains(name));
+            let measured: String = used
+                .map(|name| format!("final parameter Real {name} = 2;"))
+                .collect();
+            ModelSpec::parse(&format!(
+                "model Tanks
+                   {measured}
+                   parameter Real k = 1;
+                   input Real u;
+                   Real h(start=1);
+                   output Real y(start=1);
+                 equation
+                   {upper}*der(h) = u - k*h;
+                   {lower}*der(y) = k*h - y;
+                 end Tanks;"
+            ))
+            .unwrap()
+        };
+        let names = |spec: &ModelSpec| -> Vec<String> {
+            let ports = spec.measured_capacities();
+            ports.map(|port| port.names(spec)).collect()
+        };
+        assert_eq!(names(&tanks("A", "B")), ["A,h", "B,y"]);
+        // One capacity of two balances, a product, and a fitted one.
+        assert!(names(&tanks("A", "A")).is_empty());
+        assert_eq!(names(&tanks("2*A", "B")), ["B,y"]);
+        assert_eq!(names(&tanks("k", "B")), ["B,y"]);
     }
 }

@@ -10,6 +10,7 @@ use super::words::{EffectWords, shown_unit};
 use crate::Error;
 use crate::look::{Look, Side, table};
 use crate::numbers;
+use crate::sentences::remarks::rounding;
 
 /// Single effects that are listed.
 const LISTED: usize = 8;
@@ -119,6 +120,10 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
             all.push("The residual of the model with these effects looks like noise.".to_string())
         }
     }
+    all.extend(diagnosis.quantisation.iter().map(|rounded| {
+        let of = format!(" of {}", rounded.output);
+        rounding(&of, rounded.step, shown_unit(&rounded.unit), rounded.share)
+    }));
     let many = Thresholds::DEFAULT.many_effects;
     if diagnosis.effects.len() >= many {
         all.push(format!(

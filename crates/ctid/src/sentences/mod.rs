@@ -8,7 +8,7 @@ mod effects;
 mod failures;
 mod prior;
 mod rejections;
-mod remarks;
+pub(crate) mod remarks;
 mod residual;
 #[cfg(test)]
 mod tests;

@@ -52,17 +52,26 @@ pub(super) fn of_quantisation(diagnosis: &Diagnosis) -> Option<String> {
             } else {
                 String::new()
             };
-            Some(format!(
-                "Nearly all readings{of} are multiples of {} {unit}: rounding alone makes an error of {} {unit} rms, {:.0} % of the mean squared error of the model without it.",
-                significant(*step, 3),
-                significant(*step / 12.0_f64.sqrt(), 2),
-                100.0 * share.min(1.0)
-            ))
+            Some(rounding(&of, *step, unit, *share))
         }
         _ => None,
     });
     let all: Vec<String> = all.collect();
     (!all.is_empty()).then(|| all.join(" "))
+}
+
+/// Readings that are multiples of a step: `of` names the output, or is empty.
+pub(crate) fn rounding(of: &str, step: f64, unit: &str, share: f64) -> String {
+    let with_unit = |value: f64, digits: i32| {
+        let text = format!("{} {unit}", significant(value, digits));
+        text.trim_end().to_string()
+    };
+    format!(
+        "Nearly all readings{of} are multiples of {}: rounding alone makes an error of {} rms, {:.0} % of the mean squared error of the model without it.",
+        with_unit(step, 3),
+        with_unit(step / 12.0_f64.sqrt(), 2),
+        100.0 * share.min(1.0)
+    )
 }
 
 /// Remark: the two weightings of the residual rank different effects first.

@@ -7,7 +7,7 @@ use effect_search::{Error, Options, Problem};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::hidden::{BLOCK, problem, record};
+use crate::records::{BLOCK, problem, record};
 
 /// The block whose heater lags.
 fn lagging() -> String {

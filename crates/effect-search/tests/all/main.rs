@@ -3,6 +3,8 @@
 
 mod design;
 mod hidden;
+mod quantisation;
+mod records;
 mod results;
 mod thresholds;
 mod together;

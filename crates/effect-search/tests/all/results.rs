@@ -6,7 +6,7 @@ use effect_search::{
     diagnose,
 };
 
-use crate::hidden::{BLOCK, problem, record};
+use crate::records::{BLOCK, problem, record};
 
 /// The outputs of a model on the inputs of the record of a problem, from the initial states that were fitted.
 fn simulated(spec: ModelSpec, problem: &Problem, found: &Diagnosis) -> Vec<f64> {

@@ -2,7 +2,7 @@
 
 use effect_search::{Options, Thresholds, Verdict, diagnose};
 
-use crate::hidden::{BLOCK, problem, record};
+use crate::records::{BLOCK, problem, record};
 
 /// A margin or a probability that no fall passes leaves a hidden effect unnamed.
 #[test]

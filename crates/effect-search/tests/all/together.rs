@@ -6,7 +6,7 @@ use ct_model::ModelSpec;
 use ct_model::effects::{OwnCandidate, OwnParameter};
 use effect_search::{Options, Problem, Verdict, diagnose};
 
-use crate::hidden::record;
+use crate::records::record;
 
 /// Two heaters of one board, as its user believes.
 const BOARD: &str = r#"model Board

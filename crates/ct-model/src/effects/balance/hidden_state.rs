@@ -1,4 +1,5 @@
-//! `hidden_state(x)`: exchange with a store that is not measured.
+//! `hidden_state(x)`: exchange with a store that is not measured. The store begins near the values that the state takes: one that begins far
+//! away is a drift.
 
 use crate::effects::{Effect, Place, Role, Starts};
 
@@ -10,12 +11,14 @@ model hidden_state
   input Real x;
   constant Real first(unit="signal") = 0;
   constant Real balance(unit="balance") = 1;
+  constant Real low(unit="signal") = 0;
+  constant Real high(unit="signal") = 1;
   constant Real width(unit="signal") = 1;
   constant Real interval(unit="time") = 1;
   constant Real duration(unit="time") = 1;
   parameter Real exchange(unit="balance/port", min=0, max=100*balance/width) = 0 "exchange per unit of difference";
   parameter Real tau(unit="time", min=0.1*interval, max=20*duration) = 0.1*duration "time constant of the store";
-  Real z(unit="port", start=first) "the store";
+  Real z(unit="port", start=first, min=low - width, max=high + width) "the store";
   output Real v(unit="balance") = exchange*(z - x);
 equation
   tau*der(z) = x - z;

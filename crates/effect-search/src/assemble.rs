@@ -79,11 +79,6 @@ pub(crate) fn assemble(
         .iter()
         .map(|node| step(context, base, node, &floors))
         .collect::<Result<Vec<_>, Error>>()?;
-    let last_rmse = ladder
-        .last()
-        .map_or(&last.fit, |node| &node.fit)
-        .rmse
-        .clone();
     let named = |values: &[f64]| -> BTreeMap<String, f64> {
         let names = outputs.iter().map(|y| y.name.clone());
         names.zip(values.iter().copied()).collect()
@@ -138,7 +133,7 @@ pub(crate) fn assemble(
         steps,
         share: share.filter(|_| !order.is_empty()),
         not_noise,
-        quantisation: quantisation(&problem.records, &last_rmse),
+        quantisation: quantisation(context, ladder.last().unwrap_or(last)),
         unknown,
         noise: noise.collect(),
         singles,

@@ -7,9 +7,12 @@
 
 use std::ops::RangeInclusive;
 
-use ct_signals::Record;
+use ct_model::effects::Port;
 use greybox::exact_reading_step;
 use serde::{Deserialize, Serialize};
+
+use crate::node::{Context, Node};
+use crate::score::QUANTISATION;
 
 /// Rounding is reported if its variance is within this range, as a share of the mean squared residual. With a larger variance the measured
 /// quantity is constant, or the grid is not that of a converter.
@@ -28,10 +31,23 @@ pub struct Quantisation {
     pub share: f64,
 }
 
-/// Outputs whose rounded readings cause a large part of the residual. `rmse`: residual by output.
-pub(crate) fn quantisation(records: &[Record], rmse: &[f64]) -> Vec<Quantisation> {
-    let outputs = records[0].outputs.iter().zip(rmse).enumerate();
+/// Outputs whose rounded readings cause a large part of a model's residual, except those that are rounded in the model too.
+pub(crate) fn quantisation(context: &Context, node: &Node) -> Vec<Quantisation> {
+    let records = &context.problem.records;
+    let in_model = |output: usize| {
+        node.added.iter().any(|&i| {
+            let candidate = &context.candidates[i];
+            let effect = candidate
+                .effect
+                .is_some_and(|effect| effect.id == QUANTISATION);
+            effect && candidate.port == Port::Output(output)
+        })
+    };
+    let outputs = records[0].outputs.iter().zip(&node.fit.rmse).enumerate();
     let rounded = outputs.filter_map(|(i, (output, rmse))| {
+        if in_model(i) {
+            return None;
+        }
         let step = exact_reading_step(records, i)?;
         let share = step.powi(2) / 12.0 / rmse.powi(2);
         SHARE.contains(&share).then(|| Quantisation {

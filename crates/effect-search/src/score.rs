@@ -59,7 +59,7 @@ struct Place {
 /// The effect whose starts come from the spectrum of the residual.
 const PERIODIC: &str = "periodic";
 /// The effect whose step comes from the readings: the error has a narrow minimum there, which no grid of starts meets.
-const QUANTISATION: &str = "quantisation";
+pub(crate) const QUANTISATION: &str = "quantisation";
 /// The effect whose instant is refined between its starts.
 const STEP: &str = "step";
 /// Distances from the best instants at which further starts are scored, round by round, as shares of the longest record.

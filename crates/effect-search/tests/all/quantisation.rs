@@ -43,6 +43,19 @@ fn fine_readings_are_not_reported() {
 }
 
 #[test]
+fn rounding_that_is_in_the_model_is_not_reported_again() {
+    let mut record = record(BLOCK, 0.0, 0.02, 7);
+    rounded(&mut record, 0.5);
+    let diagnosis = found(&problem(BLOCK, record));
+    assert!(
+        names(&diagnosis, "quantisation(y)"),
+        "{:?}",
+        diagnosis.groups
+    );
+    assert_eq!(diagnosis.quantisation, []);
+}
+
+#[test]
 fn a_step_before_the_noise_is_found_where_it_is_3_5_times_the_noise() {
     let mut record = record(BLOCK, 0.0, 0.0, 7);
     rounded(&mut record, 0.7);

@@ -18,6 +18,10 @@ const MOST_POSSIBLE_STEPS: f64 = 1000.0;
 const FEWEST_STEPS: f64 = 4.0;
 /// Number of readings in the first test.
 const FIRST_LOOK: usize = 400;
+/// The same for starts of fits: an alignment that much noise has lowered is above that of chance only over many readings.
+const FIRST_LOOK_IN_NOISE: usize = 2000;
+/// The most cosines of a first test, for its time.
+const MOST_COSINES: usize = 40_000_000;
 
 /// The largest `D` such that nearly all readings of an output are multiples of `D` \[output unit\], if it is larger than the last digit.
 pub(crate) fn reading_step(records: &[Record], output: usize) -> Option<f64> {
@@ -36,7 +40,7 @@ pub fn exact_reading_step(records: &[Record], output: usize) -> Option<f64> {
 #[must_use]
 pub fn possible_reading_steps(records: &[Record], output: usize, most: usize) -> Vec<f64> {
     let all = readings(records, output);
-    let Some(mut looked) = FirstLook::of(&all, MOST_POSSIBLE_STEPS) else {
+    let Some(mut looked) = FirstLook::of(&all, MOST_POSSIBLE_STEPS, FIRST_LOOK_IN_NOISE) else {
         return Vec::new();
     };
     let chance = (2.0 * looked.readings as f64).sqrt().recip();
@@ -54,7 +58,7 @@ pub fn possible_reading_steps(records: &[Record], output: usize, most: usize) ->
 /// Quantisation step if noise is added after the quantisation.
 fn noisy_step(records: &[Record], output: usize) -> Option<f64> {
     let all = readings(records, output);
-    let looked = FirstLook::of(&all, MOST_STEPS)?;
+    let looked = FirstLook::of(&all, MOST_STEPS, FIRST_LOOK)?;
     // Readings on multiples of D are also on multiples of D/2, so the first (largest) step is the result.
     let tried = looked
         .maxima
@@ -89,8 +93,8 @@ struct FirstLook {
 }
 
 impl FirstLook {
-    /// For at most `most_steps` over the range of the readings; `None` if they have no range.
-    fn of(all: &[f64], most_steps: f64) -> Option<Self> {
+    /// For at most `most_steps` over the range of the readings, with at most `most_readings` of them; `None` if they have no range.
+    fn of(all: &[f64], most_steps: f64, most_readings: usize) -> Option<Self> {
         let (low, high) = all
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
@@ -100,11 +104,12 @@ impl FirstLook {
         if !(span > 0.0 && reach.is_finite()) {
             return None;
         }
-        let every = all.len().div_ceil(FIRST_LOOK);
+        let every = all.len().div_ceil(most_readings);
         let some: Vec<f64> = all.iter().copied().step_by(every).collect();
         // The phase of the largest reading changes by an eighth from one number of steps to the next, so no peak is missed.
         let grid = 0.125 / reach;
-        let count = ((most_steps - FEWEST_STEPS) / span / grid).min(1e5) as usize;
+        let count = ((most_steps - FEWEST_STEPS) / span / grid) as usize;
+        let count = count.min(MOST_COSINES / some.len());
         let at = |k: usize| FEWEST_STEPS / span + grid * k as f64;
         let coarse: Vec<f64> = (0..count).map(|k| aligned(at(k), &some)).collect();
         let maxima = (1..count.saturating_sub(1))

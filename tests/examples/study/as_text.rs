@@ -5,8 +5,10 @@ use std::error::Error;
 use ct_model::{Given, ModelSpec};
 use ct_signals::Channel;
 use ctid_tests::Rig;
-use effect_search::{Diagnosis, Options, Problem, Verdict, diagnose};
+use effect_search::{Diagnosis, Options, Problem, diagnose};
 use plants::Plant;
+
+use crate::record::Answer;
 
 /// The diagnosis with the text of the plant, on the measured command.
 pub fn diagnosed(rig: &Rig, kernel: &missing_effect::Problem) -> Result<Diagnosis, Box<dyn Error>> {
@@ -40,15 +42,20 @@ pub fn diagnosed(rig: &Rig, kernel: &missing_effect::Problem) -> Result<Diagnosi
     Ok(diagnose(&problem, &Options::default(), &|_| {})?)
 }
 
-/// The verdict in the terms of a tank's diagnosis.
-pub fn verdict(verdict: Verdict) -> missing_effect::Verdict {
-    match verdict {
-        Verdict::Adequate => missing_effect::Verdict::Adequate,
-        Verdict::Effect => missing_effect::Verdict::Effect,
-        Verdict::Undecided => missing_effect::Verdict::Undecided,
-        Verdict::Partial => missing_effect::Verdict::Partial,
-        Verdict::Unexplained => missing_effect::Verdict::Unexplained,
-    }
+/// The answer, with the names of the catalogue of tanks.
+pub fn answer(rig: &Rig, found: &Diagnosis) -> Answer {
+    let names = |ids: &[String]| -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for name in ids.iter().map(|id| tank_name(id, rig.plant)) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    };
+    let groups = found.groups.iter().map(|group| names(group)).collect();
+    let named = (names(&found.effects), groups);
+    Answer::new(rig, found.verdict, named, found.seconds)
 }
 
 /// The name of an effect at a port of the plant's text in the catalogue of tanks; the identifier itself if that catalogue has no such effect.

@@ -100,6 +100,27 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// An answer with these effects and groups; without feedback.
+    pub fn new(
+        rig: &Rig,
+        verdict: Verdict,
+        (effects, groups): (Vec<String>, Vec<Vec<String>>),
+        seconds: f64,
+    ) -> Self {
+        Self {
+            plant: rig.plant.id(),
+            drive: rig.drive,
+            hidden: rig.missing().iter().map(|(id, ..)| *id).collect(),
+            verdict,
+            effects,
+            groups,
+            mark: None,
+            pair_falls: None,
+            feedback: false,
+            seconds,
+        }
+    }
+
     /// Whether an effect of the catalogue is named.
     pub fn named(&self) -> bool {
         matches!(
@@ -238,13 +259,14 @@ impl Job {
         };
         let problem = problem(&rig, rig.run(&mut ChaCha8Rng::seed_from_u64(self.seed())));
         if text {
-            return match as_text::diagnosed(&rig, &problem) {
-                Err(why) => refused(why.to_string()),
-                Ok(found) => Outcome {
-                    answer: Some(text_answer(&rig, &found)),
+            let found = as_text::diagnosed(&rig, &problem);
+            return found.map_or_else(
+                |why| refused(why.to_string()),
+                |found| Outcome {
+                    answer: Some(as_text::answer(&rig, &found)),
                     refused: None,
                 },
-            };
+            );
         }
         match diagnose(&problem, &Options::default(), &|_| {}) {
             Err(why) => refused(why.to_string()),
@@ -374,43 +396,10 @@ fn problem(rig: &Rig, record: Record) -> Problem {
 }
 
 fn answer(rig: &Rig, found: &Diagnosis) -> Answer {
+    let named = (found.effects.clone(), found.groups.clone());
     Answer {
-        plant: rig.plant.id(),
-        drive: rig.drive,
-        hidden: rig.missing().iter().map(|(id, ..)| *id).collect(),
-        verdict: found.verdict,
-        effects: found.effects.clone(),
-        groups: found.groups.clone(),
-        mark: None,
-        pair_falls: None,
         feedback: claims_feedback(found),
-        seconds: found.seconds,
-    }
-}
-
-/// The answer with the plant as text, with the names of the catalogue of tanks.
-fn text_answer(rig: &Rig, found: &effect_search::Diagnosis) -> Answer {
-    let names = |ids: &[String]| -> Vec<String> {
-        let mut names: Vec<String> = Vec::new();
-        for id in ids {
-            let name = as_text::tank_name(id, rig.plant);
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        }
-        names
-    };
-    Answer {
-        plant: rig.plant.id(),
-        drive: rig.drive,
-        hidden: rig.missing().iter().map(|(id, ..)| *id).collect(),
-        verdict: as_text::verdict(found.verdict),
-        effects: names(&found.effects),
-        groups: found.groups.iter().map(|group| names(group)).collect(),
-        mark: None,
-        pair_falls: None,
-        feedback: false,
-        seconds: found.seconds,
+        ..Answer::new(rig, found.verdict, named, found.seconds)
     }
 }
 

@@ -185,21 +185,18 @@ impl Context<'_> {
             let mut own = candidate.parameters.iter();
             places[own.position(|own| own.short == parameter)?]
         };
-        if let (Some(at), Some(first)) = (own_place(PERIODIC, "period"), starts.first()) {
-            let first = first.clone();
-            for period in self.periods(node)? {
-                let mut x = first.clone();
-                x[at] = within(period, setup.bounds()[at]);
-                starts.insert(0, x);
+        // Starts from the data come before those of the grid.
+        let from_data = match (own_place(PERIODIC, "period"), candidate.port) {
+            (Some(at), _) => Some((at, self.periods(node)?)),
+            (None, Port::Output(output)) => {
+                own_place(QUANTISATION, "step").map(|at| (at, self.reading_steps[output].clone()))
             }
-        }
-        if let (Some(at), Port::Output(output)) = (own_place(QUANTISATION, "step"), candidate.port)
-            && let Some(first) = starts.first()
-        {
-            let first = first.clone();
-            for step in &self.reading_steps[output] {
+            _ => None,
+        };
+        if let (Some((at, values)), Some(first)) = (from_data, starts.first().cloned()) {
+            for value in values {
                 let mut x = first.clone();
-                x[at] = within(*step, setup.bounds()[at]);
+                x[at] = within(value, setup.bounds()[at]);
                 starts.insert(0, x);
             }
         }

@@ -101,7 +101,7 @@ class Identification:
     @property
     def warnings(self) -> list[str]:
         """Warnings to read before the model is used."""
-        return list(self._found["warnings"])
+        return list(self._found["sentences"])
 
     @property
     def simulated(self) -> tuple[Array, Array]:

@@ -121,11 +121,19 @@ impl Found for SideBySide {
     fn page(&self) -> String {
         report::side_by_side(self)
     }
+
+    fn sentences(&self) -> Option<Vec<String>> {
+        Some(sentences::of_side_by_side(self))
+    }
 }
 
 impl Found for Identification {
     fn page(&self) -> String {
         report::identification(self)
+    }
+
+    fn sentences(&self) -> Option<Vec<String>> {
+        Some(sentences::of_identification(self))
     }
 }
 

@@ -3,7 +3,7 @@
 use ct_signals::quoted;
 use missing_effect::numbers::significant;
 
-use crate::{MAX_ORDER, Method, Order, warnings::or_lower};
+use crate::{MAX_ORDER, Method, Order};
 
 /// Reason why no model was identified.
 #[derive(Debug, thiserror::Error)]
@@ -208,5 +208,23 @@ pub enum Error {
 impl From<ct_rls::Error> for Error {
     fn from(error: ct_rls::Error) -> Self {
         Self::Estimator(error.into())
+    }
+}
+
+/// First suggestion: `--order 2,0, or `; empty without a lower order.
+fn or_lower(order: Order) -> String {
+    order
+        .lower()
+        .map_or_else(String::new, |lower| format!("--order {lower}, or "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lower_order_is_advised_where_there_is_one() {
+        assert_eq!(or_lower(Order { n: 3, m: 3 }), "--order 2,2, or ");
+        assert_eq!(or_lower(Order { n: 1, m: 0 }), "");
     }
 }

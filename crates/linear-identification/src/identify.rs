@@ -3,9 +3,10 @@
 use ct_signals::Record;
 
 use crate::{
-    Error, Identification, Mended, Request,
+    Error, Identification, Mended, Request, Warning,
     checks::{possible, whole},
     looped, mend, recursion, refined,
+    warning::of_gaps,
 };
 
 /// Identifies from one record.
@@ -39,14 +40,13 @@ pub fn identify_mended(records: &[Mended], request: &Request) -> Result<Identifi
         _ => recursion::identify(&first.whole, request),
     }?;
     found.gaps = first.gaps;
-    let sentence = first.gaps.and_then(|gaps| gaps.sentence());
-    found.warnings.extend(sentence);
+    found.warnings.extend(of_gaps(first.gaps));
     let left_out = first.readings_left_out();
     if left_out > 0 && !request.method.is_refined() {
-        found.warnings.push(format!(
-            "{} simulates through long gaps with the input held at its last value, and does not use {left_out} readings after them, until the effect of the gap has decayed; srivc and rivc restart there with new initial states, and use all readings",
-            request.method.id()
-        ));
+        found.warnings.push(Warning::ReadingsAfterGaps {
+            method: request.method,
+            readings: left_out,
+        });
     }
     Ok(found)
 }

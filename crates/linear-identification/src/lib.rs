@@ -86,7 +86,7 @@ mod request;
 mod residual;
 mod result;
 pub mod side_by_side;
-mod warnings;
+mod warning;
 
 pub use error::Error;
 pub use gaps::{Mended, mend};
@@ -99,6 +99,7 @@ pub use refined::{DelayChoice, RecordNoise, Refined};
 pub use request::Request;
 pub use residual::{deviation, rms};
 pub use result::{Identification, Oscillation, Settings, Shown, Trajectory};
+pub use warning::Warning;
 
 /// The example of the README.
 #[cfg(doctest)]

@@ -46,7 +46,8 @@ impl Order {
     }
 
     /// The order with one pole less; `None` for the first order.
-    pub(crate) fn lower(self) -> Option<Self> {
+    #[must_use]
+    pub fn lower(self) -> Option<Self> {
         let n = self.n.checked_sub(1).filter(|n| *n > 0)?;
         Some(Self {
             n,

@@ -4,7 +4,7 @@ use ct_signals::Channel;
 use missing_effect::{MendedGaps, Parameter};
 use serde::Serialize;
 
-use crate::{Drift, InLoop, Method, Order, Refined};
+use crate::{Drift, InLoop, Method, Order, Refined, Warning};
 
 /// Settings that were used.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -45,7 +45,7 @@ pub struct Identification {
     /// `100 (1 - simulation_rmse/s)` with the standard deviation s of the output, %.
     pub fit_percent: f64,
     /// Warnings about the use of the model.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// The parameters over time; for a recursion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trajectory: Option<Trajectory>,

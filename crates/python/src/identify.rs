@@ -2,6 +2,7 @@
 
 use clap::ValueEnum;
 use ct_signals::{Columns, Hold, ReadOptions, Reading};
+use ctid::output::Written;
 use fcloe::Controller;
 use linear_identification::{
     DelayChoice, LevelChoice, Method, Order, Request, identify_mended, mend,
@@ -142,5 +143,5 @@ pub fn identify<'py>(
         PyArray1::from_slice(py, &shown.output.values),
         PyArray1::from_slice(py, &shown.simulated),
     );
-    Ok((crate::diagnosis::json(&found)?, curves))
+    Ok((crate::diagnosis::json(&Written::of(&found))?, curves))
 }

@@ -4,6 +4,7 @@ use linear_identification::side_by_side::{Outcome, Row, SideBySide};
 
 use crate::look::{Look, Side, table};
 use crate::numbers;
+use crate::sentences::{of_violation, of_warning};
 
 /// The complete text.
 #[must_use]
@@ -137,12 +138,14 @@ fn assumptions(found: &SideBySide, look: Look) -> String {
         let Some(outcome) = &row.found else {
             continue;
         };
-        for violated in &outcome.violated {
+        for violation in &outcome.violated {
+            let violated = of_violation(violation, row.method);
             text += &look.paragraph("      ", &format!("violated: {violated}"));
         }
         text += &look.paragraph("      ", &tests(outcome));
         for warning in &outcome.warnings {
-            text += &look.paragraph("      ", &format!("note: {warning}"));
+            let note = format!("note: {}", of_warning(warning));
+            text += &look.paragraph("      ", &note);
         }
     }
     text

@@ -8,6 +8,7 @@ pub(crate) use self::facts::{condition, facts, refined_facts};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
+use crate::sentences;
 
 /// The whole of it.
 #[must_use]
@@ -29,9 +30,9 @@ pub fn text(found: &Identification, look: Look) -> String {
     text += &refined(found, look);
     text += &drift(found, look);
     text += &error(found, look);
-    for warning in &found.warnings {
+    for warning in sentences::of_identification(found) {
         text += &look.warning("note: ");
-        text += look.paragraph("      ", warning).trim_start();
+        text += look.paragraph("      ", &warning).trim_start();
     }
     text
 }

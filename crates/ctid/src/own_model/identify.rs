@@ -55,6 +55,10 @@ impl<T: Found> Found for Beside<'_, T> {
     fn page(&self) -> String {
         self.found.page()
     }
+
+    fn sentences(&self) -> Option<Vec<String>> {
+        self.found.sentences()
+    }
 }
 
 impl<'f> OneByOne<'f> {

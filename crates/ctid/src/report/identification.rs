@@ -6,6 +6,7 @@ use super::tables::table;
 use super::text::{code, escape, significant, unit, with_error};
 use crate::identify::text::{self, condition, drift_verdict, model, time_constant_name};
 use crate::numbers::duration;
+use crate::sentences::of_identification;
 use linear_identification::{Identification, OverLevel};
 
 /// The page as a complete HTML file. The same result gives the same bytes.
@@ -38,8 +39,7 @@ pub fn html(found: &Identification) -> String {
 
 fn headline(found: &Identification) -> String {
     let output = unit(&found.shown.output.unit);
-    let warnings: String = found
-        .warnings
+    let warnings: String = of_identification(found)
         .iter()
         .map(|warning| format!("<p class=\"notice\">{}</p>\n", escape(warning)))
         .collect();

@@ -5,6 +5,7 @@ use super::page::{self, NOTICES, Page, figure, items, large, section};
 use super::tables::table;
 use super::text::{code, escape, significant, unit, with_error};
 use crate::identify::side_by_side_text::{ORDERS, largest_error, measure, tests, with_results};
+use crate::sentences::{of_violation, of_warning};
 use linear_identification::side_by_side::{Row, SideBySide};
 
 /// The page as a complete HTML file.
@@ -131,9 +132,11 @@ fn assumptions(found: &SideBySide) -> String {
             .map(|reason| format!("Refused: {reason}"))
             .collect();
         if let Some(outcome) = &row.found {
-            says.extend(outcome.violated.iter().map(|it| format!("Violated: {it}")));
+            let violated = outcome.violated.iter();
+            says.extend(violated.map(|it| format!("Violated: {}", of_violation(it, row.method))));
             says.push(tests(outcome));
-            says.extend(outcome.warnings.iter().map(|it| format!("Note: {it}")));
+            let warnings = outcome.warnings.iter();
+            says.extend(warnings.map(|it| format!("Note: {}", of_warning(it))));
         }
         format!(
             "<h3>{}</h3>\n<p>Assumes {}.</p>\n<ul>\n{}</ul>\n",

@@ -1,4 +1,5 @@
-//! Sentences from the findings of a plant: the verdict, the effects, the residual, remarks, and the next experiment.
+//! Sentences from the findings of a plant: the verdict, the effects, the residual, remarks, and the next experiment; and from those of an
+//! identification.
 //!
 //! Every sentence is a function of the typed result alone.
 
@@ -6,6 +7,7 @@ mod control_loop;
 mod design;
 mod effects;
 mod failures;
+mod identification;
 mod prior;
 mod rejections;
 pub(crate) mod remarks;
@@ -14,6 +16,7 @@ mod residual;
 mod tests;
 mod unknown;
 mod verdict;
+mod warnings;
 
 use missing_effect::numbers::value_and_error;
 use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
@@ -21,8 +24,10 @@ use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
 use self::control_loop::of_the_loop;
 pub use self::design::of_design;
 pub use self::failures::of_failures;
+pub use self::identification::{of_identification, of_side_by_side, of_violation};
 pub use self::prior::of_prior;
 pub use self::rejections::of_rejections;
+pub use self::warnings::of_warning;
 
 /// The findings of a comparison or a diagnosis in sentences: first one for each accepted effect, or the verdict; then the rest of the
 /// verdict, the unexplained error, and remarks. Empty if nothing was fitted.

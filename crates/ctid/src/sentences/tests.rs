@@ -1,5 +1,7 @@
 //! Sentences of a few typical results.
 
+use linear_identification::side_by_side::Violation;
+use linear_identification::{Method, Order, Warning};
 use missing_effect::{ControlLoop, NotNoise, NotSimulated, PerOutput, Remark, Verdict};
 
 use super::of_diagnosis;
@@ -228,4 +230,61 @@ fn a_loop_that_is_not_simulated_says_why() {
             assert!(said.contains(part), "{said}");
         }
     }
+}
+
+/// There is no order below the first: then faster sampling is advised.
+#[test]
+fn a_lower_order_is_advised_where_there_is_one() {
+    let said = |lower| {
+        super::of_warning(&Warning::BelowStep {
+            time_constant: 0.5,
+            step: 2.0,
+            lower,
+        })
+    };
+    let first = said(Some(Order { n: 1, m: 0 }));
+    assert!(
+        first.starts_with("the fastest time constant, 0.50 s, is below the longest step of 2 s: ")
+            && first.ends_with("; try --order 1,0"),
+        "{first}"
+    );
+    assert!(said(None).ends_with("; sample faster"), "{}", said(None));
+}
+
+#[test]
+fn a_parameter_that_may_be_zero_has_its_relative_error() {
+    let said = |lower| {
+        super::of_warning(&Warning::NotSignificant {
+            parameter: "b0_2".to_string(),
+            value: -0.5,
+            std_error: 0.3,
+            lower,
+        })
+    };
+    let start =
+        "b0_2 is not significantly different from 0: its standard error is 60 % of its value; ";
+    assert_eq!(
+        said(None),
+        format!("{start}try a lower --order, or leave out its input or term")
+    );
+    assert_eq!(
+        said(Some(Order { n: 2, m: 1 })),
+        format!("{start}try --order 2,1")
+    );
+}
+
+#[test]
+fn an_error_above_the_least_has_its_reason_by_method() {
+    let worse = Violation::WorseThanLeast {
+        rmse: 0.3,
+        least: 0.2,
+    };
+    assert_eq!(
+        super::of_violation(&worse, Method::Ls),
+        "its error is 50 % above the least of this order: noise may bias it"
+    );
+    assert!(
+        super::of_violation(&worse, Method::Fcloe).ends_with("or of this order"),
+        "{worse:?}"
+    );
 }

@@ -6,7 +6,7 @@ mod program;
 
 use ct_lti::{Simulator, StateSpace, TransferFunction};
 use ct_signals::{Channel, Hold, Record, excitation, noise};
-use linear_identification::{Identification, Method, Order, Request, identify};
+use linear_identification::{Identification, Method, Order, Request, Warning, identify};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 
@@ -128,7 +128,7 @@ fn without_noise_the_plant_is_found_in_its_units() {
                 );
             }
             assert!(found.fit_percent > 99.0, "{}", found.fit_percent);
-            assert_eq!(found.warnings, Vec::<String>::new(), "{method:?}");
+            assert_eq!(found.warnings, Vec::<Warning>::new(), "{method:?}");
         }
     }
 }
@@ -215,7 +215,7 @@ fn steps_longer_than_the_time_constant_do_not_become_it() {
         let told = found
             .warnings
             .iter()
-            .any(|w| w.contains("below the longest step"));
+            .any(|w| matches!(w, Warning::BelowStep { .. }));
         (found.parameters[0].value, told)
     };
     // The remaining error comes from the output between samples, which is not linear: a warning is given if it is the larger error.
@@ -239,13 +239,9 @@ fn where_a_bound_has_held_a_parameter_no_standard_error_is_given() {
         ..Request::new(Method::StabilizedOe, Order { n: 3, m: 0 })
     };
     let found = identify(&record, &request).unwrap();
-    let said = |warning: &&String| warning.contains("a bound held");
-    let warning = found.warnings.iter().find(said);
-    assert!(
-        warning.is_some_and(|w| w.contains("try --order 2,0")),
-        "{:?}",
-        found.warnings
-    );
+    let second = Some(Order { n: 2, m: 0 });
+    let held = |warning: &Warning| matches!(warning, Warning::HeldByBound { steps: 1.., lower } if *lower == second);
+    assert!(found.warnings.iter().any(held), "{:?}", found.warnings);
     assert!(found.parameters.iter().all(|p| p.std_error.is_none()));
     assert!(found.drift.is_none());
 }
@@ -272,14 +268,9 @@ fn an_order_too_high_is_said() {
     };
     let order = Order { n: 2, m: 0 };
     let found = found(&plant.record(2000, 4), Method::StabilizedOe, order);
-    assert!(
-        found
-            .warnings
-            .iter()
-            .any(|warning| warning.contains("try --order 1,0")),
-        "{:?}",
-        found.warnings
-    );
+    let first = Some(Order { n: 1, m: 0 });
+    let too_high = |warning: &Warning| matches!(warning, Warning::NotSignificant { lower, .. } if *lower == first);
+    assert!(found.warnings.iter().any(too_high), "{:?}", found.warnings);
 }
 
 #[test]
@@ -371,6 +362,6 @@ fn a_memory_too_short_for_standard_errors_is_said() {
     let found = identify(&SECOND.record(2000, 1), &request).unwrap();
     assert!(found.parameters.iter().all(|p| p.std_error.is_none()));
     assert!(found.drift.is_none());
-    let said = |warning: &String| warning.contains("standard errors are not known");
+    let said = |warning: &Warning| matches!(warning, Warning::StdErrorsUnknown { memory, needed, .. } if needed > memory);
     assert!(found.warnings.iter().any(said), "{:?}", found.warnings);
 }

@@ -6,7 +6,7 @@ use fcloe::{LoopRecord, Offsets, Problem, Stop};
 use super::levels::chosen;
 use super::regression::name;
 use super::{Batch, Found, LevelChoice, Start, Task};
-use crate::Error;
+use crate::{Error, Warning};
 
 impl Task<'_> {
     /// The whole record's fit, from the best few starts.
@@ -49,7 +49,7 @@ impl Task<'_> {
         }
         let mut warnings = Vec::new();
         if !fit.stop.was_successful() {
-            warnings.push(stopped(fit.stop).to_owned());
+            warnings.push(Warning::FitStopped { stop: fit.stop });
         }
         let levels = fit.levels.first().map_or([f64::NAN; 2], |l| [l.drive, l.y]);
         Ok(Found {
@@ -87,13 +87,5 @@ impl Task<'_> {
             self.orders,
             &settings,
         )?)
-    }
-}
-
-/// Reason why a fit is not reliable.
-fn stopped(stop: Stop) -> &'static str {
-    match stop {
-        Stop::Iterations => "the fit ran out of iterations: try a lower --order",
-        _ => "the fit did not come to a minimum: try a lower --order",
     }
 }

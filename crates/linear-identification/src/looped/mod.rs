@@ -15,11 +15,11 @@ use missing_effect::Parameter;
 use serde::Serialize;
 
 use crate::{
-    Error, Identification, Method, Order, Request, Shown, Trajectory,
+    Error, Identification, Method, Order, Request, Shown, Trajectory, Warning,
     checks::positive,
     parameters::{names, plant, poles},
     residual::{deviation, errors, rms},
-    warnings::{doubtful, too_fast},
+    warning::{doubtful, too_fast},
 };
 pub use levels::LevelChoice;
 
@@ -115,7 +115,7 @@ struct Found {
     start: Start,
     batch: Option<Batch>,
     recursion: Option<Run>,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
 }
 
 /// Result of a recursion.
@@ -198,10 +198,7 @@ impl Task<'_> {
         let deviation = deviation(output);
         let mut warnings = found.warnings;
         if self.request.levels == LevelChoice::Auto && found.levels_from == LevelChoice::Mean {
-            warnings.push(
-                "the record does not begin at rest: its mean values were used as the operating point, which biases the estimates; --method fcloe estimates the operating point, and --levels sets it"
-                    .to_owned(),
-            );
+            warnings.push(Warning::MeanLevels);
         }
         warnings.extend(mismatch.and_then(|mismatch| missed(&mismatch)));
         warnings.extend(limited(record, self.request.limits));
@@ -222,7 +219,7 @@ impl Task<'_> {
         let (trajectory, health) = recursion.unzip();
         let of = |polynomial: &ct_lti::Polynomial| polynomial.coefficients().to_vec();
         Ok(Identification {
-            schema: 1,
+            schema: 2,
             method: self.request.method,
             order,
             record: record.name.clone(),
@@ -261,13 +258,17 @@ impl Task<'_> {
 
     /// Reason why the end of a recursion is not reliable, if there is one: its loop was nearly unstable, or one model for the whole record
     /// has a much smaller simulation error.
-    fn astray(&self, health: &LoopHealth, rmse: f64, deviation: f64, unit: &str) -> Option<String> {
-        let untold = "so condition (14) is not reported";
+    fn astray(
+        &self,
+        health: &LoopHealth,
+        rmse: f64,
+        deviation: f64,
+        unit: &str,
+    ) -> Option<Warning> {
         if health.refused > 0 {
-            return Some(format!(
-                "{} steps were refused, as the loop would not have been stable: the estimates are not to be trusted, {untold}; compare with --method fcloe",
-                health.refused
-            ));
+            return Some(Warning::StepsRefused {
+                steps: health.refused,
+            });
         }
         if rmse <= SURELY_GOOD * deviation {
             return None;
@@ -278,10 +279,10 @@ impl Task<'_> {
             .simulated(&batch.record, &batch.plant, batch.levels)
             .ok()?;
         let best = rms(errors(&self.record.outputs[0], &simulated));
-        (rmse > MUCH_WORSE * best).then(|| {
-            format!(
-                "--method fcloe simulates the record with an error of {best:.3} {unit} instead of {rmse:.3}: the plant drifts, or the recursion diverged, {untold}"
-            )
+        (rmse > MUCH_WORSE * best).then(|| Warning::BatchBetter {
+            batch_rmse: best,
+            rmse,
+            unit: unit.to_owned(),
         })
     }
 
@@ -335,25 +336,15 @@ impl Task<'_> {
 }
 
 /// Warning about a small difference between controller and command.
-fn missed(mismatch: &Mismatch) -> Option<String> {
+fn missed(mismatch: &Mismatch) -> Option<Warning> {
     let share = mismatch.systematic / mismatch.size;
-    (share > MISSED).then(|| {
-        format!(
-            "the controller does not explain {:.0} % of the response of the measured command to the reference: this error biases the estimates; check gain and integral_time",
-            100.0 * share
-        )
-    })
+    (share > MISSED).then_some(Warning::ControllerMismatch { share })
 }
 
 /// The command is at its limits, where the loop is not linear.
-fn limited(record: &Record, (low, high): (f64, f64)) -> Option<String> {
+fn limited(record: &Record, (low, high): (f64, f64)) -> Option<Warning> {
     let values = &record.inputs[0].values;
     let at = values.iter().filter(|u| **u <= low || **u >= high).count();
     let share = at as f64 / values.len().max(1) as f64;
-    (share > LIMITED).then(|| {
-        format!(
-            "the command is at its limits of {low} and {high} in {:.0} % of the rows: there the loop is not linear, and the estimates are biased",
-            100.0 * share
-        )
-    })
+    (share > LIMITED).then_some(Warning::CommandAtLimits { low, high, share })
 }

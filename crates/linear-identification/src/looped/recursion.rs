@@ -8,7 +8,7 @@ use fcloe::{
 
 use super::levels::chosen;
 use super::{Found, LevelChoice, Run, Start, Task};
-use crate::{Error, Trajectory, residual::rms};
+use crate::{Error, Trajectory, Warning, residual::rms};
 
 /// The share of the record for the start of a recursion.
 const BEGINNING: f64 = 0.3;
@@ -48,10 +48,7 @@ impl Task<'_> {
         let begun = match begun {
             Ok(begun) => begun,
             Err(_) => {
-                warnings.push(
-                    "the first rows do not determine a start: the start was taken from the whole record, so the recursion uses future samples"
-                        .to_owned(),
-                );
+                warnings.push(Warning::StartFromWholeRecord);
                 self.begun(record.clone())?
             }
         };

@@ -5,7 +5,7 @@ use fcloe::{LoopRecord, PlantModel};
 
 use super::levels::chosen;
 use super::{Found, Start, Task};
-use crate::{Error, residual::rms};
+use crate::{Error, Warning, residual::rms};
 
 /// Number of iterations of instruments with a constant filter, and of both instruments and filter.
 const INSTRUMENTS: usize = 3;
@@ -72,13 +72,14 @@ impl Task<'_> {
             match start::standard_errors(records, &self.controller, &filter, &plant) {
                 Ok(errors) => {
                     std_errors = errors.into_iter().map(Some).collect();
-                    "the standard errors assume that the levels are exact: --method fcloe estimates them"
-                        .to_owned()
+                    Warning::LevelsTakenAsExact
                 }
-                Err(error) => format!("no standard errors: {error}"),
+                Err(error) => Warning::NoStdErrors {
+                    why: error.to_string(),
+                },
             }
         } else {
-            "noise biases least squares by more than standard errors show, so none are given; --method iv and fcloe have them".to_owned()
+            Warning::BiasedByNoise
         };
         Ok(Found {
             levels: self.levels_of(&record),

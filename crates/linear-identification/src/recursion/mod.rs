@@ -17,7 +17,7 @@ use crate::{
     checks::{moves, positive},
     parameters::{names, plant, poles},
     residual::{errors, rms},
-    warnings::{doubtful, too_fast, unsure, worse_than_first_order},
+    warning::{doubtful, too_fast, unsure, worse_than_first_order},
 };
 pub use drift::{Drift, OverLevel};
 
@@ -80,7 +80,7 @@ pub(crate) fn identify(record: &Record, request: &Request) -> Result<Identificat
         &record.outputs[0].unit,
     ));
     Ok(Identification {
-        schema: 1,
+        schema: 2,
         method: request.method,
         order,
         record: record.name.clone(),

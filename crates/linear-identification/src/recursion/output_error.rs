@@ -13,7 +13,7 @@ use super::{
     scaled::Scaled,
     start,
 };
-use crate::{Error, Order, warnings::lower_or_faster};
+use crate::{Error, Order, Warning};
 
 const P_OUTPUT_ERROR: f64 = 10.0;
 /// Ranges of the plausible plants around the start, with bounds on c: factors; the widest range with guaranteed convergence is used.
@@ -61,9 +61,7 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
     let mut path = Path::new(order);
     let (bounds, plausible) = filter_bounds(&a)?;
     if plausible.is_none() {
-        path.warnings.push(format!(
-            "no bounds on the error filter guarantee convergence for plants around the start, for n = {N}; compare with --method ct-rls"
-        ));
+        path.warnings.push(Warning::NoFilterBounds { n: N });
     }
     let filters = StateVariableFilters::<N>::with_input(scaled.bandwidth, scaled.hold)?;
     let mut estimator = StabilizedOe::new(gain, filters)?
@@ -101,17 +99,17 @@ fn parallel<const N: usize, const P: usize>(scaled: &Scaled, order: Order) -> Re
     let held = estimator.bounded().theta - held_early;
     if held > 0 {
         path.held = true;
-        path.warnings.push(format!(
-            "a time constant is too short to be identified: in the second half a bound held a coefficient of A above 0 (steps: {held}), and standard errors \
-             are not known; {}",
-            lower_or_faster(order)
-        ));
+        path.warnings.push(Warning::HeldByBound {
+            steps: held,
+            lower: order.lower(),
+        });
     }
     let unstable = estimator.bounded().unstable;
     if unstable > 0 {
-        path.warnings.push(format!(
-            "{unstable} of {count} steps would have made the model unstable, and were shortened"
-        ));
+        path.warnings.push(Warning::StepsShortened {
+            steps: unstable,
+            count,
+        });
     }
     path.warnings.extend(left_plausible(&path, plausible, &a)?);
     Ok(path)
@@ -163,7 +161,7 @@ fn left_plausible<const N: usize>(
     path: &Path,
     reach: Option<f64>,
     a: &[f64; N],
-) -> Result<Option<String>, Error> {
+) -> Result<Option<Warning>, Error> {
     let Some(reach) = reach else { return Ok(None) };
     let found = &path.last()?.theta;
     let found: [f64; N] = core::array::from_fn(|i| found[i]);
@@ -173,14 +171,12 @@ fn left_plausible<const N: usize>(
     // Outside the box the bounds may still be sufficient.
     let [.., here] = PLAUSIBLE;
     let (bounds, _) = filter_bounds(a)?;
-    Ok(match check_filter_bounds(&bounds, &about(&found, here)?, 0.5)? {
-        FilterBounds::PositiveReal => None,
-        _ => Some(
-            "the error filter's bounds do not guarantee convergence for the plant that was found (C/A - 1/2 is not strictly positive real): \
-             compare with --method ct-rls"
-                .to_owned(),
-        ),
-    })
+    Ok(
+        match check_filter_bounds(&bounds, &about(&found, here)?, 0.5)? {
+            FilterBounds::PositiveReal => None,
+            _ => Some(Warning::ConvergenceNotGuaranteed),
+        },
+    )
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::scaled::Scaled;
-use crate::{Error, Order};
+use crate::{Error, Order, Warning};
 
 /// Number of stored points of the trajectory.
 const POINTS: usize = 500;
@@ -28,7 +28,7 @@ pub(super) struct Path {
     /// Bounds on the parameters were active in the second half: then the variance of the estimates contains no information about their
     /// errors.
     pub held: bool,
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Path {

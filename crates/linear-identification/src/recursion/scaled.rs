@@ -4,7 +4,7 @@ use ct_lti::{Hold, ReadingFilter, Start, StateVariableFilter};
 use ct_signals::Record;
 use nalgebra::{DMatrix, DVector};
 
-use crate::{Error, Order, Request, Settings};
+use crate::{Error, Order, Request, Settings, Warning};
 
 /// Time constants that are tried, between the sampling interval and the length of the record.
 const GRID: usize = 60;
@@ -54,7 +54,7 @@ pub(super) struct Scaled {
 
 impl Scaled {
     /// The record must have rows, and signals that change. Also collects warnings.
-    pub fn new(record: &Record, request: &Request) -> (Self, Vec<String>) {
+    pub fn new(record: &Record, request: &Request) -> (Self, Vec<Warning>) {
         let begin = record.time.first().copied().unwrap_or(0.0);
         let (duration, step) = (record.duration(), record.sample_interval());
         let hold = match record.hold() {
@@ -75,33 +75,38 @@ impl Scaled {
         let (unit, first_order, first_order_error, at_edge) = first_order(record, &u, &y, hold);
         let mut warnings = Vec::new();
         if at_edge {
-            warnings.push(format!(
-                "no time constant between the sampling interval of {step} s and the length of the record of {duration} s fits better than the last one tried, {unit:.3} s: \
-                 sample faster, or record longer"
-            ));
+            warnings.push(Warning::TimeConstantAtEdge {
+                time_constant: unit,
+                interval: step,
+                length: duration,
+            });
         }
         // The bandwidth of the filters has to be below the sampling rate.
         let fastest = 1.0 / step;
         let bandwidth = request.bandwidth.unwrap_or((BANDWIDTH / unit).min(fastest));
         if bandwidth > 2.0 * fastest {
-            warnings.push(format!(
-                "the filters' bandwidth of {bandwidth} 1/s is too high for a sampling interval of {step} s; take --bandwidth {fastest:.3} at most"
-            ));
+            warnings.push(Warning::BandwidthTooHigh {
+                bandwidth,
+                interval: step,
+                most: fastest,
+            });
         }
         let slowest = LEAST_BANDWIDTH / unit;
         if bandwidth < slowest {
-            warnings.push(format!(
-                "the filters' bandwidth of {bandwidth} 1/s suppresses a time constant of {unit:.3} s: it cannot be identified, although its standard errors may be small; \
-                 take --bandwidth {slowest:.3e} at least"
-            ));
+            warnings.push(Warning::BandwidthTooLow {
+                bandwidth,
+                time_constant: unit,
+                least: slowest,
+            });
         }
         let memory = request
             .memory
             .unwrap_or((MEMORY_PART * duration).max(LEAST_MEMORY * unit));
         if memory < 5.0 * unit {
-            warnings.push(format!(
-                "the memory of {memory} s is below 5 time constants of {unit:.3} s: the estimates follow the noise"
-            ));
+            warnings.push(Warning::MemoryTooShort {
+                memory,
+                time_constant: unit,
+            });
         }
         let scaled = Self {
             time: record.time.iter().map(|t| (t - begin) / unit).collect(),

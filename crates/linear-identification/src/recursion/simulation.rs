@@ -4,7 +4,7 @@ use ct_lti::{Hold, Simulator, StateSpace, TransferFunction};
 use nalgebra::{DMatrix, DVector};
 
 use super::scaled::Scaled;
-use crate::{Error, Order};
+use crate::{Error, Order, Warning};
 
 /// A free response is significant if this share of it is present at the end of the record.
 const LASTING: f64 = 0.2;
@@ -14,7 +14,7 @@ pub(super) fn simulate(
     scaled: &Scaled,
     order: Order,
     theta: &DVector<f64>,
-) -> Result<(Vec<f64>, Option<String>), Error> {
+) -> Result<(Vec<f64>, Option<Warning>), Error> {
     let (a, rest) = theta.as_slice().split_at(order.n);
     let (b, offset) = rest.split_at(order.m + 1);
     let driven = Driven {
@@ -27,9 +27,7 @@ pub(super) fn simulate(
     let Response { forced, fading } = driven.respond(a, b, offset)?;
     let lasting = fading.iter().rev().take(fading.len().div_ceil(10));
     let at_end = lasting.fold(0.0_f64, |most, x| most.max(x.abs()));
-    let warning = (at_end > LASTING).then(|| {
-        "the model is so slow that its initial state still matters at the end of the record: record longer".to_owned()
-    });
+    let warning = (at_end > LASTING).then_some(Warning::InitialStateLasts { share: at_end });
     let simulated = forced
         .iter()
         .zip(&fading)

@@ -9,8 +9,8 @@ mod delay;
 mod result;
 mod visible;
 
-use ct_signals::{Record, quoted};
-use missing_effect::{Parameter, numbers};
+use ct_signals::Record;
+use missing_effect::Parameter;
 use rivc::{Data, Delay, Kind, Noise, Structure};
 
 pub(crate) use self::data::data;
@@ -23,11 +23,11 @@ pub use self::{
     result::{RecordNoise, Refined},
 };
 use crate::{
-    Error, Identification, Mended, Method, Order, Request, Shown,
+    Error, Identification, Mended, Method, Order, Request, Shown, Warning,
     checks::positive,
     parameters::{gain_unit, poles, power_of_time},
     residual::{errors, rms},
-    warnings::{doubtful, too_fast},
+    warning::{doubtful, not_significant, too_fast},
 };
 
 /// The default limit of an estimated delay as a share of the shortest record.
@@ -123,27 +123,23 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
     let (time_constants, oscillations) = poles(dynamics)?;
     let mut warnings = Vec::new();
     if let Some(share) = found.explained.filter(|share| *share < EXPLAINED) {
-        warnings.push(format!(
-            "the reference explains only {:.0} % of the input: instruments from it are weak; where the record is not of a loop, name time, input and output alone by --columns",
-            100.0 * share
-        ));
+        warnings.push(Warning::WeakReference { share });
     }
     if !found.converged {
-        warnings.push(format!(
-            "the estimates did not converge in {} iterations, and have no standard errors: try a lower --order, or another --bandwidth",
-            found.iterations
-        ));
+        warnings.push(Warning::NotConverged {
+            iterations: found.iterations,
+        });
     }
     if estimates_delay {
         let pairs = parameters.iter().zip(&found.parameters);
         for (parameter, _) in pairs.filter(|(_, found)| found.std_error.is_none()) {
-            let value = numbers::significant(parameter.value, 4);
+            let name = parameter.name.clone();
             warnings.push(match parameter.value {
-                0.0 => format!("no {} was found: the best one is 0", parameter.name),
-                _ => format!(
-                    "{} is at its largest, {value} s: the estimates are those of that delay; give a larger one by --delay 0..S",
-                    parameter.name
-                ),
+                0.0 => Warning::NoDelay { parameter: name },
+                delay => Warning::DelayAtLimit {
+                    parameter: name,
+                    delay,
+                },
             });
         }
     }
@@ -152,21 +148,19 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
         low == high
     };
     if let Some(reference) = first.references.first().filter(is_constant) {
-        warnings.push(format!(
-            "\"{}\" is constant: if a controller moved the input, these estimates, which take it for open loop, are biased",
-            quoted(&reference.name)
-        ));
+        warnings.push(Warning::ConstantReference {
+            reference: reference.name.clone(),
+        });
     }
     if let Some(slowest) = time_constants
         .first()
         .filter(|slowest| **slowest > shortest || **slowest < 0.0)
         && !request.integrator
     {
-        warnings.push(format!(
-            "the slowest time constant, {} s, is beyond the record's length of {} s: the plant may integrate: try --integrator",
-            numbers::significant(*slowest, 3),
-            numbers::significant(shortest, 3)
-        ));
+        warnings.push(Warning::BeyondRecord {
+            time_constant: *slowest,
+            length: shortest,
+        });
     }
     if inputs == 1 && !request.integrator {
         warnings.extend(doubtful(&parameters, request.order));
@@ -174,21 +168,13 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
     for (parameter, found) in parameters.iter().zip(&found.parameters) {
         let own = inputs > 1 || request.integrator;
         let of_plant = !matches!(found.kind, Kind::Offset { .. });
-        if let Some(error) = parameter.std_error.filter(|_| own && of_plant)
-            && parameter.value.abs() < 2.0 * error
-        {
-            warnings.push(format!(
-                "{} is not significantly different from 0: its standard error is {:.0} % of its value; try a lower --order, or leave out its input or term",
-                parameter.name,
-                100.0 * error / parameter.value.abs()
-            ));
+        if own && of_plant {
+            warnings.extend(not_significant(parameter, None));
         }
     }
     warnings.extend(too_fast(&time_constants, first, request.order));
     if unused > 0 {
-        warnings.push(format!(
-            "{unused} rows between long gaps are too few for initial states of their own, and are not used"
-        ));
+        warnings.push(Warning::RowsNotUsed { rows: unused });
     }
     let mut visible = Visible::default();
     let (mut all_errors, mut deviations) = (Vec::new(), Vec::new());
@@ -221,13 +207,11 @@ pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identificati
     let rmse = rms(all_errors.into_iter());
     let deviation = rms(deviations.into_iter());
     if rmse > deviation {
-        warnings.push(
-            "the model simulates worse than a constant does: the plant may be unstable without its controller, which these methods do not identify (--method fcloe does); the input may depend on the output alone, through a controller whose reference is missing or constant; or the order or --integrator is wrong".to_owned(),
-        );
+        warnings.push(Warning::WorseThanConstant { rmse, deviation });
     }
     let input_names = first.inputs.iter();
     let identification = Identification {
-        schema: 1,
+        schema: 2,
         method: request.method,
         order: request.order,
         record: first.name.clone(),

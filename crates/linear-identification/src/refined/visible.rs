@@ -1,8 +1,8 @@
 //! Test whether the simulation error depends on an input or, in a loop, on the reference.
 
-use ct_signals::{Record, quoted, residual_tests};
+use ct_signals::{Record, residual_tests};
 
-use crate::{Error, Shown};
+use crate::{Error, Shown, Warning};
 
 /// Largest number of lags for the test that the error does not depend on a signal.
 const MOST_LAGS: usize = 25;
@@ -70,19 +70,13 @@ impl Visible {
         Ok(())
     }
 
-    pub fn warning(self, inputs: usize) -> Option<String> {
-        let (p, name) = self.least?;
-        let several = match inputs {
-            1 => "",
-            _ => {
-                " (one A serves all inputs, so that time constants that differ need a higher order)"
-            }
-        };
-        (p * (self.tests as f64) < UNLIKELY).then(|| {
-            format!(
-                "the simulation error depends on \"{}\": the order is too low{several}, there is a delay (try --delay auto), or the plant is not linear; the standard errors do not hold then",
-                quoted(&name)
-            )
+    pub fn warning(self, inputs: usize) -> Option<Warning> {
+        let (p, signal) = self.least?;
+        let p_value = p * (self.tests as f64);
+        (p_value < UNLIKELY).then_some(Warning::DependsOnSignal {
+            signal,
+            inputs,
+            p_value,
         })
     }
 }

@@ -30,7 +30,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use self::outcome::{outcome, spread};
-pub use self::result::{Outcome, Row, SideBySide};
+pub use self::result::{Outcome, Row, SideBySide, Violation};
 pub use crate::order::Orders;
 use crate::{Error, Mended, Method, Order, Request, Shown, identify_mended};
 
@@ -129,7 +129,7 @@ pub fn compare(
         .collect();
     methods.sort_by(|a, b| a.rmse().total_cmp(&b.rmse()));
     Ok(SideBySide {
-        schema: 1,
+        schema: 2,
         record: record.name.clone(),
         in_loop,
         test: test.iter().map(|test| test.whole.name.clone()).collect(),
@@ -169,32 +169,22 @@ fn violated(
     found: &Outcome,
     (least, spread): (f64, f64),
     in_loop: bool,
-) -> Vec<String> {
+) -> Vec<Violation> {
     let mut violated = Vec::new();
     if in_loop && !method.is_of_loop() && !method.is_refined() {
-        violated.push("the controller feeds the noise back to the input".to_owned());
+        violated.push(Violation::NoiseFedBack);
     }
     if found.input_p < UNLIKELY {
-        violated.push(
-            "the simulation error depends on the input: the order is too low, there is a delay (srivc and rivc find one by --delay auto), or the plant is not linear"
-                .to_owned(),
-        );
+        violated.push(Violation::DependsOnInput {
+            p_value: found.input_p,
+        });
     }
     let worse = found.rmse > WORSE * least && found.rmse - least > SEEN * spread;
     if worse && !in_loop {
-        let why = match method {
-            Method::CtRls | Method::Ls => "noise may bias it",
-            Method::StabilizedOe | Method::RecursiveFcloe => {
-                "the plant may have changed, or it has not converged"
-            }
-            Method::Iv | Method::Fcloe | Method::Srivc | Method::Rivc => {
-                "the plant may not be linear, or of this order"
-            }
-        };
-        let percent = 100.0 * (found.rmse / least - 1.0);
-        violated.push(format!(
-            "its error is {percent:.0} % above the least of this order: {why}"
-        ));
+        violated.push(Violation::WorseThanLeast {
+            rmse: found.rmse,
+            least,
+        });
     }
     violated
 }

@@ -3,7 +3,9 @@
 use ct_signals::{ArModel, Channel, Record, residual_tests};
 
 use super::Outcome;
-use crate::{Error, Identification, Mended, Method, refined::data, residual::rms};
+use crate::{
+    Error, Identification, Mended, Method, refined::data, residual::rms, warning::of_gaps,
+};
 
 /// Order of the noise model of a simulation error, at most.
 const NOISE_ORDER: usize = 6;
@@ -86,7 +88,7 @@ pub(super) fn outcome(
         violated: Vec::new(),
         // Warnings that are common to all methods are reported once.
         warnings: {
-            let gaps = mended.gaps.and_then(|gaps| gaps.sentence());
+            let gaps = of_gaps(mended.gaps);
             let own = found.warnings.iter();
             own.filter(|warning| Some(*warning) != gaps.as_ref())
                 .cloned()

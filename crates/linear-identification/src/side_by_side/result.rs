@@ -3,7 +3,7 @@
 use missing_effect::{MendedGaps, Parameter};
 use serde::Serialize;
 
-use crate::{Method, Order, Shown};
+use crate::{Method, Order, Shown, Warning};
 
 /// Results of all methods.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -71,13 +71,33 @@ pub struct Outcome {
     pub whiteness_p: f64,
     /// p-value of the test that the simulation error does not depend on the input.
     pub input_p: f64,
-    /// Assumptions that the record violates, in words.
-    pub violated: Vec<String>,
+    /// Assumptions that the record violates.
+    pub violated: Vec<Violation>,
     /// Warnings of the method.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// The simulated output.
     #[serde(skip)]
     pub simulated: Vec<f64>,
+}
+
+/// An assumption of a method that the record violates.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Violation {
+    /// The controller feeds the noise back to the input.
+    NoiseFedBack,
+    /// The simulation error depends on the input.
+    DependsOnInput {
+        /// p-value of the hypothesis that it does not; [`Outcome::input_p`].
+        p_value: f64,
+    },
+    /// The simulation error exceeds the least one of this order.
+    WorseThanLeast {
+        /// Simulation error, root mean square, in the output's unit.
+        rmse: f64,
+        /// The least of all methods with this order, in the same unit.
+        least: f64,
+    },
 }
 
 impl Row {

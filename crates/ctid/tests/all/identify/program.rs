@@ -1,6 +1,7 @@
 //! The program: its files and errors.
 
 use ct_signals::{ReadOptions, Reading, read_csv};
+use ctid::sentences::of_identification;
 use linear_identification::{Method, Order, Request, identify};
 
 use super::{FIRST, SECOND, found};
@@ -22,7 +23,11 @@ fn the_program_writes_what_it_prints() {
             assert!(line.chars().count() <= 80, "wider than 80: {line}");
         }
         let json = place.json("out.json");
-        assert_eq!(json["schema"], 1);
+        assert_eq!(json["schema"], 2);
+        assert_eq!(
+            json["sentences"].as_array().unwrap().len(),
+            json["warnings"].as_array().unwrap().len()
+        );
         assert_eq!(json["method"], method);
         let names: Vec<&str> = json["parameters"]
             .as_array()
@@ -124,11 +129,8 @@ fn no_order_below_the_first_is_advised() {
     for y in &mut record.outputs[0].values[2000..] {
         *y = 40.0 + 2.0 * (*y - 40.0);
     }
-    let warnings = |order| {
-        found(&record, Method::StabilizedOe, order)
-            .warnings
-            .join("; ")
-    };
+    let warnings =
+        |order| of_identification(&found(&record, Method::StabilizedOe, order)).join("; ");
     let first = warnings(FIRST.order());
     assert!(first.contains("try a longer --memory"), "{first}");
     assert!(!first.contains("lower"), "{first}");

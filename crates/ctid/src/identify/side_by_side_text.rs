@@ -4,7 +4,7 @@ use linear_identification::side_by_side::{Outcome, Row, SideBySide};
 
 use crate::look::{Look, Side, table};
 use crate::numbers;
-use crate::sentences::{of_violation, of_warning};
+use crate::sentences::{of_gaps, of_violation, of_warning};
 
 /// The complete text.
 #[must_use]
@@ -34,7 +34,7 @@ pub(crate) fn measure(found: &SideBySide) -> String {
     } else {
         ""
     };
-    let gaps = found.gaps.and_then(|gaps| gaps.sentence());
+    let gaps = found.gaps.as_ref().and_then(of_gaps);
     let gaps = gaps.map_or_else(String::new, |sentence| format!(" {sentence}"));
     format!(
         "Fit: each model runs on the input alone, from an initial state and a level that are fitted, on the record{test}; it is not a \

@@ -7,6 +7,7 @@ mod control_loop;
 mod design;
 mod effects;
 mod failures;
+mod gaps;
 mod identification;
 mod prior;
 mod rejections;
@@ -24,6 +25,7 @@ use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
 use self::control_loop::of_the_loop;
 pub use self::design::of_design;
 pub use self::failures::of_failures;
+pub use self::gaps::of_gaps;
 pub use self::identification::{of_identification, of_side_by_side, of_violation};
 pub use self::prior::of_prior;
 pub use self::rejections::of_rejections;
@@ -65,7 +67,7 @@ pub fn of_diagnosis(diagnosis: &Diagnosis) -> Vec<String> {
     said.extend(remarks::of_rankings(&diagnosis.rankings));
     let control_loop = diagnosis.control_loop.iter();
     said.extend(control_loop.map(|known| of_the_loop(known, &diagnosis.input_unit)));
-    said.extend(diagnosis.gaps.and_then(|gaps| gaps.sentence()));
+    said.extend(diagnosis.gaps.as_ref().and_then(of_gaps));
     said
 }
 

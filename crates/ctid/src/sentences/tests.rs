@@ -1,8 +1,9 @@
 //! Sentences of a few typical results.
 
+use ct_signals::Gaps;
 use linear_identification::side_by_side::Violation;
 use linear_identification::{Method, Order, Warning};
-use missing_effect::{ControlLoop, NotNoise, NotSimulated, PerOutput, Remark, Verdict};
+use missing_effect::{ControlLoop, MendedGaps, NotNoise, NotSimulated, PerOutput, Remark, Verdict};
 
 use super::of_diagnosis;
 use crate::report::sample;
@@ -286,5 +287,27 @@ fn an_error_above_the_least_has_its_reason_by_method() {
     assert!(
         super::of_violation(&worse, Method::Fcloe).ends_with("or of this order"),
         "{worse:?}"
+    );
+}
+
+#[test]
+fn gaps_are_counted_with_the_longest_hold() {
+    let mut mended = MendedGaps {
+        gaps: Gaps::default(),
+        time_constant: 100.0,
+        limit: 10.0,
+    };
+    assert_eq!(super::of_gaps(&mended), None);
+    mended.gaps = Gaps {
+        rows: 12,
+        places: 3,
+        held: 2,
+        cut: 1,
+        unused: 1,
+        longest_hold: 8.0,
+    };
+    assert_eq!(
+        super::of_gaps(&mended).unwrap_or_default(),
+        "12 rows are missing in 3 places; the input is held through 2 of them, for at most 8 s; the simulation restarts after 1, where the input would have to be held longer than 10 % of the fastest time constant (100 s); 1 row is not used."
     );
 }

@@ -4,6 +4,7 @@ use ct_signals::quoted;
 use fcloe::Stop;
 use linear_identification::{Method, Order, Warning};
 
+use super::gaps::of_gaps;
 use crate::numbers::significant;
 
 /// A warning in a sentence.
@@ -76,7 +77,7 @@ pub fn of_warning(warning: &Warning) -> String {
         Warning::WorseThanConstant { .. } => {
             "the model simulates worse than a constant does: the plant may be unstable without its controller, which these methods do not identify (--method fcloe does); the input may depend on the output alone, through a controller whose reference is missing or constant; or the order or --integrator is wrong".to_owned()
         }
-        Warning::Gaps { gaps } => gaps.sentence().unwrap_or_default(),
+        Warning::Gaps { gaps } => of_gaps(gaps).unwrap_or_default(),
         Warning::ReadingsAfterGaps { method, readings } => format!(
             "{} simulates through long gaps with the input held at its last value, and does not use {readings} readings after them, until the effect of the gap has decayed; srivc and rivc restart there with new initial states, and use all readings",
             method.id()

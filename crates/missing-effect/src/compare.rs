@@ -5,7 +5,7 @@ use std::time::Instant;
 use greybox::{Fit, coloured};
 
 use crate::{
-    ControlLoop, Diagnosis, Error, NotNoise, Options, Problem, Verdict,
+    ControlLoop, Diagnosis, Error, NoiseSource, NotNoise, Options, Problem, Verdict,
     base::{
         believed::base,
         gaps::Mended,
@@ -90,7 +90,7 @@ pub(crate) fn believed<'a>(
         .any(|single| single.gain_over(&in_noise) > BIC_MARGIN && beyond_chance(single, &in_noise));
     let left = not_noise(&base, &own)?;
     let lacking = tempted || left.is_some();
-    let floor = floors(problem, &own.noise, "the residual of the believed model");
+    let floor = floors(problem, &own.noise, NoiseSource::BelievedModel);
     // With a noise model that drifts, the simulation of the prewhitened fit may drift.
     let shown = if lacking || is_slow(&base, &own.noise) {
         base

@@ -7,8 +7,8 @@ use greybox::Noise;
 use plants::Placed;
 
 use crate::{
-    Acceptance, ControlLoop, Diagnosis, Error, Options, PerOutput, Problem, Progress, Remark,
-    Verdict,
+    Acceptance, ControlLoop, Diagnosis, Error, NoiseSource, Options, PerOutput, Problem, Progress,
+    Remark, Verdict,
     accept::{
         acceptance::{AcceptanceTest, Course, Grade, PART, WHOLE},
         ambiguity::remove_ambiguous,
@@ -197,9 +197,9 @@ fn diagnose_whole(
         problem,
         &found.noise,
         if course.last().added.len() == found.richest.added.len() && !stopped {
-            "the residual of the final model"
+            NoiseSource::FinalModel
         } else {
-            "the residual of the richest model that was tried"
+            NoiseSource::RichestModel
         },
     );
     let mut remarks = Vec::new();

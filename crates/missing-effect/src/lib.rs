@@ -29,7 +29,7 @@ pub use fit::criterion::GROUP_MARGIN;
 pub use fitted::{Fitted, fitted};
 pub use result::{
     Acceptance, Bin, ControlLoop, Diagnosis, Effort, Failure, FailureKind, Failures, HeldOutError,
-    LONGEST_HOLD, MendedGaps, NoiseFloor, NotNoise, NotSimulated, OutputStep, Parameter, PerOutput,
-    PlaceLikelihood, PlaceScore, Primitive, Rankings, Rejection, Remark, ResidualTests, Score,
-    Share, Shown, ShownInput, Step, Unknown, Verdict, Window,
+    LONGEST_HOLD, MendedGaps, NoiseFloor, NoiseSource, NotNoise, NotSimulated, OutputStep,
+    Parameter, PerOutput, PlaceLikelihood, PlaceScore, Primitive, Rankings, Rejection, Remark,
+    ResidualTests, Score, Share, Shown, ShownInput, Step, Unknown, Verdict, Window,
 };

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use ct_signals::{ArModel, Channel, Clock, Record, residual_tests};
 use effect_search::{Estimate, NoiseFloor, Step, Unknown};
 use missing_effect::{
-    Diagnosis, Effort, OutputStep, Parameter, PerOutput, Rankings, ResidualTests, Score, Series,
-    Shown, ShownInput, Verdict, locate,
+    Diagnosis, Effort, NoiseSource, OutputStep, Parameter, PerOutput, Rankings, ResidualTests,
+    Score, Series, Shown, ShownInput, Verdict, locate,
 };
 use serde::Serialize;
 
@@ -106,8 +106,8 @@ pub(crate) fn missing_term(words: &EffectWords, unknown: &Unknown) -> MissingTer
 
 /// Report of a comparison.
 pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> Document {
-    let source = "innovation of the residual: the part that its past does not predict";
-    let mut shown = document(file, records, (&found.steps, &found.noise), source);
+    let noise = with_source(&found.noise, NoiseSource::OnlyModel, true);
+    let mut shown = document(file, records, &found.steps, noise);
     shown.effort.clone_from(&found.effort);
     shown.seconds = found.seconds;
     Document {
@@ -124,8 +124,8 @@ pub fn diagnosed(
     found: &effect_search::Diagnosis,
 ) -> Document {
     let words = EffectWords::of(&file.base, &file.candidates);
-    let source = "the residual of the last model";
-    let mut shown = document(file, records, (&found.steps, &found.noise), source);
+    let noise = with_source(&found.noise, NoiseSource::LastModel, false);
+    let mut shown = document(file, records, &found.steps, noise);
     shown.verdict = found.verdict;
     shown.effects.clone_from(&found.effects);
     shown.groups.clone_from(&found.groups);
@@ -182,12 +182,29 @@ fn parameter(estimate: &Estimate) -> Parameter {
     }
 }
 
-/// A document without a finding; `source`: source of the noise. Records, steps, locations of the failures, tests of the residuals.
+/// The noise floors with their source.
+fn with_source(
+    noise: &[NoiseFloor],
+    source: NoiseSource,
+    of_innovation: bool,
+) -> Vec<missing_effect::NoiseFloor> {
+    let floors = noise.iter().map(|floor| missing_effect::NoiseFloor {
+        output: floor.output.clone(),
+        level: floor.level,
+        innovation: floor.innovation,
+        coefficients: floor.coefficients.clone(),
+        source,
+        of_innovation,
+    });
+    floors.collect()
+}
+
+/// A document without a finding: records, steps, locations of the failures, tests of the residuals.
 fn document(
     file: &OwnModelFile,
     records: &Records,
-    (steps, noise): (&[Step], &[NoiseFloor]),
-    source: &str,
+    steps: &[Step],
+    noise: Vec<missing_effect::NoiseFloor>,
 ) -> Diagnosis {
     let spec = &file.base;
     let fitted = &records.records;
@@ -218,7 +235,7 @@ fn document(
     let floors: Vec<f64> = noise.iter().map(|noise| noise.level).collect();
     let steps: Vec<missing_effect::Step> = steps
         .iter()
-        .map(|step| of_step(step, fitted, &outputs, noise))
+        .map(|step| of_step(step, fitted, &outputs, &noise))
         .map(|mut step| {
             if let Some(test) = &step.rmse_test_per_output {
                 let errors = test.0.iter().cloned().collect();
@@ -227,14 +244,6 @@ fn document(
             step
         })
         .collect();
-    let noise = noise.iter().map(|floor| missing_effect::NoiseFloor {
-        output: floor.output.clone(),
-        level: floor.level,
-        innovation: floor.innovation,
-        coefficients: floor.coefficients.clone(),
-        source: source.to_string(),
-    });
-    let noise: Vec<_> = noise.collect();
     let unit = units.first().cloned().unwrap_or_default();
     Diagnosis {
         schema: 3,
@@ -280,7 +289,7 @@ fn of_step(
     step: &Step,
     fitted: &[Record],
     outputs: &[String],
-    noise: &[NoiseFloor],
+    noise: &[missing_effect::NoiseFloor],
 ) -> missing_effect::Step {
     let count = outputs.len();
     let named = |errors: &BTreeMap<String, f64>| {

@@ -5,8 +5,8 @@ mod signals;
 mod variants;
 
 use missing_effect::{
-    Bin, Diagnosis, Effort, Failure, FailureKind, Failures, NoiseFloor, OutputStep, Parameter,
-    PerOutput, Rankings, ResidualTests, Score, Shown, ShownInput, Step, Verdict,
+    Bin, Diagnosis, Effort, Failure, FailureKind, Failures, NoiseFloor, NoiseSource, OutputStep,
+    Parameter, PerOutput, Rankings, ResidualTests, Score, Shown, ShownInput, Step, Verdict,
 };
 
 use self::signals::{NOISE, PERIOD, input, noise, simulate};
@@ -309,7 +309,8 @@ fn diagnosis(outputs: &[&str]) -> Diagnosis {
                 level: NOISE,
                 innovation: NOISE,
                 coefficients: vec![],
-                source: "residual of overflow + pump_deadzone, which passes the tests".into(),
+                source: NoiseSource::FinalModel,
+                of_innovation: false,
             })
             .collect(),
         scores: vec![

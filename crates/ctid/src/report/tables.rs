@@ -8,7 +8,7 @@ pub(super) use self::steps::parameters;
 use super::text::{code, escape, significant, unit, with_error};
 use crate::findings;
 use crate::numbers::duration;
-use crate::sentences::of_rejections;
+use crate::sentences::{of_noise_source, of_rejections};
 
 /// Analysed plant and records, and noise floor.
 pub(super) fn facts(diagnosis: &Diagnosis) -> String {
@@ -36,7 +36,7 @@ pub(super) fn facts(diagnosis: &Diagnosis) -> String {
     for (k, floor) in floors.filter(|(_, noise)| noise.level.is_finite()) {
         let output = unit(diagnosis.unit_of(k));
         let level = significant(floor.level, 2);
-        let source = escape(&floor.source);
+        let source = of_noise_source(floor);
         let of = if several {
             format!("{}: ", escape(&floor.output))
         } else {

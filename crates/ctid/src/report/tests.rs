@@ -183,7 +183,6 @@ fn names_are_escaped_wherever_they_stand() {
     diagnosis.remarks.push(Remark::Terms {
         names: vec![hostile.to_owned()],
     });
-    diagnosis.noise[0].source = hostile.to_owned();
     diagnosis.known_effects.push(hostile.to_owned());
     diagnosis.effects[0] = hostile.to_owned();
     diagnosis.groups[0] = vec![hostile.to_owned(), format!("{hostile} too")];

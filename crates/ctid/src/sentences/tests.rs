@@ -3,7 +3,9 @@
 use ct_signals::Gaps;
 use linear_identification::side_by_side::Violation;
 use linear_identification::{Method, Order, Warning};
-use missing_effect::{ControlLoop, MendedGaps, NotNoise, NotSimulated, PerOutput, Remark, Verdict};
+use missing_effect::{
+    ControlLoop, MendedGaps, NoiseSource, NotNoise, NotSimulated, PerOutput, Remark, Verdict,
+};
 
 use super::of_diagnosis;
 use crate::report::sample;
@@ -309,5 +311,20 @@ fn gaps_are_counted_with_the_longest_hold() {
     assert_eq!(
         super::of_gaps(&mended).unwrap_or_default(),
         "12 rows are missing in 3 places; the input is held through 2 of them, for at most 8 s; the simulation restarts after 1, where the input would have to be held longer than 10 % of the fastest time constant (100 s); 1 row is not used."
+    );
+}
+
+#[test]
+fn a_noise_floor_names_the_residual_that_it_is_from() {
+    let mut floor = sample::comparison().noise.remove(0);
+    floor.source = NoiseSource::RichestModel;
+    assert_eq!(
+        super::of_noise_source(&floor),
+        "the residual of the richest model that was tried"
+    );
+    (floor.source, floor.of_innovation) = (NoiseSource::OnlyModel, true);
+    assert_eq!(
+        super::of_noise_source(&floor),
+        "innovation of the residual: the part that its past does not predict"
     );
 }

@@ -4,6 +4,7 @@ use missing_effect::Diagnosis;
 
 use super::{BAR, compared, model_name, step_name, with_unit};
 use crate::look::{Look, Side, table};
+use crate::sentences::of_noise_source;
 use crate::{findings, numbers};
 
 /// The error from step to step: for each output and, if there are several, for all together.
@@ -32,8 +33,8 @@ pub(crate) fn trail(diagnosis: &Diagnosis, look: Look) -> String {
             unit: &diagnosis.output_unit,
         };
         text += &errors.table(diagnosis, look);
-        if floor_known && !floor.source.is_empty() {
-            let source = format!("(noise floor: {})", floor.source);
+        if floor_known {
+            let source = format!("(noise floor: {})", of_noise_source(floor));
             text += &look.faint(look.paragraph("  ", &source).trim_end());
             text.push('\n');
         }

@@ -4,18 +4,20 @@ use ct_signals::Clock;
 use greybox::Noise;
 
 use crate::{
-    Diagnosis, Effort, NoiseFloor, Problem, Rankings, Shown, Step, Verdict, result::Floors,
+    Diagnosis, Effort, NoiseFloor, NoiseSource, Problem, Rankings, Shown, Step, Verdict,
+    result::Floors,
 };
 
 /// The noise floors of a noise model.
-pub(crate) fn floors(problem: &Problem, noise: &Noise, source: &str) -> Floors {
+pub(crate) fn floors(problem: &Problem, noise: &Noise, source: NoiseSource) -> Floors {
     let outputs = problem.records[0].outputs.iter().zip(noise.iter());
     let floors = outputs.map(|(output, noise)| NoiseFloor {
         output: output.name.clone(),
         level: noise.stationary_std(),
         innovation: noise.sigma(),
         coefficients: noise.coefficients().to_vec(),
-        source: source.to_string(),
+        source,
+        of_innovation: false,
     });
     Floors(floors.collect())
 }

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 pub use self::{
     control_loop::{ControlLoop, NotSimulated},
     gaps::{LONGEST_HOLD, MendedGaps},
-    noise_floor::NoiseFloor,
+    noise_floor::{NoiseFloor, NoiseSource},
     not_noise::NotNoise,
     parameter::Parameter,
     per_output::PerOutput,

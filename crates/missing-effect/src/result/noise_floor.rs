@@ -4,6 +4,22 @@ use ct_signals::ArModel;
 use greybox::Noise;
 use serde::{Deserialize, Serialize};
 
+/// The model whose residual a noise floor was estimated from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseSource {
+    /// The believed model, without effects.
+    BelievedModel,
+    /// The final model, with all accepted effects.
+    FinalModel,
+    /// The model with the most effects of those that were tried.
+    RichestModel,
+    /// The last model of a diagnosis of a user's own model.
+    LastModel,
+    /// The only model: a user's own one that is compared.
+    OnlyModel,
+}
+
 /// The noise floor of an output and how it was obtained.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoiseFloor {
@@ -18,8 +34,10 @@ pub struct NoiseFloor {
     /// Autoregressive coefficients of the noise: `v[k] = sum a_i v[k-i] + e[k]`; empty for white noise.
     #[serde(deserialize_with = "crate::result::numbers")]
     pub coefficients: Vec<f64>,
-    /// In words: which model's residual it was estimated from.
-    pub source: String,
+    /// The model whose residual it was estimated from.
+    pub source: NoiseSource,
+    /// Whether `level` is the standard deviation of the innovation, because the residual is more than noise.
+    pub of_innovation: bool,
 }
 
 impl NoiseFloor {
@@ -56,10 +74,7 @@ impl Floors {
     pub fn of_what_is_new(mut self) -> Self {
         for floor in &mut self.0 {
             floor.level = floor.innovation;
-            floor.source = format!(
-                "innovation of {}: the part that its past does not predict",
-                floor.source
-            );
+            floor.of_innovation = true;
         }
         self
     }

@@ -1,10 +1,9 @@
-//! An alarm, and its sentence.
+//! An alarm.
 
-use missing_effect::numbers::significant;
-use plants::{Domain, Place, Structure};
+use plants::{Place, Structure};
 use serde::{Deserialize, Serialize};
 
-use crate::{TimeAxis, isolate::Suspect, watched::Raised};
+use crate::{isolate::Suspect, watched::Raised};
 
 /// The version of the schema of [`Alarm`]; it rises when a key changes its meaning.
 pub const SCHEMA: u32 = 1;
@@ -42,6 +41,8 @@ pub struct Alarm {
     pub event: Stage,
     /// Time of the row after which it was raised \[s\].
     pub time: f64,
+    /// `time` of the first evaluation, [`Stage::Alarm`], to which this one belongs \[s\].
+    pub raised: f64,
     /// Start of the change, as estimated with the best effect \[s\]; `None` if no effect explains the rows.
     pub since: Option<f64>,
     /// Verdict on the rows.
@@ -61,8 +62,6 @@ pub struct Alarm {
     /// With several outputs, the one whose reading offset had the largest score at the alarm: this names the vessel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<String>,
-    /// The alarm in words.
-    pub sentence: String,
 }
 
 /// An effect and its fall of the criterion.
@@ -85,9 +84,11 @@ pub struct Size {
     pub unit: String,
     /// The vessel, if there are several; for an effect at a sensor the vessel whose level it reads, if there are several outputs.
     pub vessel: Option<String>,
+    /// Whether the effect acts at a sensor of a plant.
+    pub at_sensor: bool,
 }
 
-/// Units of the signals, for sentences.
+/// Units of the signals.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Units {
     /// Unit of the readings.
@@ -97,13 +98,13 @@ pub struct Units {
 }
 
 impl Alarm {
-    /// Alarm that no effect explains the rows so far; `output`: name of the output with the largest deviation, if there are several. The
-    /// sentence is added later.
+    /// Alarm that no effect explains the rows so far; `output`: name of the output with the largest deviation, if there are several.
     pub(crate) fn unexplained(raised: &Raised, output: Option<String>) -> Self {
         Self {
             schema: SCHEMA,
             event: raised.stage,
             time: raised.time,
+            raised: raised.since,
             since: None,
             verdict: Verdict::Unexplained,
             effects: Vec::new(),
@@ -113,7 +114,6 @@ impl Alarm {
             score: raised.score,
             threshold: raised.threshold,
             output,
-            sentence: String::new(),
         }
     }
 }
@@ -123,14 +123,13 @@ pub(crate) fn alarm(
     raised: &Raised,
     suspects: &[Suspect],
     structure: &Structure,
-    (units, axis): (&Units, &TimeAxis),
+    units: &Units,
 ) -> Alarm {
     let best = suspects
         .first()
         .filter(|best| best.plausible && best.evidence > 0.0 && !best.left.is_more_than_noise());
     let output = structure.known.output_name(structure.plant, raised.output);
     let mut alarm = Alarm::unexplained(raised, output.map(str::to_string));
-    let mut place = Place::Vessel;
     if let Some(best) = best {
         let group: Vec<&Suspect> = suspects.iter().filter(|s| s.near(best)).collect();
         alarm.since = Some(best.since);
@@ -158,61 +157,8 @@ pub(crate) fn alarm(
                 .placed
                 .place_name(structure.plant, &structure.known)
                 .map(str::to_string),
+            at_sensor: best.placed.effect.place == Place::Sensor,
         });
-        place = best.placed.effect.place;
     }
-    alarm.sentence = sentence(&alarm, raised.since, place, structure.domain, axis);
     alarm
-}
-
-/// `place`: of the best effect.
-fn sentence(alarm: &Alarm, raised: f64, place: Place, domain: Domain, axis: &TimeAxis) -> String {
-    let vessel = alarm.size.as_ref().and_then(|size| size.vessel.as_ref());
-    let vessel = vessel.map_or(String::new(), |vessel| {
-        if place == Place::Sensor {
-            return format!(", {}", domain.sensor_words(vessel));
-        }
-        let (which, kind) = domain.vessel_words(vessel);
-        format!(", {which} {kind}")
-    });
-    consistent(alarm, &vessel, axis).unwrap_or_else(|| {
-        let most = alarm.output.as_ref().map_or(String::new(), |output| {
-            format!("; it shows most at the {}", domain.sensor_words(output))
-        });
-        format!(
-            "The model has not fitted since about {} or before, and no effect of the catalogue explains it (score {:.1}, threshold {:.1}){most}.",
-            axis.at(raised),
-            alarm.score,
-            alarm.threshold
-        )
-    })
-}
-
-/// Sentence on the effect that the rows are consistent with; `place` follows the size in words. `None` if no effect explains the rows.
-pub(crate) fn consistent(alarm: &Alarm, place: &str, axis: &TimeAxis) -> Option<String> {
-    let (since, evidence, size) = (alarm.since?, alarm.evidence?, alarm.size.as_ref()?);
-    let unit = if size.unit.is_empty() {
-        String::new()
-    } else {
-        format!(" {}", size.unit)
-    };
-    let against = alarm.next.as_ref().map_or(String::new(), |next| {
-        format!(
-            ", {:.1} against {:.1} for {}",
-            evidence, next.evidence, next.effect
-        )
-    });
-    let group = match &alarm.effects[..] {
-        [_, others @ ..] if !others.is_empty() => {
-            format!("; not yet distinguishable from {}", others.join(", "))
-        }
-        _ => String::new(),
-    };
-    Some(format!(
-        "Consistent with {} ({} = {}{unit}{place}) since {}{against}{group}.",
-        alarm.effects.first().map_or("", String::as_str),
-        size.name,
-        significant(size.value, 3),
-        axis.at(since),
-    ))
 }

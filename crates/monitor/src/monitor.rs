@@ -2,6 +2,7 @@
 
 mod progress;
 
+use plants::Domain;
 use serde::{Deserialize, Serialize};
 
 use smallvec::SmallVec;
@@ -242,6 +243,12 @@ impl Monitor {
     /// Sets the date of time zero; call it before the first row.
     pub fn set_axis(&mut self, axis: TimeAxis) {
         self.core.axis = axis;
+    }
+
+    /// The domain of a plant, with its words for sentences; `None` for a user's own model.
+    #[must_use]
+    pub fn domain(&self) -> Option<Domain> {
+        self.model.0.domain(&self.units)
     }
 
     /// Complete state, for saving.

@@ -6,7 +6,7 @@ use ct_signals::Hold;
 use plants::{Domain, MAX_VESSELS, Scales, Structure};
 
 use crate::{
-    Alarm, Each, Error, Model, NotUsed, TimeAxis, Units, Watched,
+    Alarm, Each, Error, Model, NotUsed, Units, Watched,
     alarm::alarm,
     fingerprint::{Fingerprint, fingerprint},
     intake::{Readings, Sample},
@@ -141,9 +141,8 @@ impl Believed for Model {
         name.map(str::to_string)
     }
 
-    fn output_words(&self, output: usize, units: &Units) -> String {
-        let name = self.known.output_name(self.plant, output);
-        Domain::of(self.plant, &units.output).sensor_words(name.unwrap_or(""))
+    fn domain(&self, units: &Units) -> Option<Domain> {
+        Some(Domain::of(self.plant, &units.output))
     }
 
     fn output_unit(&self, _output: usize, units: &Units) -> String {
@@ -157,12 +156,12 @@ impl Believed for Model {
         rows: &[Kept],
         growth: &Each<f64>,
         raised: &Raised,
-        said_in: (&Units, &TimeAxis),
+        units: &Units,
     ) -> Alarm {
-        let Ok(structure) = self.learned_structure(learned, said_in.0) else {
+        let Ok(structure) = self.learned_structure(learned, units) else {
             return Alarm::unexplained(raised, self.output_name(raised.output));
         };
         let suspects = isolate(&structure, learned, hold, rows, growth);
-        alarm(raised, &suspects, &structure, said_in)
+        alarm(raised, &suspects, &structure, units)
     }
 }

@@ -231,8 +231,6 @@ pub struct ScatterAlarm {
     pub now: f64,
     /// The output unit.
     pub unit: String,
-    /// The alarm in words.
-    pub sentence: String,
 }
 
 /// Event of the noise monitor.
@@ -246,39 +244,16 @@ pub enum ScatterEvent {
 }
 
 impl ScatterAlarm {
-    /// `output`: its name, if there are several, and its description; `noise`: the learned noise, with its unit.
+    /// `output`: its name, if there are several; `noise`: the learned noise, with its unit.
     pub(crate) fn new(
         moved: Moved,
         time: f64,
-        output: Option<(String, String)>,
+        output: Option<String>,
         (noise, unit): (f64, String),
     ) -> Self {
-        let (output, of) = match output {
-            Some((name, words)) => (Some(name), format!(" at the {words}")),
-            None => (None, String::new()),
-        };
-        let written = |value: f64| {
-            let number = missing_effect::numbers::significant(value, 3);
-            format!("{number} {unit}").trim_end().to_string()
-        };
-        let (event, now, sentence) = match moved {
-            Moved::Grown(ratio) => {
-                let now = ratio * noise;
-                let sentence = format!(
-                    "The noise of the readings{of} has grown from {} to {}, without the signature of an effect of the plant: look at the sensor and its cable.",
-                    written(noise),
-                    written(now)
-                );
-                (ScatterEvent::ScatterGrown, now, sentence)
-            }
-            Moved::Back => (
-                ScatterEvent::ScatterBack,
-                noise,
-                format!(
-                    "The noise of the readings{of} is back at {}.",
-                    written(noise)
-                ),
-            ),
+        let (event, now) = match moved {
+            Moved::Grown(ratio) => (ScatterEvent::ScatterGrown, ratio * noise),
+            Moved::Back => (ScatterEvent::ScatterBack, noise),
         };
         Self {
             schema: crate::SCHEMA,
@@ -288,7 +263,6 @@ impl ScatterAlarm {
             learned: noise,
             now,
             unit,
-            sentence,
         }
     }
 }

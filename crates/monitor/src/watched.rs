@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use ct_signals::Hold;
+use plants::Domain;
 
 use crate::{
-    Alarm, Each, Error, NotUsed, Stage, TimeAxis, Units,
+    Alarm, Each, Error, NotUsed, Stage, Units,
     fingerprint::Fingerprint,
     intake::{Readings, Sample},
     isolate::Kept,
@@ -60,11 +61,11 @@ pub(crate) trait Believed: Send + Sync {
     fn put_readings(&self, states: &mut Each<f64>, readings: &Readings);
     /// The name of an output, of several.
     fn output_name(&self, output: usize) -> Option<String>;
-    /// Name of an output in a sentence: "at the ...".
-    fn output_words(&self, output: usize, units: &Units) -> String;
+    /// The domain of a plant; `None` for a user's own model.
+    fn domain(&self, units: &Units) -> Option<Domain>;
     /// The unit of an output.
     fn output_unit(&self, output: usize, units: &Units) -> String;
-    /// Evaluates the latest rows after the onset of a change; `said_in` has the units and times of the sentence.
+    /// Evaluates the latest rows after the onset of a change.
     fn look(
         &self,
         learned: &Learned,
@@ -72,6 +73,6 @@ pub(crate) trait Believed: Send + Sync {
         rows: &[Kept],
         growth: &Each<f64>,
         raised: &Raised,
-        said_in: (&Units, &TimeAxis),
+        units: &Units,
     ) -> Alarm;
 }

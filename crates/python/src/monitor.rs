@@ -6,11 +6,13 @@ use ct_model::effects::{apply, own_candidates};
 use ct_model::{Model as Compiled, ModelSpec};
 use ctid::model_file::ModelFile;
 use ctid::own_model::OwnSettings;
+use ctid::sentences::Told;
 use monitor::{CandidateModel, Notice, OwnModel, Row, Settings, State, Units};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
+use crate::diagnosis::json;
 use crate::model::Inner;
 use crate::{bytes, error, tank};
 
@@ -267,16 +269,21 @@ impl Monitor {
         Vec<Option<String>>,
     )> {
         let row = Row::with_inputs(time, &inputs, &outputs);
-        let step = py.detach(|| self.monitor().update(&row));
+        let (step, domain, axis) = py.detach(|| {
+            let mut monitor = self.monitor();
+            let step = monitor.update(&row);
+            (step, monitor.domain(), monitor.axis().clone())
+        });
         let step = step.map_err(error::of_data)?;
         let innovations = step.innovations.iter();
         let innovations = innovations.map(|i| i.map(|i| (i.residual, i.standardised)));
         let alarm = step
             .alarm
             .as_ref()
-            .map(crate::diagnosis::json)
+            .map(|alarm| json(&Told::alarm(alarm, domain, &axis)))
             .transpose()?;
-        let scatter = step.scatter.iter().map(crate::diagnosis::json);
+        let scatter = step.scatter.iter();
+        let scatter = scatter.map(|scatter| json(&Told::scatter(scatter, domain)));
         let notices = step.notices.iter().flatten().map(|n| notice(py, n));
         let lost = step
             .lost

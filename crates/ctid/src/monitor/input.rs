@@ -6,6 +6,7 @@ use ::monitor::{NotUsed, Row};
 use ct_signals::{BadLine, LONGEST_LINE, Line, Rows, TimestampError, quoted};
 
 use super::{Halt, INPUT, Session, lines::Cut};
+use crate::sentences::Told;
 use crate::{Error, one_line};
 
 /// Number of lines at the beginning that may be incomplete.
@@ -210,12 +211,14 @@ impl<'a> Session<'a> {
         }
         self.screen.innovations(row.time, &step.innovations);
         for scatter in &step.scatter {
-            self.warn(scatter.time, &scatter.sentence);
-            self.print(scatter, scatter.time, None)?;
+            let told = Told::scatter(scatter, self.monitor.domain());
+            self.warn(scatter.time, &told.sentence);
+            self.print(&told, scatter.time, None)?;
         }
         if let Some(alarm) = &step.alarm {
-            self.warn(alarm.time, &alarm.sentence);
-            self.print(alarm, alarm.time, alarm.since)?;
+            let told = Told::alarm(alarm, self.monitor.domain(), self.monitor.axis());
+            self.warn(alarm.time, &told.sentence);
+            self.print(&told, alarm.time, alarm.since)?;
         }
         if row.time >= self.next_estimate {
             self.estimate(row.time)?;

@@ -1,8 +1,9 @@
 //! Sentences from the findings of a plant: the verdict, the effects, the residual, remarks, and the next experiment; and from those of an
-//! identification.
+//! identification and of the monitor.
 //!
 //! Every sentence is a function of the typed result alone.
 
+mod alarm;
 mod control_loop;
 mod design;
 mod effects;
@@ -23,6 +24,7 @@ mod warnings;
 use missing_effect::numbers::value_and_error;
 use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
 
+pub use self::alarm::{Told, of_alarm, of_scatter};
 use self::control_loop::of_the_loop;
 pub use self::design::of_design;
 pub use self::failures::of_failures;

@@ -137,8 +137,7 @@ impl Core {
             bank.begin();
         }
         let model = &self.model.0;
-        let words = |name| (name, model.output_words(output, &self.units));
-        let name = model.output_name(output).map(words);
+        let name = model.output_name(output);
         let noise = noise.model()?.stationary_std();
         let unit = model.output_unit(output, &self.units);
         Some(ScatterAlarm::new(moved, time, name, (noise, unit)))
@@ -236,8 +235,8 @@ impl Core {
             output: following.output,
         };
         let (hold, growth) = (self.hold(), self.growth());
-        let (model, said_in) = (&self.model.0, (&self.units, &self.axis));
-        let alarm = model.look(learned, hold, &rows, &growth, &raised, said_in);
+        let model = &self.model.0;
+        let alarm = model.look(learned, hold, &rows, &growth, &raised, &self.units);
         self.now.phase = Phase::Alarmed(Following {
             explained: alarm.verdict != Verdict::Unexplained,
             ..following

@@ -16,11 +16,11 @@ use ct_model::{Expression, Given, Model, Variable};
 use ct_signals::Hold;
 use greybox::PriorValue;
 use missing_effect::GROUP_MARGIN;
+use plants::Domain;
 
 use self::simulation::running;
 use crate::{
-    Alarm, Each, Error, NotUsed, Other, Size, TimeAxis, Units, Verdict, Watched,
-    alarm::consistent,
+    Alarm, Each, Error, NotUsed, Other, Size, Units, Verdict, Watched,
     fingerprint::{Fingerprint, TIME_UNIT},
     intake::{Readings, Sample},
     isolate::Kept,
@@ -124,6 +124,7 @@ fn put_in(alarm: &mut Alarm, suspects: &[isolate::Suspect]) {
         value,
         unit,
         vessel: None,
+        at_sensor: false,
     });
 }
 
@@ -224,8 +225,8 @@ impl Believed for OwnModel {
         (self.outputs() > 1).then(|| self.output(output).name.clone())
     }
 
-    fn output_words(&self, output: usize, _units: &Units) -> String {
-        format!("output {}", self.output(output).name)
+    fn domain(&self, _units: &Units) -> Option<Domain> {
+        None
     }
 
     fn output_unit(&self, output: usize, _units: &Units) -> String {
@@ -239,34 +240,14 @@ impl Believed for OwnModel {
         rows: &[Kept],
         growth: &Each<f64>,
         raised: &Raised,
-        (units, axis): (&Units, &TimeAxis),
+        _units: &Units,
     ) -> Alarm {
-        let name = self.output_name(raised.output);
-        let most = match &name {
-            Some(_) => format!(
-                "; it shows most at {}",
-                self.output_words(raised.output, units)
-            ),
-            None => String::new(),
-        };
-        let mut alarm = Alarm::unexplained(raised, name);
+        let mut alarm = Alarm::unexplained(raised, self.output_name(raised.output));
         alarm.since = onset::onset(self, learned, hold, rows, growth, raised.since);
-        let since = match alarm.since {
-            Some(since) => format!("since about {}", axis.at(since)),
-            None => format!("since {} or before", axis.at(raised.since)),
-        };
         let found = alarm.since.map_or_else(Vec::new, |since| {
             isolate::isolate(self, learned, hold, rows, growth, since)
         });
         put_in(&mut alarm, &found);
-        if let Some(sentence) = consistent(&alarm, "", axis) {
-            alarm.sentence = sentence;
-            return alarm;
-        }
-        alarm.sentence = format!(
-            "The model does not fit {since} (score {:.1}, threshold {:.1}){most}.",
-            raised.score, raised.threshold
-        );
         alarm
     }
 }

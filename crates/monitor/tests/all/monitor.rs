@@ -103,7 +103,8 @@ fn a_leak_is_seen_named_and_dated() {
     assert_eq!(first.event, Stage::Alarm);
     assert!(first.score > first.threshold);
     assert!(last.evidence.unwrap() > first.evidence.unwrap());
-    assert!(last.sentence.contains(" since t = ") && last.sentence.contains(" against "));
+    assert!(first.raised == first.time && last.raised == first.time);
+    assert!(last.since.is_some() && last.next.is_some(), "{last:?}");
     // The group contains the effects that cannot be distinguished: a member is within six of the best.
     if last.effects.len() > 1 {
         assert_eq!(last.verdict, Verdict::Undecided);
@@ -185,8 +186,6 @@ fn a_scatter_that_grows_is_said_in_words_and_is_no_effect() {
         assert!((4000.0..4600.0).contains(&up.time), "{up:?}");
         assert!((up.learned / 0.05 - 1.0).abs() < 0.1, "{up:?}");
         assert!((up.now / (0.05 * grown) - 1.0).abs() < 0.4, "{up:?}");
-        assert!(up.sentence.contains("has grown from 0.0"), "{up:?}");
-        assert!(up.sentence.contains("sensor and its cable"), "{up:?}");
         assert_eq!(down.event, ScatterEvent::ScatterBack);
         assert!((7000.0..9500.0).contains(&down.time), "{down:?}");
         assert!(alarms(&steps).is_empty(), "{:?}", alarms(&steps));

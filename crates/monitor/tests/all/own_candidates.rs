@@ -86,7 +86,7 @@ fn last_alarm(begins: &str, sizes: &[f64], candidates: &[CandidateModel]) -> Ala
 fn a_candidate_that_begins_is_named_with_its_size() {
     let declared = declared(&model(BLOCK));
     let alarm = last_alarm("vent", &[0.4], &declared);
-    assert_eq!(alarm.effects, ["vent"], "{}", alarm.sentence);
+    assert_eq!(alarm.effects, ["vent"], "{alarm:?}");
     assert_eq!(alarm.verdict, Verdict::Effect);
     let size = alarm.size.as_ref().unwrap();
     assert_eq!((size.name.as_str(), size.unit.as_str()), ("q", "W/K"));
@@ -94,8 +94,7 @@ fn a_candidate_that_begins_is_named_with_its_size() {
     let since = alarm.since.unwrap();
     assert!(
         (since - 5.0 * ONSET as f64).abs() < 200.0,
-        "{since}: {}",
-        alarm.sentence
+        "{since}: {alarm:?}"
     );
     // No effect of the catalogue has this form.
     let without = last_alarm("vent", &[0.4], &[]);
@@ -108,7 +107,7 @@ fn a_candidate_that_begins_is_named_with_its_size() {
 fn a_candidate_may_bring_a_state() {
     let declared = declared(&model(BLOCK));
     let alarm = last_alarm("second_store", &[60.0, 0.8], &declared);
-    assert_eq!(alarm.effects[0], "second_store", "{}", alarm.sentence);
+    assert_eq!(alarm.effects[0], "second_store", "{alarm:?}");
     let size = alarm.size.as_ref().unwrap();
     assert_eq!(size.name, "h");
     // Its size is correlated with the capacity and with the onset, which is accurate to a few rows.

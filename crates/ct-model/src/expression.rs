@@ -50,13 +50,16 @@ pub enum Function {
     /// `stick_slip(x, b, j)`: stiction; the result stays until `x` is further than `b (1 + j)` from it, and then moves to a distance of `b (1 - j)`
     /// from `x`: with `j = 0` a play, with `j = 1` it jumps to `x`.
     StickSlip,
+    /// `stay_between(a, b)`: the result keeps its value of the row before while this is between `a` and `b`, and follows the nearer one
+    /// otherwise. A play of `x` stays between `x - b` and `x + b`.
+    StayBetween,
     /// `quantise(x, d)`: the multiple of `d` that is nearest to `x`; `x` itself where `d` is zero.
     Quantise,
 }
 
 impl Function {
     /// List of all functions.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Abs,
         Self::Sign,
         Self::Sqrt,
@@ -72,6 +75,7 @@ impl Function {
         Self::Max,
         Self::Play,
         Self::StickSlip,
+        Self::StayBetween,
         Self::Quantise,
     ];
 
@@ -94,6 +98,7 @@ impl Function {
             Self::Max => "max",
             Self::Play => "play",
             Self::StickSlip => "stick_slip",
+            Self::StayBetween => "stay_between",
             Self::Quantise => "quantise",
         }
     }
@@ -102,7 +107,12 @@ impl Function {
     #[must_use]
     pub fn arguments(self) -> usize {
         match self {
-            Self::Atan2 | Self::Min | Self::Max | Self::Play | Self::Quantise => 2,
+            Self::Atan2
+            | Self::Min
+            | Self::Max
+            | Self::Play
+            | Self::StayBetween
+            | Self::Quantise => 2,
             Self::StickSlip => 3,
             _ => 1,
         }
@@ -211,7 +221,7 @@ impl Expression {
         }
     }
 
-    /// The value for these values of the variables; a delay, a play and stick-slip return their input.
+    /// The value for these values of the variables; functions with memory return their first argument.
     #[must_use]
     pub fn value(&self, time: f64, of: &impl Fn(Variable) -> f64) -> f64 {
         match self {
@@ -248,7 +258,7 @@ impl Expression {
                     Function::Atan2 => a.atan2(argument(1)),
                     Function::Min => a.min(argument(1)),
                     Function::Max => a.max(argument(1)),
-                    Function::Play | Function::StickSlip => a,
+                    Function::Play | Function::StickSlip | Function::StayBetween => a,
                     Function::Quantise => quantised(a, argument(1)),
                 }
             }

@@ -176,7 +176,7 @@ fn degree(expression: &Expression, flows: &[Degree]) -> Degree {
             }
         }
         // The function has memory, whatever its arguments are.
-        Expression::Call(Function::Play | Function::StickSlip, _) => Other,
+        Expression::Call(Function::Play | Function::StickSlip | Function::StayBetween, _) => Other,
         Expression::Call(_, arguments) => {
             constant_or_other(arguments.iter().map(of).max().unwrap_or(Constant))
         }

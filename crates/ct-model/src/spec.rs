@@ -9,6 +9,8 @@ pub struct About {
     pub name: String,
     /// Unit as written, `W/K`; empty if the text gives none.
     pub unit: String,
+    /// Physical quantity as written, `Level`; empty if the text gives none.
+    pub quantity: String,
     /// Description of the variable in a few words.
     pub description: String,
     /// Smallest value; minus infinity where the text gives none.

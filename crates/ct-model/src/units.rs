@@ -173,9 +173,14 @@ impl Walk<'_> {
             },
             Expression::Call(function, arguments) => match (function, arguments.as_slice()) {
                 (Function::Abs, [a]) => self.dimension(a),
-                (Function::Min | Function::Max | Function::Play | Function::Quantise, [a, b]) => {
-                    self.together(a, b)
-                }
+                (
+                    Function::Min
+                    | Function::Max
+                    | Function::Play
+                    | Function::StayBetween
+                    | Function::Quantise,
+                    [a, b],
+                ) => self.together(a, b),
                 (Function::StickSlip, [a, b, share]) => {
                     self.pure(*function, share);
                     self.together(a, b)

@@ -99,7 +99,10 @@ pub(crate) fn begin<'a>(
         (fit, visited, tolerance)
     };
     context.tolerance = tolerance.unwrap_or(ct_model::TOLERANCE);
-    let all = all_candidates(&problem.spec, &visited, &problem.kept, &problem.candidates)?;
+    let mut all = all_candidates(&problem.spec, &visited, &problem.kept, &problem.candidates)?;
+    all.retain(|candidate| {
+        problem.effects.contains(&candidate.id) || !problem.left_out.contains(&candidate.id)
+    });
     let is_searched =
         |candidate: &Candidate| !candidate.is_shape() || problem.effects.contains(&candidate.id);
     (context.candidates, context.shapes) = all.into_iter().partition(is_searched);

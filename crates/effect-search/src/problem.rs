@@ -1,6 +1,6 @@
 //! The problem of a diagnosis: a model as text, records, prior knowledge, and the user's candidates; options and time limits of a search.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -32,6 +32,8 @@ pub struct Problem {
     pub priors: BTreeMap<String, PriorValue>,
     /// Candidates of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
+    /// Identifiers of effects of the catalogue that are not candidates.
+    pub left_out: BTreeSet<String>,
     /// Seconds in one unit of the model's time.
     pub time_unit: f64,
     /// The unit of the model's time, as it is written: `s`, `h`.

@@ -1,6 +1,6 @@
 //! A problem made step by step, and checked.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use ct_model::effects::OwnCandidate;
 use ct_model::{Model, ModelSpec};
@@ -56,6 +56,7 @@ impl Problem {
                 known: BTreeMap::new(),
                 priors: BTreeMap::new(),
                 candidates: BTreeMap::new(),
+                left_out: BTreeSet::new(),
                 time_unit: 1.0,
                 time_unit_name: "s".to_string(),
             },
@@ -97,6 +98,12 @@ impl ProblemBuilder {
     /// Adds a user's own candidate to those of the catalogue.
     pub fn candidate(mut self, name: impl Into<String>, candidate: OwnCandidate) -> Self {
         self.problem.candidates.insert(name.into(), candidate);
+        self
+    }
+
+    /// Leaves effects of the catalogue out of the candidates, by their identifiers.
+    pub fn left_out<S: Into<String>>(mut self, effects: impl IntoIterator<Item = S>) -> Self {
+        self.problem.left_out = effects.into_iter().map(Into::into).collect();
         self
     }
 

@@ -13,21 +13,14 @@ model ThreeTank "three tanks in a row, T1, T3, T2, joined by valves, an outlet a
   constant Real w = 1e-4 "below this level a parabola stands for the outlet's root";
   input Real u1 "command to pump 1";
   input Real u2 "command to pump 2";
-  Real level_1(start=15);
-  output Real level_3(start=11);
-  Real level_2(start=8);
-  Real d13 = level_1 - level_3;
-  Real d32 = level_3 - level_2;
-  Real x13 = (d13/width)^2;
-  Real x32 = (d32/width)^2;
-  Real s13 = if d13 >= width then sqrt(d13) elseif d13 <= -width then -sqrt(-d13) else d13/width*((5*x13 - 18)*x13 + 45)*sqrt(width)/32;
-  Real s32 = if d32 >= width then sqrt(d32) elseif d32 <= -width then -sqrt(-d32) else d32/width*((5*x32 - 18)*x32 + 45)*sqrt(width)/32;
-  Real x = level_2/w;
-  Real s20 = if level_2 >= w then sqrt(level_2) elseif level_2 > 0 then (1.5 - 0.5*x)*x*sqrt(w) else 0;
-  Real q13 = orifice*az13*s13;
-  Real q32 = orifice*az32*s32;
+  Real level_1(quantity="Level", start=15);
+  output Real level_3(quantity="Level", start=11);
+  Real level_2(quantity="Level", start=8);
+  Real q13 = orifice*az13*(if level_1 - level_3 >= width then sqrt(level_1 - level_3) elseif level_1 - level_3 <= -width then -sqrt(level_3 - level_1) else (level_1 - level_3)/width*(45 - 18*((level_1 - level_3)/width)^2 + 5*((level_1 - level_3)/width)^4)*sqrt(width)/32);
+  Real q32 = orifice*az32*(if level_3 - level_2 >= width then sqrt(level_3 - level_2) elseif level_3 - level_2 <= -width then -sqrt(level_2 - level_3) else (level_3 - level_2)/width*(45 - 18*((level_3 - level_2)/width)^2 + 5*((level_3 - level_2)/width)^4)*sqrt(width)/32);
+  Real q20 = orifice*az20*(if level_2 >= w then sqrt(level_2) elseif level_2 > 0 then (1.5 - 0.5*level_2/w)*level_2/sqrt(w) else 0);
 equation
   area_1*der(level_1) = pump_gain_1*u1 - q13;
   area_3*der(level_3) = q13 - q32;
-  area_2*der(level_2) = pump_gain_2*u2 + q32 - orifice*az20*s20;
+  area_2*der(level_2) = pump_gain_2*u2 + q32 - q20;
 end ThreeTank;

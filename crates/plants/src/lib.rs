@@ -49,6 +49,7 @@ mod sensor;
 mod simulator;
 mod structure;
 mod term;
+mod text;
 mod unit;
 mod vessels;
 

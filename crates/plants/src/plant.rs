@@ -98,21 +98,6 @@ impl Plant {
         }
     }
 
-    /// The plant as the text of a model ([`ct_model::ModelSpec::parse`]): its fitted parameters in the order of [`Plant::parameters`], its
-    /// levels, vessel by vessel, and one output: the level of the last vessel, or of T3 for [`Plant::ThreeTank`]. Constants that may be
-    /// known ([`Known`]) are `final parameter`s, with the values that they have if they are not known.
-    #[must_use]
-    pub fn text(self) -> &'static str {
-        match self {
-            Self::SingleTank => include_str!("../models/single-tank.mo"),
-            Self::SingleTankLinear => include_str!("../models/single-tank-linear.mo"),
-            Self::CascadedTanks => include_str!("../models/cascaded-tanks.mo"),
-            Self::CascadedTanksLinear => include_str!("../models/cascaded-tanks-linear.mo"),
-            Self::FirstOrder => include_str!("../models/first-order.mo"),
-            Self::ThreeTank => include_str!("../models/three-tank.mo"),
-        }
-    }
-
     /// Number of vessels; the level of the last one is measured, unless [`crate::Known::measured`] says otherwise.
     #[must_use]
     pub fn vessels(self) -> usize {

@@ -2,21 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use ct_model::{Given, ModelSpec, Output, Variable};
+use ct_model::{Given, ModelSpec};
 use ctid::model_file::ModelFile;
-use plants::Plant;
 use pyo3::prelude::*;
 
 use crate::error;
-
-/// The text's names of what is known of the vessels, in their order.
-fn areas(plant: Plant) -> &'static [&'static str] {
-    match plant.vessels() {
-        3 => &["area_1", "area_3", "area_2"],
-        2 => &["area_upper", "area_lower"],
-        _ => &["area"],
-    }
-}
 
 /// The plant's text with what is known, these values of its parameters and initial levels, and the outputs that are read.
 pub fn spec(file: &ModelFile, values: &BTreeMap<String, f64>) -> PyResult<ModelSpec> {
@@ -37,7 +27,7 @@ pub fn spec(file: &ModelFile, values: &BTreeMap<String, f64>) -> PyResult<ModelS
             plant.id()
         )));
     }
-    let mut spec = ModelSpec::parse(plant.text()).map_err(error::of_model)?;
+    let mut spec = plant.spec(&file.known).map_err(error::of_model)?;
     let fitted = spec.parameters.iter().filter(|p| p.given == Given::Fitted);
     let names = fitted.map(|parameter| parameter.about.name.as_str());
     let lacking: Vec<&str> = names.filter(|name| !values.contains_key(*name)).collect();
@@ -49,18 +39,8 @@ pub fn spec(file: &ModelFile, values: &BTreeMap<String, f64>) -> PyResult<ModelS
         )));
     }
     for parameter in &mut spec.parameters {
-        let name = parameter.about.name.as_str();
-        let vessel = areas(plant).iter().position(|area| *area == name);
-        let known = match (vessel, name) {
-            (Some(vessel), _) => file.known.area[vessel],
-            (None, "orifice") => file.known.orifice,
-            _ => values.get(name).copied(),
-        };
-        parameter.value = known.unwrap_or(parameter.value);
+        let value = values.get(parameter.about.name.as_str()).copied();
+        parameter.value = value.unwrap_or(parameter.value);
     }
-    let state = |vessel: usize| Output {
-        variable: Variable::State(vessel),
-    };
-    spec.outputs = file.known.outputs(plant).into_iter().map(state).collect();
     Ok(spec)
 }

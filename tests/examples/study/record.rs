@@ -260,10 +260,11 @@ impl Job {
         let problem = problem(&rig, rig.run(&mut ChaCha8Rng::seed_from_u64(self.seed())));
         if text {
             let found = as_text::diagnosed(&rig, &problem);
-            return found.map_or_else(
+            let answer = found.and_then(|found| as_text::answer(&rig, &found));
+            return answer.map_or_else(
                 |why| refused(why.to_string()),
-                |found| Outcome {
-                    answer: Some(as_text::answer(&rig, &found)),
+                |answer| Outcome {
+                    answer: Some(answer),
                     refused: None,
                 },
             );

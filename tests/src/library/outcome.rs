@@ -218,6 +218,7 @@ pub fn outcome(
             })
             .collect(),
         candidates: own,
+        left_out: std::collections::BTreeSet::default(),
         time_unit: driven.time_unit.0,
         time_unit_name: driven.time_unit.1.to_string(),
     };

@@ -329,6 +329,7 @@ fn ports_of(
         Place::BalanceAndSurrounding
         | Place::Motion
         | Place::Level
+        | Place::LevelReading
         | Place::TankAndTankBelow
         | Place::Terminal => domain::ports(spec, effect),
     }

@@ -4,7 +4,7 @@ use ct_signals::{Dimension, Unit};
 
 use super::effect::{Effect, Place};
 use super::port::Port;
-use crate::expression::Variable;
+use crate::expression::{Expression, Variable};
 use crate::spec::ModelSpec;
 
 pub(super) fn ports(spec: &ModelSpec, effect: &Effect) -> Vec<Port> {
@@ -12,6 +12,7 @@ pub(super) fn ports(spec: &ModelSpec, effect: &Effect) -> Vec<Port> {
         Place::BalanceAndSurrounding => thermal(spec),
         Place::Motion => mechanical(spec),
         Place::Level => levels(spec).map(Port::Balance).collect(),
+        Place::LevelReading => level_readings(spec),
         Place::TankAndTankBelow => tanks(spec),
         Place::Terminal => electrical(spec),
         _ => Vec::new(),
@@ -53,10 +54,27 @@ fn mechanical(spec: &ModelSpec) -> Vec<Port> {
     balances.filter(is_speed).map(Port::Balance).collect()
 }
 
-/// Levels: lengths that are no positions, as no state is their speed.
+/// States of this quantity are levels of tanks, whatever the unit of their sensor.
+const LEVEL: &str = "Level";
+
+/// Levels: those whose text says so, and lengths that are no positions, as no state is their speed.
 fn levels(spec: &ModelSpec) -> impl Iterator<Item = usize> {
     let states = 0..spec.states.len();
-    states.filter(|&x| is(spec, Variable::State(x), "m") && spec.speed_of(x).is_none())
+    states.filter(|&x| {
+        let is_length = || is(spec, Variable::State(x), "m") && spec.speed_of(x).is_none();
+        spec.states[x].about.quantity == LEVEL || is_length()
+    })
+}
+
+/// Outputs that are readings of levels.
+fn level_readings(spec: &ModelSpec) -> Vec<Port> {
+    let outputs = 0..spec.outputs.len();
+    let reads = |&y: &usize| {
+        let variable = Expression::Variable(spec.outputs[y].variable);
+        let read = spec.behind(&variable);
+        levels(spec).any(|x| *read == Expression::Variable(Variable::State(x)))
+    };
+    outputs.filter(reads).map(Port::Output).collect()
 }
 
 /// Pairs of tanks of which the first one drains into the other.

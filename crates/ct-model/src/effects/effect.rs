@@ -30,6 +30,8 @@ pub enum Place {
     Motion,
     /// The equation of a level `x`.
     Level,
+    /// Between a level and its reading: the effect of `y` supplies the reading.
+    LevelReading,
     /// A flow from a tank of level `x1` to one of level `x2` that it drains into.
     TankAndTankBelow,
     /// A voltage that is read, `y`, with a current that is an input, `a`.
@@ -60,6 +62,8 @@ pub enum Starts {
     Quantiles(&'static [f64]),
     /// Shares of the width of the signal's range.
     Widths(&'static [f64]),
+    /// Values in the signal's range: shares of it, from its lower end.
+    Range(&'static [f64]),
     /// Instants: shares of the record, from its beginning.
     Times(&'static [f64]),
     /// Shares of the record's duration.

@@ -125,6 +125,7 @@ pub(super) fn instance(
     fragment.action = match effect.place {
         Place::Input
         | Place::Output
+        | Place::LevelReading
         | Place::Parameter
         | Place::ParameterAndSignal
         | Place::Terminal => Action::Stand(result),

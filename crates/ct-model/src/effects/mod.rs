@@ -62,10 +62,11 @@ pub fn all_effects() -> impl Iterator<Item = &'static Effect> {
     const GROUPS: [&[Effect]; 9] = [
         &input::EFFECTS,
         &electrical::EFFECTS,
+        // Effects of the sensor of a level come before the general ones of a sensor.
+        &hydraulic::EFFECTS,
         &output::EFFECTS,
         &thermal::EFFECTS,
         &mechanical::EFFECTS,
-        &hydraulic::EFFECTS,
         &balance::EFFECTS,
         &parameter::EFFECTS,
         &between::EFFECTS,

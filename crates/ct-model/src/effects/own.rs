@@ -300,6 +300,7 @@ fn about(name: &str, unit: &str, min: Option<f64>, max: Option<f64>) -> About {
         name: name.to_string(),
         unit: unit.to_string(),
         description: String::new(),
+        quantity: String::new(),
         min: min.unwrap_or(f64::NEG_INFINITY),
         max: max.unwrap_or(f64::INFINITY),
     }

@@ -40,7 +40,9 @@ impl Tape {
                     Expression::Call(Function::Sign | Function::Abs, _) => {
                         numbers.set(numbers.get() + 2);
                     }
-                    Expression::Call(Function::Play, _) => plays.set(plays.get() + 1),
+                    Expression::Call(Function::Play | Function::StayBetween, _) => {
+                        plays.set(plays.get() + 1);
+                    }
                     Expression::Call(Function::StickSlip, _) => {
                         numbers.set(numbers.get() + 3);
                         plays.set(plays.get() + 4);
@@ -301,6 +303,7 @@ impl Compiler<'_> {
             Function::Min => self.smaller(a, b),
             Function::Max => self.larger(a, b),
             Function::Play => self.play(a, b),
+            Function::StayBetween => self.stay_between(a, a, b),
             Function::StickSlip => self.stick_slip(a, b, c),
             Function::Quantise => self.operation(Operation::Quantise(a, b)),
             Function::Sqrt => self.operation(Operation::Sqrt(a)),

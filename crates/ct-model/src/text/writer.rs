@@ -220,6 +220,9 @@ impl ModelSpec {
 /// Name and attributes of a variable: its own, and more that are given.
 fn declared(about: &About, more: &[(&str, String)]) -> String {
     let mut attributes = Vec::new();
+    if !about.quantity.is_empty() {
+        attributes.push(format!("quantity={}", quoted(&about.quantity)));
+    }
     if !about.unit.is_empty() {
         attributes.push(format!("unit={}", quoted(&about.unit)));
     }

@@ -242,6 +242,7 @@ fn model() -> impl Strategy<Value = ModelSpec> {
                     ModelSpec {
                         name: "Random".to_string(),
                         description: String::new(),
+                        quantity: String::new(),
                         parameters,
                         inputs,
                         states,

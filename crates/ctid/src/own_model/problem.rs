@@ -1,6 +1,6 @@
 //! A model file and its records as a search problem, and the model with the effects of its file inserted.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use ct_model::Model;
 use ct_model::effects::{Candidate, Role, Visited, apply};
@@ -34,6 +34,7 @@ pub(super) fn problem(file: &OwnModelFile, records: &Records) -> Problem {
         known: file.known.clone(),
         priors: file.priors.clone(),
         candidates: file.candidates.clone(),
+        left_out: BTreeSet::new(),
         time_unit: records.time_unit,
         time_unit_name: unit_of(records.time_unit).to_string(),
     }

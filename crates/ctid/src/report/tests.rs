@@ -241,7 +241,10 @@ fn several_outputs_are_told_by_name_and_as_multiples_of_their_noise() {
             output.name
         );
         assert!(words.contains(&line), "{line}");
-        let floor = format!("<dd>{}: 0.080 V, from: the residual of the final model", output.name);
+        let floor = format!(
+            "<dd>{}: 0.080 V, from: the residual of the final model",
+            output.name
+        );
         assert!(words.contains(&floor), "{floor}");
         for row in [
             "Simulation error, fitted data (rms)",

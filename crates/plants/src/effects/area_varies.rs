@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The vessel widens or narrows with the level, as a cone does.",
     general: None,
+    at_ports: &["varies_with(s,h)"],
     equation: "S(H) = S (1 + c (H - H_op)/H_op)^2",
     applies: any_plant,
     parameters,

@@ -14,6 +14,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The reading moves in steps: a coarse converter, a float switch with many contacts, digits that were cut off.",
     general: Some("the reading is rounded coarsely"),
+    at_ports: &["quantisation(y)"],
     equation: "y = E[D round((H + v)/D)], v ~ N(0, s^2)",
     applies: any_plant,
     parameters,

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "A constant flow leaves the vessel beside the outlet: a leak, or a consumer that was not recorded.",
     general: Some("a constant unknown load acts on the process"),
+    at_ports: &["constant(h)"],
     equation: "S dH/dt = ... - q0",
     applies: any_plant,
     parameters,

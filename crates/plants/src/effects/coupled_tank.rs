@@ -10,6 +10,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "A single tank exchanges water with a side tank; with two tanks in series, the lower level reduces the outflow of the upper tank.",
     general: None,
+    at_ports: &["hidden_state(h)", "coupling(h,h)"],
     equation: "one tank: S_b dH_b/dt = c (H - H_b), S dH/dt = ... - c (H - H_b), S_b = share S, c = S_b/T_b; two tanks: the head of the upper outflow is max(H_1 - b H_2, 0)",
     applies: first_vessel,
     parameters,

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "A part of the outflow is laminar and grows in proportion to the level, as through a long thin pipe.",
     general: None,
+    at_ports: &["loss(h)"],
     equation: "Q_out = a H + b sqrt(H)",
     applies: torricelli_plant,
     parameters,

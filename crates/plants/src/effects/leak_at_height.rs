@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "Water leaves through a hole in the wall, or over a side outlet, once the level stands above it.",
     general: None,
+    at_ports: &["leak_at_height(h)"],
     equation: "S dH/dt = ... - c sqrt(max(H - h_leak, 0))",
     applies: any_plant,
     parameters,

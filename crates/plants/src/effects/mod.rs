@@ -40,6 +40,10 @@ pub struct EffectInfo {
     ///
     /// A drift and a step of the outflow coefficient are general: in every linear plant, the coefficient is the loss `1/tau`.
     pub general: Option<&'static str>,
+    /// Effects at ports of a model text that it is ([`Plant::names_of`]): `drift(q)`. `u` stands for a command to a pump, `y` for an
+    /// output, `h` for a level, `k` for the gain of a pump, `q` for an outflow or its coefficient, `s` for a cross-section or the time
+    /// constant of a vessel.
+    pub at_ports: &'static [&'static str],
     /// Its equation.
     pub equation: &'static str,
     /// The plants and their vessels (or pumps) for which the effect is meaningful; for an effect at the sensor, the index is that of an

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The vessel overflows at its rim; what spills is lost, or a part of it reaches the next tank.",
     general: None,
+    at_ports: &["limit(h)", "overflow(h,h)"],
     equation: "H <= h_rim; at the rim the spill is the net inflow, and a fraction of it runs into the next tank",
     applies: any_plant,
     parameters,

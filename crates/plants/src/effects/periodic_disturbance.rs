@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: true,
     physics: "A flow that is not measured varies with a fixed period: a consumer that switches on and off, a pump that pulsates.",
     general: Some("a periodic unknown load acts on the process"),
+    at_ports: &["periodic(h)"],
     equation: "S dH/dt = ... + A sin(2 pi t/P + phi) = ... + s sin(2 pi t/P) + c cos(2 pi t/P); A = sqrt(s^2 + c^2), phi = atan2(c, s)",
     applies: any_plant,
     parameters,

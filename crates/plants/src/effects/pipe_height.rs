@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The outlet pipe leads down: its height adds to the level that drives the outflow.",
     general: None,
+    at_ports: &["offset(y)"],
     equation: "Q_out = alpha sqrt(H + h_pipe)",
     applies: measured_vessel,
     parameters,

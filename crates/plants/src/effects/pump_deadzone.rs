@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The pump delivers nothing below a threshold of the command: it must first overcome friction and head.",
     general: Some("the actuator does nothing below a threshold"),
+    at_ports: &["dead_zone(u)"],
     equation: "q = k max(u - u_dz, 0)   (odd in u)",
     applies: any_plant,
     parameters,

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: true,
     physics: "The pump delivers more or less for the same command as the record goes on: it wears, or it warms up and settles.",
     general: Some("the gain of the actuator drifts"),
+    at_ports: &["gain_drift(u)", "drift(k)"],
     equation: "k(t) = k (1 + r (1 - exp(-t/T_w))/(1 - exp(-T_rec/T_w))); T_w above T_rec: k (1 + r t/T_rec)",
     applies: any_plant,
     parameters,

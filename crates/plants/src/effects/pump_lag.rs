@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The inflow follows the command with a time constant: the pump has to spin up.",
     general: Some("the actuator lags behind the input"),
+    at_ports: &["lag(u)"],
     equation: "T dq/dt = k u - q",
     applies: any_plant,
     parameters,

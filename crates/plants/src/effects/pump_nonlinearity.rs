@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The inflow bends away from proportional to the command; it is right at both ends of the range.",
     general: Some("the actuator's characteristic is bent"),
+    at_ports: &["nonlinearity(u)", "varies_with(k,u)"],
     equation: "q = k (u + b u (u - u_range)/u_range)",
     applies: any_plant,
     parameters,

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The pump delivers no more above a limit of the command, which lies below the largest recorded one.",
     general: Some("the actuator saturates"),
+    at_ports: &["saturation(u)"],
     equation: "q = k min(u, u_max)",
     applies: any_plant,
     parameters,

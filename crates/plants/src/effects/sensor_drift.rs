@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: true,
     physics: "The zero of the sensor drifts over the record, with temperature or with dirt.",
     general: Some("the zero of the sensor drifts"),
+    at_ports: &["drift(y)"],
     equation: "y = H + D t/T_rec",
     applies: any_plant,
     parameters,

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "After the level has been high the reading sticks too high by a step, and drops back when the level falls.",
     general: Some("the sensor sticks after high values and drops back"),
+    at_ports: &["sticking(y)", "hysteresis(y)"],
     equation: "y = H + step s; s rises from 0 at `drop` to 1 at `stick` with the highest level since the last drop",
     applies: any_plant,
     parameters,

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The reading follows the level with a time constant: a filter in the transmitter, or a stilling tube.",
     general: Some("the sensor lags behind what it measures"),
+    at_ports: &["lag(y)"],
     equation: "T dy/dt = H - y",
     applies: any_plant,
     parameters,

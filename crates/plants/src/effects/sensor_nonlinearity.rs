@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The reading bends away from the level; it is right when empty and at the highest level.",
     general: Some("the sensor's characteristic is bent"),
+    at_ports: &["curved_reading(y)", "nonlinearity(y)"],
     equation: "y = H + g H (H/h_range - 1), h_range the highest level of the record",
     applies: any_plant,
     parameters,

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The reading is shifted: the sensor's zero is not the level of the outlet.",
     general: Some("the zero of the sensor is shifted"),
+    at_ports: &["offset(y)"],
     equation: "y = H + b",
     applies: any_plant,
     parameters,

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The reading does not rise above a limit: the end of the sensor's or the converter's range.",
     general: Some("the sensor saturates"),
+    at_ports: &["saturation(y)"],
     equation: "y = min(H, y_max)",
     applies: any_plant,
     parameters,

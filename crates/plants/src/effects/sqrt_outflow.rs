@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The outflow grows with the square root of the level (Torricelli), where the model has it grow in proportion.",
     general: None,
+    at_ports: &["varies_with(q,h)"],
     equation: "Q_out = Q_lin + c (2 sqrt(H_op) (sqrt(H) - sqrt(H_op)) - (H - H_op)); c = 1 is the square root",
     applies: linear_plant,
     parameters,

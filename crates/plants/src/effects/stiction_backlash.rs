@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "What the command moves has play, or sticks until the command has moved on far enough and then slips.",
     general: Some("the actuator has play, or sticks and then slips"),
+    at_ports: &["backlash(u)"],
     equation: "pos stays while |u - pos| <= w (1 + j)/2, else pos = u - sign(u - pos) w (1 - j)/2; j = 0: backlash of width w, j = 1: stiction, it moves only when |u - pos| > w; the record begins with pos = u + b w (1 + j)/2",
     applies: any_plant,
     parameters,

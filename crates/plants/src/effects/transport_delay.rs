@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: false,
     physics: "The inflow follows the command after a dead time: the water takes time to run through the pipe.",
     general: Some("a dead time passes before the input acts"),
+    at_ports: &["delay(u)"],
     equation: "q(t) = k u(t - delay)",
     applies: any_plant,
     parameters,

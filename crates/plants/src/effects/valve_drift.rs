@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: true,
     physics: "The outlet slowly clogs, or opens, over the record.",
     general: Some("the loss coefficient drifts"),
+    at_ports: &["drift(q)"],
     equation: "Q_out(t) = (1 + r t/T_rec) Q_out; clogging: r < 0",
     applies: any_plant,
     parameters,

@@ -9,6 +9,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     by_clock: true,
     physics: "At one instant the outlet changes: the valve was turned, or something lodged in it.",
     general: Some("the loss coefficient changes at one instant"),
+    at_ports: &["step(q)"],
     equation: "Q_out(t) = (1 + s) Q_out from t_s on",
     applies: any_plant,
     parameters,

@@ -166,6 +166,7 @@ pub(super) fn values(starts: Starts, span: &Span, visited: &Visited, balance: f6
     let (shares, of): (&[f64], Box<dyn Fn(f64) -> f64 + '_>) = match starts {
         Starts::Values(all) => (all, Box::new(|share| share)),
         Starts::Quantiles(all) => (all, Box::new(|share| span.quantile(share))),
+        Starts::Range(all) => (all, Box::new(|share| span.low + share * span.width())),
         Starts::Widths(all) => (all, Box::new(|share| share * span.width())),
         Starts::Times(all) => {
             let time = |share: f64| visited.begin + share * visited.duration;

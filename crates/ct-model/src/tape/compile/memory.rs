@@ -1,4 +1,4 @@
-//! The functions with memory: play and stick-slip.
+//! The functions with memory: play, stick-slip, and values that stay between two others.
 
 use super::Compiler;
 use crate::expression::Comparison;
@@ -11,6 +11,17 @@ impl Compiler<'_> {
     pub(super) fn play(&mut self, from: Register, half_width: Register) -> Register {
         let low = self.operation(Operation::Subtract(from, half_width));
         let high = self.operation(Operation::Add(from, half_width));
+        self.stay_between(from, low, high)
+    }
+
+    /// A value that stays between two others and begins at `from`: a generalised play (Krasnosel'skii and Pokrovskii, Systems with
+    /// Hysteresis, 1989).
+    pub(super) fn stay_between(
+        &mut self,
+        from: Register,
+        low: Register,
+        high: Register,
+    ) -> Register {
         let held = self.first_play + self.plays.len();
         let pushed = self.larger(held, low);
         let to = self.smaller(pushed, high);

@@ -18,6 +18,7 @@ impl Builder<'_> {
             name: declaration.name.clone(),
             unit: String::new(),
             description: declaration.description.clone(),
+            quantity: String::new(),
             min: f64::NEG_INFINITY,
             max: f64::INFINITY,
         };
@@ -31,7 +32,8 @@ impl Builder<'_> {
             }
             match (name.as_str(), attribute) {
                 ("unit", Attribute::Text(unit)) => about.unit.clone_from(unit),
-                ("displayUnit" | "quantity", Attribute::Text(_)) => {}
+                ("quantity", Attribute::Text(quantity)) => about.quantity.clone_from(quantity),
+                ("displayUnit", Attribute::Text(_)) => {}
                 ("unit" | "displayUnit" | "quantity", Attribute::Value(_)) => {
                     let what = format!("{name} is a text: write {name}=\"...\"");
                     return self.error(*from, what);

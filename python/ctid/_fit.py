@@ -193,23 +193,24 @@ class Fit:
         return band_table(zip(outputs, found["outputs"].values(), strict=True), data, interval)
 
     def failures(self) -> pd.DataFrame:
-        """Where the model fails on its records: windows of time, levels, inputs, directions and frequencies whose error is above the noise.
+        """Where the model fails on its records: windows of time, ranges of the output, the inputs and the states, directions of change and frequencies whose error is above the noise.
 
-        Columns: `output`, `by`, `record` of a window of time, the edges `from` and `to`, `samples`, the `mean` of the residual (measured minus
+        Columns: `output`, `by`, `signal` (the input or the state), `record` of a window of time, the edges `from` and `to`, `samples`, the `mean` of the residual (measured minus
         model), its `rms`, and its `share` of the squared error among those of the same `by`. The worst first. `failures_in_words` says the same.
         """
         rows: dict[str, list[Any]] = {
-            key: [] for key in ("output", "by", "record", "from", "to", "samples", "mean", "rms", "share")
+            key: [] for key in ("output", "by", "signal", "record", "from", "to", "samples", "mean", "rms", "share")
         }
         found: list[tuple[Any, ...]] = []
         for output, _, bins, _ in self._native.outputs:
-            sums: dict[str, float] = {}
-            for by, (_, _, _, count, _, rms, _) in bins:
-                sums[by] = sums.get(by, 0.0) + count * rms * rms
-            for by, (record, start, end, count, mean, rms, fails) in bins:
+            sums: dict[tuple[str, str | None], float] = {}
+            for by, signal, (_, _, _, count, _, rms, _) in bins:
+                sums[by, signal] = sums.get((by, signal), 0.0) + count * rms * rms
+            for by, signal, (record, start, end, count, mean, rms, fails) in bins:
                 if fails:
-                    share = count * rms * rms / sums[by] if sums[by] > 0.0 else np.nan
-                    found.append((output, by, record, start, end, count, mean, rms, share))
+                    whole = sums[by, signal]
+                    share = count * rms * rms / whole if whole > 0.0 else np.nan
+                    found.append((output, by, signal, record, start, end, count, mean, rms, share))
         for row in sorted(found, key=lambda row: -row[-1]):
             for key, value in zip(rows, row, strict=True):
                 rows[key].append(value)

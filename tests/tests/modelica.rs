@@ -44,7 +44,7 @@ fn mended(name: &str) -> Vec<(String, String)> {
     let text = fs::read_to_string(folder.join(name).with_extension("mo")).unwrap();
     let spec = ModelSpec::parse(&text).unwrap();
     let all = candidates(&spec, &Visited::nominal(&spec));
-    let own = ["play(", "stick_slip(", "quantise("];
+    let own = ["play(", "stick_slip(", "stay_between(", "quantise("];
     let of_modelica = |text: &String| own.iter().all(|function| !text.contains(function));
     let texts = all.iter().map(|candidate| {
         let mut mended = apply(&spec, &[candidate]).unwrap();

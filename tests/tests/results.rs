@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 
 use ctid::output::Written;
 use ctid_tests::{Drive, Rig};
+use effect_search::HeldOutError;
 use missing_effect::{
-    Acceptance, Diagnosis, Effort, HeldOutError, Options, PerOutput, PlaceScore, Primitive,
-    Problem, Rejection, Verdict, diagnose,
+    Acceptance, Diagnosis, Effort, Options, PerOutput, PlaceScore, Primitive, Problem, Rejection,
+    Verdict, diagnose,
 };
 use plants::{Fitted, Place, Term, Variable};
 use rand::SeedableRng;

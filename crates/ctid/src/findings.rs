@@ -1,7 +1,8 @@
 //! Texts about the parts of a diagnosis, shared by the terminal, the report and the page.
 
+use effect_search::HeldOutError;
 use missing_effect::{
-    Acceptance, Diagnosis, Effort, GROUP_MARGIN, HeldOutError, PerOutput, PlaceScore, Score, Step,
+    Acceptance, Diagnosis, Effort, GROUP_MARGIN, PerOutput, PlaceScore, Score, Step,
 };
 use plants::Domain;
 

@@ -9,6 +9,7 @@ use estimation::{Fit, Noise};
 use greybox::{Robust, not_determined, weighted_rms};
 
 use crate::node::{Context, FINE, Node};
+use crate::output_step::output_steps;
 use crate::quantisation::quantisation;
 use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 use crate::search::Grown;
@@ -77,7 +78,7 @@ pub(crate) fn assemble(
     }
     let steps = ladder
         .iter()
-        .map(|node| step(context, base, node, &floors))
+        .map(|node| step(context, base, node, (&own.noise, &floors)))
         .collect::<Result<Vec<_>, Error>>()?;
     let named = |values: &[f64]| -> BTreeMap<String, f64> {
         let names = outputs.iter().map(|y| y.name.clone());
@@ -124,7 +125,7 @@ pub(crate) fn assemble(
         .map(|candidate| (candidate.id.clone(), candidate.numbers_of_record()))
         .collect();
     Ok(Diagnosis {
-        schema: 3,
+        schema: 4,
         model: problem.spec.name.clone(),
         verdict,
         effects: context.ids(order),
@@ -193,7 +194,13 @@ pub(crate) fn sizes(node: &Node, candidate: &Candidate) -> Vec<Estimate> {
     .collect()
 }
 
-fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<Step, Error> {
+/// `noise`: of the last model, with the level of each output.
+fn step(
+    context: &Context,
+    base: &Node,
+    node: &Node,
+    (noise, floors): (&Noise, &[f64]),
+) -> Result<Step, Error> {
     let problem = context.problem;
     let setup = context.setup(&node.model)?;
     let outputs = &problem.records[0].outputs;
@@ -237,6 +244,12 @@ fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<S
     });
     let test = held_out(&setup, &node.fit, &problem.test)?;
     let mut simulated = setup.simulate(&node.fit.x).unwrap_or_default();
+    let noise: Vec<ArModel> = noise.iter().cloned().collect();
+    let at_outputs = if simulated.is_empty() {
+        Vec::new()
+    } else {
+        output_steps(&setup, &node.fit, &simulated, &noise, test.as_ref())
+    };
     simulated.extend(test.iter().flat_map(|test| test.simulated.iter().cloned()));
     let added = node.added.len() > base.added.len();
     Ok(Step {
@@ -254,6 +267,7 @@ fn step(context: &Context, base: &Node, node: &Node, floors: &[f64]) -> Result<S
         not_determined: not_determined(&setup, &node.fit),
         starts: node.fit.starts,
         starts_agree: node.fit.agree,
+        outputs: at_outputs,
         simulated,
         parameters: parameters.collect(),
     })

@@ -10,7 +10,7 @@ use estimation::Fit;
 use greybox::{FitOptions, ModelSetup};
 use nalgebra::{DMatrix, DVector};
 
-use crate::Error;
+use crate::{Error, HeldOutError};
 
 /// Samples on which the initial states of a held-out record are fitted at least, and which are not scored.
 const STATE_ROWS: usize = 5;
@@ -22,6 +22,8 @@ const MOST_OF_RECORD: usize = 4;
 pub struct HeldOut {
     /// Simulation error of each output \[its unit\].
     pub rmse: Vec<f64>,
+    /// Parts of the error of each output \[its unit\].
+    pub errors: Vec<HeldOutError>,
     /// Simulated output: a series for each record and output; NaN after the simulation diverges.
     pub simulated: Vec<Vec<f64>>,
     /// Number of first samples of each record for the fit of the initial states; they are not scored.
@@ -37,7 +39,7 @@ pub fn held_out(setup: &ModelSetup, fit: &Fit, test: &[Record]) -> Result<Option
         return Ok(None);
     }
     let outputs = fit.rmse.len();
-    let mut sums = vec![(0.0, 0_usize); outputs];
+    let mut scored: Vec<Vec<Vec<(f64, f64)>>> = vec![Vec::new(); outputs];
     let mut simulated = Vec::new();
     let mut state_rows = Vec::new();
     for record in test {
@@ -57,20 +59,22 @@ pub fn held_out(setup: &ModelSetup, fit: &Fit, test: &[Record]) -> Result<Option
         };
         let model = of_whole.simulate(&states);
         let model = model.unwrap_or_else(|| vec![vec![f64::NAN; record.len()]; outputs]);
-        for (o, sum) in sums.iter_mut().enumerate() {
-            let measured = record.outputs[o].values.iter();
-            let pairs = measured.zip(&model[o]).skip(rows);
-            for (y, m) in pairs.filter(|(y, _)| !y.is_nan()) {
-                sum.0 += (y - m).powi(2);
-                sum.1 += 1;
-            }
+        for (o, scored) in scored.iter_mut().enumerate() {
+            let measured = record.outputs[o].values.iter().copied();
+            let pairs = measured.zip(model[o].iter().copied()).skip(rows);
+            scored.push(pairs.filter(|(y, _)| !y.is_nan()).collect());
         }
         simulated.extend(model);
         state_rows.push(rows);
     }
-    let rms = |(sum, n): (f64, usize)| (sum / n.max(1) as f64).sqrt();
+    let rms = |pairs: &Vec<Vec<(f64, f64)>>| {
+        let squares = pairs.iter().flatten().map(|(y, m)| (y - m).powi(2));
+        let count: usize = pairs.iter().map(Vec::len).sum();
+        (squares.sum::<f64>() / count.max(1) as f64).sqrt()
+    };
     Ok(Some(HeldOut {
-        rmse: sums.into_iter().map(rms).collect(),
+        rmse: scored.iter().map(rms).collect(),
+        errors: scored.iter().map(|all| HeldOutError::of(all)).collect(),
         simulated,
         state_rows,
     }))

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::output_step::OutputStep;
 use crate::quantisation::Quantisation;
 use crate::residual_tests::NotNoise;
 use crate::unknown::Unknown;
@@ -71,6 +72,8 @@ pub struct Step {
     pub starts: usize,
     /// Number of starts that ended in the best minimum.
     pub starts_agree: usize,
+    /// Results at each output, in the order of the model: its error, where it fails, and tests of its residual.
+    pub outputs: Vec<OutputStep>,
     /// Simulated output: a series for each fitted record and output, then those of the held-out records.
     #[serde(skip)]
     pub simulated: Vec<Vec<f64>>,

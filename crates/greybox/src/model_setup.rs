@@ -121,7 +121,8 @@ impl<'a> ModelSetup<'a> {
     }
 
     /// The records.
-    pub(crate) fn records(&self) -> &'a [Record] {
+    #[must_use]
+    pub fn records(&self) -> &'a [Record] {
         self.records
     }
 

@@ -20,16 +20,12 @@ mod simulated;
 pub use base::{Options, Problem, ProblemBuilder, Progress, TIME_LIMIT};
 pub use compare::compare;
 pub use diagnose::diagnose;
-pub use diagnostics::{
-    locate::{Series, locate},
-    unknown::PLACE_MARGIN,
-};
+pub use diagnostics::unknown::PLACE_MARGIN;
 pub use error::Error;
 pub use fit::criterion::GROUP_MARGIN;
 pub use fitted::{Fitted, fitted};
 pub use result::{
-    Acceptance, Bin, ControlLoop, Diagnosis, Effort, Failure, FailureKind, Failures, HeldOutError,
-    LONGEST_HOLD, MendedGaps, NoiseFloor, NoiseSource, NotNoise, NotSimulated, OutputStep,
-    Parameter, PerOutput, PlaceLikelihood, PlaceScore, Primitive, Rankings, Rejection, Remark,
-    ResidualTests, Score, Share, Shown, ShownInput, Step, Unknown, Verdict, Window,
+    Acceptance, ControlLoop, Diagnosis, Effort, LONGEST_HOLD, MendedGaps, NoiseFloor, NoiseSource,
+    NotNoise, NotSimulated, Parameter, PerOutput, PlaceLikelihood, PlaceScore, Primitive, Rankings,
+    Rejection, Remark, Score, Share, Shown, ShownInput, Step, Unknown, Verdict, Window,
 };

@@ -4,6 +4,7 @@ model FirstOrder "one first-order lag"
   parameter Real tau(min=0) = 80 "time constant";
   input Real u "command";
   output Real level(start=10);
+  Real outflow = level;
 equation
-  tau*der(level) = K*u - level;
+  tau*der(level) = K*u - outflow;
 end FirstOrder;

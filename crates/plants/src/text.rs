@@ -8,7 +8,7 @@ use ct_model::{
 use ct_signals::Record;
 
 use crate::effects::CATALOGUE;
-use crate::{EffectInfo, Known, Plant};
+use crate::{Domain, EffectInfo, Known, Plant};
 
 impl Plant {
     /// The plant as the text of a model ([`ct_model::ModelSpec::parse`]): its fitted parameters in the order of [`Plant::parameters`], its
@@ -65,9 +65,7 @@ impl Plant {
     pub fn spec_of(self, known: &Known, record: &mut Record) -> Result<ModelSpec, TextError> {
         let mut spec = self.spec(known)?;
         let unit = record.outputs.first().map(|level| level.unit.clone());
-        for state in &mut spec.states {
-            state.about.unit = unit.clone().unwrap_or_default();
-        }
+        in_unit(self, &mut spec, &unit.unwrap_or_default());
         for (input, channel) in spec.inputs.iter_mut().zip(&mut record.inputs) {
             input.about.unit.clone_from(&channel.unit);
             channel.name.clone_from(&input.about.name);
@@ -146,6 +144,15 @@ fn kind(spec: &ModelSpec, name: &str) -> char {
     }
 }
 
+/// Gives the levels a unit. The output of a linear plant may be any quantity: it is a level where its unit may be that of one.
+fn in_unit(plant: Plant, spec: &mut ModelSpec, unit: &str) {
+    let is_level = Domain::of(plant, unit) == Domain::Hydraulic;
+    for state in &mut spec.states {
+        state.about.unit = unit.to_string();
+        state.about.quantity = if is_level { "Level" } else { "" }.to_string();
+    }
+}
+
 /// Adds a measured flow into a vessel.
 fn add_disturbance(spec: &mut ModelSpec, vessel: usize) {
     let about = |name: &str, description: &str| About {
@@ -188,7 +195,8 @@ mod tests {
                 measured: (0..plant.vessels()).collect(),
                 ..Known::default()
             };
-            let spec = plant.spec(&known).unwrap();
+            let mut spec = plant.spec(&known).unwrap();
+            in_unit(plant, &mut spec, "cm");
             let all = candidates(&spec, &Visited::nominal(&spec));
             let names: Vec<&str> = all
                 .iter()

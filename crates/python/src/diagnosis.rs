@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use ctid::effort::EffortLevel;
 use ctid::own_model::{Records, design, diagnosed_page};
+use effect_search::Failures;
 use effect_search::Options;
 use effect_search::design::Limits;
-use missing_effect::Failures;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -40,30 +40,26 @@ struct KeptDiagnosis {
 /// A bin of the residual: index of the record (for a window), from, to, samples, mean, root mean square, whether the model fails clearly in
 /// the bin.
 pub type Bin = (Option<usize>, f64, f64, usize, f64, f64, bool);
+/// A kind of bin, the name of its input or state, and the bin.
+pub type NamedBin = (&'static str, Option<String>, Bin);
 
 /// Bins of the residual, by kind.
-pub fn bins(failures: &Failures) -> Vec<(&'static str, Bin)> {
-    let Failures {
-        by_time,
-        by_level,
-        by_flow,
-        by_direction,
-        by_frequency,
-        ..
-    } = failures;
-    let all = [
-        ("time", by_time),
-        ("level", by_level),
-        ("input", by_flow),
-        ("direction", by_direction),
-        ("frequency", by_frequency),
+pub fn bins(failures: &Failures) -> Vec<NamedBin> {
+    let unnamed = [
+        ("time", &failures.by_time),
+        ("output", &failures.by_output),
+        ("direction", &failures.by_direction),
+        ("frequency", &failures.by_frequency),
     ];
-    let all = all.into_iter().flat_map(|(by, bins)| {
+    let unnamed = unnamed.into_iter().map(|(by, bins)| (by, None, bins));
+    let inputs = failures.by_input.iter().map(|signal| ("input", signal));
+    let states = failures.by_state.iter().map(|signal| ("state", signal));
+    let named = inputs.chain(states);
+    let named = named.map(|(by, signal)| (by, Some(signal.name.clone()), &signal.bins));
+    let all = unnamed.chain(named).flat_map(|(by, name, bins)| {
         bins.iter().map(move |b| {
-            (
-                by,
-                (b.record, b.from, b.to, b.count, b.mean, b.rms, b.fails),
-            )
+            let bin = (b.record, b.from, b.to, b.count, b.mean, b.rms, b.fails);
+            (by, name.clone(), bin)
         })
     });
     all.collect()

@@ -213,7 +213,7 @@ impl Fit {
     ) -> Vec<(
         String,
         (f64, f64),
-        Vec<(&'static str, crate::diagnosis::Bin)>,
+        Vec<crate::diagnosis::NamedBin>,
         Vec<String>,
     )> {
         let diagnosis = &self.page().diagnosis;

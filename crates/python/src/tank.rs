@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
-use crate::diagnosis::{Bin, bins, json};
+use crate::diagnosis::{NamedBin, bins, json};
 use crate::fit::{Covariance, check_simulation, simulation, units_of};
 use crate::frame::{Content, Frame};
 use crate::model::contents;
@@ -190,7 +190,7 @@ impl TankFit {
 
     #[getter]
     #[allow(clippy::type_complexity)]
-    fn outputs(&self) -> Vec<(String, (f64, f64), Vec<(&'static str, Bin)>, Vec<String>)> {
+    fn outputs(&self) -> Vec<(String, (f64, f64), Vec<NamedBin>, Vec<String>)> {
         let last = self.found.steps.last();
         let all = last.into_iter().flat_map(|step| &step.outputs);
         all.enumerate()

@@ -139,7 +139,12 @@ impl ModelSpec {
             Variable::Flow(o) => self.flows[o].value == Expression::Variable(variable),
             _ => false,
         };
-        if matches!(flow.value, Expression::Variable(_)) || self.outputs.iter().any(is_read) {
+        // The name of a state stays: a flow in proportion to it has no other port.
+        let is_alias = match flow.value {
+            Expression::Variable(variable) => !matches!(variable, Variable::State(_)),
+            _ => false,
+        };
+        if is_alias || self.outputs.iter().any(is_read) {
             return false;
         }
         let mut factors = Vec::new();

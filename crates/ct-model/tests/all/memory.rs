@@ -229,3 +229,41 @@ fn a_delay_of_nothing_is_there_at_once() {
     assert_eq!(run(&model(text), &[0.0], &u, false).0, [2.0, 6.0, 4.0]);
     assert_eq!(run(&model(text), &[0.5], &u, false).0, [2.0, 2.0, 6.0]);
 }
+
+#[test]
+fn a_value_stays_between_two_others() {
+    let text = "model Between
+      parameter Real w = 1;
+      input Real u;
+      output Real y = stay_between(u, u + w);
+    end Between;";
+    let u = [2.0, 2.5, 4.0, 3.0, 2.0, 1.5, 6.0];
+    let (y, _) = run(&model(text), &[1.0], &u, false);
+    assert_eq!(y, [2.0, 2.5, 4.0, 4.0, 3.0, 2.5, 6.0]);
+    // The slope is that of the side which moved the value.
+    let (y, _) = run(&model(text), &[Dual::<2>::variable(1.0, 0)], &u, false);
+    let slopes: Vec<f64> = y.iter().map(|y| y.eps[0]).collect();
+    assert_eq!(slopes, [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0]);
+    // A play is one whose two values are on both sides of its input.
+    let both = "model Both
+      parameter Real b = 0.5;
+      input Real u;
+      output Real y = play(u, b);
+      output Real z = stay_between(u - b, u + b) + 0*y;
+    end Both;";
+    let both = model(both);
+    let mut simulation = Simulation::new(&both, &[0.5], &[], 0.0);
+    let mut y = [0.0; 2];
+    let rows: Vec<[f64; 2]> = u
+        .iter()
+        .enumerate()
+        .map(|(k, u)| {
+            simulation.read(&[*u], &mut y);
+            simulation.advance(&[*u], &[*u], (k + 1) as f64).unwrap();
+            y
+        })
+        .collect();
+    // It begins at the lower value instead of the middle.
+    assert_eq!(rows[0], [2.0, 1.5]);
+    assert!(rows[2..].iter().all(|[y, z]| y == z), "{rows:?}");
+}

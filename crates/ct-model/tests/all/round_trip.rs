@@ -121,6 +121,11 @@ fn about(name: String) -> impl Strategy<Value = About> {
         Just("it's \"µ\"\n\t\\".to_string())
     ];
     (unit, text, any::<(bool, bool)>()).prop_map(move |(unit, description, (low, high))| About {
+        quantity: if low {
+            String::new()
+        } else {
+            "Level".to_string()
+        },
         name: name.clone(),
         unit: unit.to_string(),
         description,
@@ -242,7 +247,6 @@ fn model() -> impl Strategy<Value = ModelSpec> {
                     ModelSpec {
                         name: "Random".to_string(),
                         description: String::new(),
-                        quantity: String::new(),
                         parameters,
                         inputs,
                         states,

@@ -259,7 +259,7 @@ impl Diagnose {
         let text = input::notes(&records.summaries, look)
             + &model.loop_said(look)
             + &not_kept(model, &diagnosis.record_numbers, look)
-            + &own_model::diagnosis_said(model, &diagnosis, look);
+            + &own_model::diagnosis_said(model, &records, &diagnosis, look);
         let page = outputs.iter().any(|output| output.kind() == Kind::Report);
         let page = page.then(|| report::diagnosed(model, &records, &diagnosis));
         let unknown = diagnosis.unknown.as_ref().map(own_model::unknown_file);

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use effect_search::{Estimate, NoiseFloor, Options, Step, held_out};
+use ct_signals::{ArModel, Clock};
+use effect_search::{Estimate, NoiseFloor, Options, Step, held_out, output_steps};
 use greybox::{FitOptions, TimeLimit, not_determined, weighted_rms};
 use missing_effect::Effort;
 use serde::Serialize;
@@ -53,6 +54,9 @@ pub struct Comparison {
     pub effort: Effort,
     /// Computing time \[s\].
     pub seconds: f64,
+    /// Format of times.
+    #[serde(skip)]
+    pub clock: Clock,
     /// Measured values and model output, for each output of each record.
     #[serde(skip)]
     pub curves: Vec<Curves>,
@@ -172,6 +176,10 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
         starts: fit.starts,
         starts_agree: fit.agree,
         not_determined: not_determined(&setup, fit),
+        outputs: {
+            let white: Vec<ArModel> = noise.iter().map(|sigma| ArModel::white(*sigma)).collect();
+            output_steps(&setup, fit, &simulated, &white, test.as_ref())
+        },
         simulated: simulated
             .iter()
             .cloned()
@@ -193,10 +201,11 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
             model,
         });
     Ok(Comparison {
-        schema: 3,
+        schema: 4,
         model: spec.name.clone(),
         effects: file.effects.on.clone(),
         record_numbers: file.record_numbers.clone(),
+        clock: Clock::of(&records.records),
         curves: curves.collect(),
         steps: [step],
         noise: noise_floors,

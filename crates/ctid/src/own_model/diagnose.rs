@@ -1,10 +1,11 @@
 //! Diagnosis of a user's own model.
 
+use ct_signals::Clock;
 use effect_search::{Diagnosis, NotNoise, Options, Step, Thresholds, Verdict};
 
 use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
-use super::text::undetermined;
+use super::text::{failures, undetermined};
 use super::unknown;
 use super::words::{EffectWords, shown_unit};
 use crate::Error;
@@ -30,14 +31,42 @@ pub fn diagnose(
 }
 
 /// Text output of a diagnosis.
-pub(crate) fn said(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
+pub(crate) fn said(
+    file: &OwnModelFile,
+    records: &Records,
+    diagnosis: &Diagnosis,
+    look: Look,
+) -> String {
     let words = EffectWords::of(&file.base, &file.candidates);
     let mut text = format!("{}\n\n", look.heading(&diagnosis.model));
+    let fails = |name: &str, step: &Step| {
+        let clock = Clock::of(&records.records);
+        let mut fitted: Vec<&str> = records.records.iter().map(|r| r.name.as_str()).collect();
+        fitted.dedup();
+        let units = file
+            .base
+            .outputs
+            .iter()
+            .map(|output| file.base.about(output.variable));
+        let unit_of = |output: &str| {
+            let mut units = units.clone();
+            let own = units.find(|about| about.name == *output);
+            own.map_or("", |about| about.unit.as_str())
+        };
+        failures(name, step, (&clock, &fitted), unit_of, look)
+    };
+    if let Some(first) = diagnosis.steps.first() {
+        text += &fails(&diagnosis.model, first);
+    }
     text += &singles(diagnosis, look);
     text += &errors(diagnosis, look);
     if let Some(last) = diagnosis.steps.last() {
         text += &estimates(last, look);
         text += &undetermined(&last.not_determined, look);
+        if diagnosis.verdict == Verdict::Partial && last.added.is_some() {
+            text.push('\n');
+            text += &fails("the model with these effects", last);
+        }
     }
     text += &format!("\n{}\n", look.heading(&heading(diagnosis)));
     for sentence in sentences(diagnosis, &words) {

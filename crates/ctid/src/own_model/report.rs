@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{ArModel, Channel, Clock, Record, residual_tests};
+use ct_signals::{Clock, Record};
 use effect_search::{Estimate, NoiseFloor, Step, Unknown};
 use missing_effect::{
-    Diagnosis, Effort, NoiseSource, OutputStep, Parameter, PerOutput, Rankings, ResidualTests,
-    Score, Series, Shown, ShownInput, Verdict, locate,
+    Diagnosis, Effort, NoiseSource, Parameter, PerOutput, Rankings, Score, Shown, ShownInput,
+    Verdict,
 };
 use serde::Serialize;
 
@@ -235,7 +235,7 @@ fn document(
     let floors: Vec<f64> = noise.iter().map(|noise| noise.level).collect();
     let steps: Vec<missing_effect::Step> = steps
         .iter()
-        .map(|step| of_step(step, fitted, &outputs, &noise))
+        .map(|step| of_step(step, &outputs))
         .map(|mut step| {
             if let Some(test) = &step.rmse_test_per_output {
                 let errors = test.0.iter().cloned().collect();
@@ -246,7 +246,7 @@ fn document(
         .collect();
     let unit = units.first().cloned().unwrap_or_default();
     Diagnosis {
-        schema: 3,
+        schema: 4,
         verdict: Verdict::Adequate,
         clock: Clock::of(fitted),
         gaps: None,
@@ -285,55 +285,13 @@ fn document(
     }
 }
 
-fn of_step(
-    step: &Step,
-    fitted: &[Record],
-    outputs: &[String],
-    noise: &[missing_effect::NoiseFloor],
-) -> missing_effect::Step {
-    let count = outputs.len();
+fn of_step(step: &Step, outputs: &[String]) -> missing_effect::Step {
     let named = |errors: &BTreeMap<String, f64>| {
         let values = outputs.iter().map(|name| {
             let value = errors.get(name).copied().unwrap_or(f64::NAN);
             (name.clone(), value)
         });
         PerOutput(values.collect())
-    };
-    let residuals: Vec<Vec<f64>> = fitted
-        .iter()
-        .flat_map(|record| &record.outputs)
-        .zip(&step.simulated)
-        .map(|(y, model)| y.values.iter().zip(model).map(|(y, m)| y - m).collect())
-        .collect();
-    let of_output = |o: usize| {
-        let series = fitted.iter().enumerate().map(|(r, record)| Series {
-            time: &record.time,
-            input: record.inputs.first().map_or(&[][..], |input| &input.values),
-            model: &step.simulated[r * count + o],
-            residual: &residuals[r * count + o],
-        });
-        let series: Vec<Series> = series.collect();
-        let noise = noise.get(o).map_or_else(
-            || ArModel::white(f64::INFINITY),
-            |floor| {
-                ArModel::from_coefficients(&floor.coefficients, floor.innovation)
-                    .unwrap_or_else(|_| ArModel::white(floor.level))
-            },
-        );
-        let failures = locate(&series, &noise);
-        let test = step.rmse_test_per_output.as_ref();
-        OutputStep {
-            name: outputs[o].clone(),
-            rmse: step
-                .rmse_per_output
-                .get(&outputs[o])
-                .copied()
-                .unwrap_or(f64::NAN),
-            rmse_test: test.and_then(|test| test.get(&outputs[o])).copied(),
-            held_out_error: None,
-            tests: tests(&fitted[0], &residuals[o]),
-            failures,
-        }
     };
     let test = step.rmse_test_per_output.as_ref();
     missing_effect::Step {
@@ -355,35 +313,8 @@ fn of_step(
         parameters: step.parameters.iter().map(parameter).collect(),
         starts: step.starts,
         starts_agree: step.starts_agree,
-        outputs: (0..count).map(of_output).collect(),
+        outputs: step.outputs.clone(),
         simulated: step.simulated.clone(),
-    }
-}
-
-/// Tests of a residual, on the first record: whiteness, and the input with the smallest p-value, corrected for the number of inputs.
-fn tests(record: &Record, residual: &[f64]) -> ResidualTests {
-    let samples = residual.iter().filter(|e| !e.is_nan()).count();
-    let lags = (samples / 10).clamp(2, 60);
-    let portmanteau = (samples / 10).clamp(2, 25);
-    let moves = |input: &&Channel| {
-        let (low, high) = input.range();
-        high > low
-    };
-    let inputs: Vec<&Channel> = record.inputs.iter().filter(moves).collect();
-    let count = inputs.len() as f64;
-    let trace = inputs.iter().filter_map(|input| {
-        residual_tests::prewhitened_input_test(&input.values, residual, lags).ok()
-    });
-    let clearest = trace.min_by(|a, b| a.1.total_cmp(&b.1));
-    let (cross, p) = clearest.unwrap_or((vec![f64::NAN; lags + 1], f64::NAN));
-    let bound = 1.96 * (record.len() as f64).sqrt() / samples.max(1) as f64;
-    ResidualTests {
-        autocorrelation: residual_tests::autocorrelation(residual, lags),
-        cross_correlation: cross,
-        autocorrelation_bound: bound,
-        cross_correlation_bound: bound,
-        whiteness_p: residual_tests::ljung_box(residual, portmanteau, 0).unwrap_or(f64::NAN),
-        input_p: if p.is_nan() { p } else { (count * p).min(1.0) },
     }
 }
 

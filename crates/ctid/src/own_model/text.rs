@@ -1,11 +1,16 @@
 //! Text output of a comparison.
 
+use ct_signals::Clock;
+use effect_search::Step;
+
 use super::compare::{Comparison, Curves};
 use super::diagnose::state_rows;
 use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
+use crate::sentences::FailureWords;
+use crate::terminal::{FAILURES, residual_tests};
 
 /// The complete comparison, with a plot of the first record.
 pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
@@ -20,17 +25,21 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     {
         text += &drawn(curves, look);
     }
+    let fitted: Vec<&str> = first_names(comparison);
+    text += &failures(
+        &comparison.model,
+        step,
+        (&comparison.clock, &fitted),
+        |name| comparison.unit_of(name),
+        look,
+    );
     let held_out = step.rmse_test_per_output.as_ref();
     let mut rows = vec![vec![String::new(), "fitted data".to_string()]];
     if held_out.is_some() {
         rows[0].push("held-out data".to_string());
     }
     for (name, rmse) in &step.rmse_per_output {
-        let unit = comparison
-            .curves
-            .iter()
-            .find(|c| c.output == *name)
-            .map_or("", |c| c.unit.as_str());
+        let unit = comparison.unit_of(name);
         let number = |value: f64| format!("{} {unit}", numbers::significant(value, 3));
         let mut row = vec![name.clone(), number(*rmse)];
         row.extend(
@@ -79,6 +88,59 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     );
     text += &format!("  {}\n", look.faint(agree));
     text += &undetermined(&step.not_determined, look);
+    text
+}
+
+impl Comparison {
+    /// Unit of an output.
+    fn unit_of(&self, output: &str) -> &str {
+        let own = self.curves.iter().find(|curves| curves.output == output);
+        own.map_or("", |curves| curves.unit.as_str())
+    }
+}
+
+/// Names of the fitted records, in order.
+fn first_names(comparison: &Comparison) -> Vec<&str> {
+    let mut names: Vec<&str> = comparison
+        .curves
+        .iter()
+        .map(|curves| curves.record.as_str())
+        .collect();
+    names.dedup();
+    names
+}
+
+/// Where a model fails, output by output, and the tests of its residual.
+pub(super) fn failures<'a>(
+    model: &str,
+    step: &'a Step,
+    (clock, fitted): (&'a Clock, &[&'a str]),
+    unit_of: impl Fn(&'a str) -> &'a str,
+    look: Look,
+) -> String {
+    let mut text = String::new();
+    for output in &step.outputs {
+        let of_output = if step.outputs.len() > 1 {
+            format!(": {}", output.name)
+        } else {
+            String::new()
+        };
+        let title = format!("Where {model} fails{of_output}");
+        text += &format!("{}\n", look.heading(&title));
+        let words = FailureWords {
+            clock,
+            fitted: fitted.to_vec(),
+            output: &output.name,
+            outputs: &output.name,
+            unit: unit_of(&output.name),
+            input: None,
+        };
+        for sentence in words.sentences(output).iter().take(FAILURES) {
+            text += &look.paragraph("  - ", sentence);
+        }
+        text += &look.paragraph("  - ", &residual_tests(&output.tests));
+        text.push('\n');
+    }
     text
 }
 

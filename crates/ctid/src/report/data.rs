@@ -1,7 +1,8 @@
 //! Data for the report's script, as JSON: the curves thinned for display, the other data unchanged.
 
 use ct_signals::Clock;
-use missing_effect::{Diagnosis, Failures, OutputStep, ResidualTests, Score, Shown, Step, Unknown};
+use effect_search::{Failures, OutputStep, ResidualTests};
+use missing_effect::{Diagnosis, Score, Shown, Step, Unknown};
 use serde::Serialize;
 
 use super::decimate::min_max;

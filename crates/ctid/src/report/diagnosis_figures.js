@@ -15,7 +15,6 @@ const diagnosisFigures = (report, view) => {
 
   const unitOf = (o) => pretty(outputs[o]?.unit ?? report.output_unit);
   const OUT = () => unitOf(view.output);
-  const IN = pretty(report.input_unit);
   const sized = (value, unit) => `${value === null || value === undefined ? "–" : Number(value.toPrecision(2))} ${unit}`.trim();
 
   const outputName = (o) => plain(outputs[o]?.name ?? "");
@@ -75,7 +74,7 @@ const diagnosisFigures = (report, view) => {
   const binHover = (bins, name) => bins.map((b, k) =>
     `${name(b, k)}<br>${b.count} values, rms ${sized(b.rms, OUT())}, mean ${sized(b.mean, OUT())}${b.fails ? "<br>fails" : ""}`);
 
-  const tallest = (kind) => 1.08 * largest([level(), ...seen().flatMap((s) => s.failures[kind].map((b) => b.rms))]) || 1;
+  const tallest = (of) => 1.08 * largest([level(), ...seen().flatMap((s) => of(s.failures).map((b) => b.rms))]) || 1;
 
   // --- the figures -------------------------------------------------------------------------
 
@@ -153,12 +152,13 @@ const diagnosisFigures = (report, view) => {
   }
 
   // Every sample and the bin means above, the rms of the bins below.
-  function binned(kind, at, title) {
-    const bins = chosen().failures[kind].filter((b) => b.count > 0);
+  // Of a signal without samples in the page, the means and the bars. `of`: the bins of a model's failures.
+  function binned(of, at, title) {
+    const bins = of(chosen().failures).filter((b) => b.count > 0);
     if (!bins.length) return null;
-    const cloud = chosen().cloud;
+    const cloud = at && chosen().cloud;
     const centre = bins.map((b) => (b.from + b.to) / 2);
-    const most = 1.05 * largest(seen().flatMap((s) => (s.cloud ? s.cloud.residual : s.failures[kind].map((b) => b.mean)))) || 1;
+    const most = 1.05 * largest(seen().flatMap((s) => (at && s.cloud ? s.cloud.residual : of(s.failures).map((b) => b.mean)))) || 1;
     const data = [];
     if (cloud) {
       data.push({
@@ -177,7 +177,7 @@ const diagnosisFigures = (report, view) => {
       uirevision: zoomOfOutput(), hovermode: "closest", shapes: floorLine("y2"),
       xaxis: axis(title, { anchor: "y2" }),
       yaxis: axis(named(ofOutput("residual"), OUT()), { domain: [0.42, 1], range: [-most, most] }),
-      yaxis2: axis(named("rms", OUT()), { domain: [0, 0.34], range: [0, tallest(kind)], nticks: 4 }),
+      yaxis2: axis(named("rms", OUT()), { domain: [0, 0.34], range: [0, tallest(of)], nticks: 4 }),
     }) };
   }
 
@@ -198,7 +198,7 @@ const diagnosisFigures = (report, view) => {
     }
     return { data, layout: layout(300, {
       hovermode: "closest", shapes: floorLine("y"), xaxis: axis(title, { type: "category" }),
-      yaxis: axis(named(ofOutput("residual"), OUT()), { range: [low, tallest(kind)] }),
+      yaxis: axis(named(ofOutput("residual"), OUT()), { range: [low, tallest((failures) => failures[kind])] }),
     }) };
   }
 
@@ -314,8 +314,7 @@ const diagnosisFigures = (report, view) => {
     "unknown-path": unknownPath,
     "unknown-shape": unknownShape,
     "by-time": byTime,
-    "by-level": () => binned("by_level", "level", named(several ? `simulated ${outputName(view.output)}` : "simulated output", OUT())),
-    "by-flow": () => binned("by_flow", "flow", named(plain(records[0]?.inputs[0]?.name ?? "input"), IN)),
+    "by-output": () => binned((failures) => failures.by_output, "level", named(several ? `simulated ${outputName(view.output)}` : "simulated output", OUT())),
     "by-direction": () => bars("by_direction", directionName, true, ""),
     "by-frequency": () => bars("by_frequency", bandName, false, ""),
     autocorrelation: () => correlation("autocorrelation", "autocorrelation_bound", 1),
@@ -323,6 +322,17 @@ const diagnosisFigures = (report, view) => {
     scores,
     trail,
   };
+  // Every input, and every state that is not an output. The samples of the first input are in the page.
+  for (const kind of ["input", "state"]) {
+    const most = Math.max(0, ...steps.flatMap((s) => s.outputs.map((o) => o.failures[`by_${kind}`].length)));
+    for (let k = 0; k < most; k += 1) {
+      const of = (failures) => failures[`by_${kind}`][k]?.bins ?? [];
+      figures[`by-${kind}-${k}`] = () => {
+        const signal = chosen().failures[`by_${kind}`][k];
+        return signal ? binned(of, kind === "input" && k === 0 ? "flow" : null, named(plain(signal.name), pretty(signal.unit))) : null;
+      };
+    }
+  }
   records.forEach((_, r) => { figures[`record-${r}`] = () => recordFigure(r); });
 
   return { figures, stepColour, sized, several, ofOutput };

@@ -22,7 +22,8 @@ mod tables;
 mod text;
 mod udink;
 
-use missing_effect::{Diagnosis, OutputStep, Step, Verdict};
+use effect_search::OutputStep;
+use missing_effect::{Diagnosis, Step, Verdict};
 
 pub use self::baysse::html as baysse;
 pub(crate) use self::data::{json as drawing, records as drawing_of_records, rounded};

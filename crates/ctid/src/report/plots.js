@@ -63,7 +63,7 @@ const plots = (() => {
   }, more);
 
   // Where the tools stand above, only the plots worth a zoom have them.
-  const ZOOMED = /^(record-\d+|own-\d+|by-time|by-level|by-flow|unknown-path)$/;
+  const ZOOMED = /^(record-\d+|own-\d+|by-time|by-output|by-input-\d+|by-state-\d+|unknown-path)$/;
   function tooled(id, { data, layout }) {
     if (!tight() || !ZOOMED.test(id)) return [data, layout, config()];
     toolsAbove(layout);

@@ -1,6 +1,8 @@
 //! Residual: where the model fails, the unexplained error, and the residual tests.
 
-use missing_effect::{Diagnosis, Failures, ResidualTests, Shown};
+use effect_search::failures::SignalBins;
+use effect_search::{Failures, ResidualTests};
+use missing_effect::{Diagnosis, Shown};
 
 use super::page::{figure, figure_with, items, section};
 use super::text::escape;
@@ -23,11 +25,20 @@ pub(super) fn failures(diagnosis: &Diagnosis) -> String {
         figures.push_str(&figure("by-time", "Residual against time", ""));
     }
     let mut pairs = String::new();
-    if any(|failures| failures.by_level.len()) {
-        pairs.push_str(&figure("by-level", "Against the model's output", BINNED));
+    if any(|failures| failures.by_output.len()) {
+        pairs.push_str(&figure("by-output", "Against the model's output", BINNED));
     }
-    if any(|failures| failures.by_flow.len()) {
-        pairs.push_str(&figure("by-flow", "Against the input", BINNED));
+    for (k, signal) in signals(diagnosis, |failures| &failures.by_input) {
+        let title = match signal {
+            None => "Against the input".to_string(),
+            Some(name) => format!("Against the input {name}"),
+        };
+        pairs.push_str(&figure(&format!("by-input-{k}"), &escape(&title), BINNED));
+    }
+    for (k, signal) in signals(diagnosis, |failures| &failures.by_state) {
+        let title = format!("Against the state {}", signal.unwrap_or_default());
+        let note = "Root mean square and mean of each bin.";
+        pairs.push_str(&figure(&format!("by-state-{k}"), &escape(&title), note));
     }
     if any(|failures| failures.by_direction.len()) {
         pairs.push_str(&figure(
@@ -56,6 +67,27 @@ pub(super) fn failures(diagnosis: &Diagnosis) -> String {
             "<ul id=\"failure-sentences\">{sentences}</ul>\n{choices}{figures}<div class=\"pairs\">{pairs}</div>\n"
         ),
     )
+}
+
+/// Positions and names of the signals with bins; a single input has no name.
+fn signals(
+    diagnosis: &Diagnosis,
+    of: fn(&Failures) -> &Vec<SignalBins>,
+) -> Vec<(usize, Option<&str>)> {
+    let outputs = diagnosis.steps.iter().flat_map(|step| &step.outputs);
+    let most = outputs
+        .map(|output| of(&output.failures))
+        .max_by_key(|signals| signals.len());
+    let all = most.map_or(&[][..], |signals| signals.as_slice());
+    let is_input = all.len() == 1
+        && diagnosis
+            .records
+            .first()
+            .is_some_and(|r| r.inputs.len() == 1);
+    let named = all
+        .iter()
+        .map(|signal| (!is_input).then_some(signal.name.as_str()));
+    named.enumerate().collect()
 }
 
 /// The unexplained error, if it is a function of a variable.

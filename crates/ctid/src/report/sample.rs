@@ -4,9 +4,11 @@
 mod signals;
 mod variants;
 
+use effect_search::failures::SignalBins;
+use effect_search::{Bin, Failure, FailureKind, Failures, OutputStep, ResidualTests};
 use missing_effect::{
-    Bin, Diagnosis, Effort, Failure, FailureKind, Failures, NoiseFloor, NoiseSource, OutputStep,
-    Parameter, PerOutput, Rankings, ResidualTests, Score, Shown, ShownInput, Step, Verdict,
+    Diagnosis, Effort, NoiseFloor, NoiseSource, Parameter, PerOutput, Rankings, Score, Shown,
+    ShownInput, Step, Verdict,
 };
 
 use self::signals::{NOISE, PERIOD, input, noise, simulate};
@@ -86,6 +88,8 @@ fn failures(record: &Shown, simulated: &[f64], residual: &[f64]) -> Failures {
     let worst = worst
         .map(|bin| Failure {
             by: FailureKind::Time,
+            signal: String::new(),
+            unit: String::new(),
             bin: bin.clone(),
             error_share: 0.3,
             sample_share: 1.0 / 24.0,
@@ -93,12 +97,17 @@ fn failures(record: &Shown, simulated: &[f64], residual: &[f64]) -> Failures {
         .collect();
     Failures {
         by_time,
-        by_level: bins(simulated, residual, &even_edges(simulated, 10)),
-        by_flow: bins(
-            &record.inputs[0].values,
-            residual,
-            &even_edges(&record.inputs[0].values, 10),
-        ),
+        by_output: bins(simulated, residual, &even_edges(simulated, 10)),
+        by_input: record
+            .inputs
+            .iter()
+            .map(|input| SignalBins {
+                name: input.name.clone(),
+                unit: input.unit.clone(),
+                bins: bins(&input.values, residual, &even_edges(&input.values, 10)),
+            })
+            .collect(),
+        by_state: Vec::new(),
         by_direction: bins(&rate, residual, &[-1.0, -0.003, 0.003, 1.0]),
         by_frequency,
         worst,
@@ -274,7 +283,7 @@ fn diagnosis(outputs: &[&str]) -> Diagnosis {
     Diagnosis {
         gaps: None,
         clock: ct_signals::Clock::of([]),
-        schema: 3,
+        schema: 4,
         verdict: Verdict::Undecided,
         effects: vec!["overflow".into(), "pump_deadzone".into()],
         groups: vec![

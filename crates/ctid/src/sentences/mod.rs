@@ -27,7 +27,7 @@ use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
 pub use self::alarm::{Told, of_alarm, of_scatter};
 use self::control_loop::of_the_loop;
 pub use self::design::of_design;
-pub use self::failures::of_failures;
+pub use self::failures::{FailureWords, of_failures};
 pub use self::gaps::of_gaps;
 pub use self::identification::{of_identification, of_side_by_side, of_violation};
 pub use self::noise::of_noise_source;

@@ -4,7 +4,8 @@ mod curves;
 mod errors;
 mod ranking;
 
-use missing_effect::{Diagnosis, OutputStep, ResidualTests, Shown, Step, Verdict};
+use effect_search::{OutputStep, ResidualTests};
+use missing_effect::{Diagnosis, Shown, Step, Verdict};
 
 pub(crate) use self::curves::{overlay, residuals};
 pub(crate) use self::errors::trail;
@@ -16,7 +17,7 @@ use crate::plot;
 use crate::sentences::{self, with_unit};
 
 /// Number of findings about where a model fails.
-const FAILURES: usize = 5;
+pub(crate) const FAILURES: usize = 5;
 const BAR: usize = 20;
 
 /// What `ctid compare` prints.
@@ -196,7 +197,7 @@ fn failures_of(
 }
 
 /// Sentences about the residual tests.
-fn residual_tests(tests: &ResidualTests) -> String {
+pub(crate) fn residual_tests(tests: &ResidualTests) -> String {
     let p = |p: f64| {
         if p < 0.001 {
             "p < 0.001".to_string()

@@ -88,7 +88,7 @@ fn compare_shows_the_error_and_writes_both_files() {
     }
     let json: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(place.path("out.json")).unwrap()).unwrap();
-    assert_eq!(json["schema"], 3);
+    assert_eq!(json["schema"], 4);
     assert_eq!(json["steps"].as_array().unwrap().len(), 1);
     assert!(json["steps"][0]["rmse_test"].is_f64());
     assert!(

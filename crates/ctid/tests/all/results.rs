@@ -39,7 +39,7 @@ fn parameters(step: &Value) -> Vec<(String, f64)> {
 
 /// The keys, types and rules that `docs/results.md` specifies for the JSON of `diagnose`.
 fn fulfils_the_contract(json: &Value, held_out: bool) {
-    assert_eq!(json["schema"], 3);
+    assert_eq!(json["schema"], 4);
     let verdict = json["verdict"].as_str().unwrap();
     let effects = texts(&json["effects"]);
     let groups: Vec<Vec<&str>> = json["groups"]

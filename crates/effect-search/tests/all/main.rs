@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod design;
+mod failures;
 mod hidden;
 mod quantisation;
 mod records;

@@ -1,6 +1,6 @@
 //! Simulates the records: rows of residuals and their derivatives.
 
-use ct_model::{Dual, Simulation, SimulationNumber};
+use ct_model::{Dual, Model, Output, Simulation, SimulationNumber, Variable};
 use ct_signals::Hold;
 use estimation::{Prior, Residuals, Sample};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,6 +30,33 @@ impl<'a> ModelSetup<'a> {
             }
             Some(())
         })?;
+        Some(all)
+    }
+
+    /// The states that the model gives, a series for each record and state; `None` where the simulation cannot go on.
+    #[must_use]
+    pub fn simulate_states(&self, x: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let mut spec = self.model.spec().clone();
+        let states = spec.states.len();
+        let read = (0..states).map(|x| Output {
+            variable: Variable::State(x),
+        });
+        spec.outputs = read.collect();
+        let model = Model::new(spec);
+        let shown = ModelSetup {
+            model: &model,
+            samples: vec![0; states],
+            ..self.clone()
+        };
+        let mut all = vec![Vec::new(); self.records.len() * states];
+        if states > 0 {
+            shown.each_instant::<f64>(x, &[], |r, _, values| {
+                for (i, value) in values.iter().enumerate() {
+                    all[r * states + i].push(*value);
+                }
+                Some(())
+            })?;
+        }
         Some(all)
     }
 

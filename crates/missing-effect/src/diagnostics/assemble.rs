@@ -32,7 +32,7 @@ pub(crate) fn assemble(
     let noise = noise.0;
     let outputs = &problem.records[0].outputs;
     Diagnosis {
-        schema: 3,
+        schema: 4,
         verdict,
         effects: Vec::new(),
         groups: Vec::new(),

@@ -3,7 +3,9 @@
 use ct_signals::{Channel, Record};
 use greybox::{Stopping, fit_initial_levels};
 
-use crate::{Error, HeldOutError, PerOutput, Step, fit::node::Node};
+use effect_search::HeldOutError;
+
+use crate::{Error, PerOutput, Step, fit::node::Node};
 
 /// Samples of a held-out record for the fit of its initial levels, which are not scored.
 const HEAD: usize = 5;
@@ -59,28 +61,18 @@ pub(crate) fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, 
     let series = node.setup.with_records(test)?.simulate(&x)?.output;
     let outputs = node.setup.outputs();
     let of_output = |o: usize| {
-        let mut parts = [0.0; 4];
-        let mut count = 0;
-        for (record, models) in test.iter().zip(series.chunks_exact(outputs)) {
+        let scored = test.iter().zip(series.chunks_exact(outputs));
+        let scored = scored.map(|(record, models)| {
             let measured = record.outputs[o].values.iter().copied();
-            let pairs: Vec<(f64, f64)> = measured
-                .zip(models[o].iter().copied())
-                .skip(head(&record.outputs[o]))
-                .filter(|(measured, _)| !measured.is_nan())
-                .collect();
-            for (sum, part) in parts.iter_mut().zip(error_parts(&pairs)) {
-                *sum += part;
-            }
-            count += pairs.len();
-        }
-        // NaN for an output without scored samples.
-        let [rmse, offset, gain, shape] = parts.map(|sum| (sum / count as f64).sqrt());
-        let error = HeldOutError {
-            offset,
-            gain,
-            shape,
-        };
-        (count, rmse, error)
+            let pairs = measured.zip(models[o].iter().copied());
+            let pairs = pairs.skip(head(&record.outputs[o]));
+            pairs.filter(|(measured, _)| !measured.is_nan()).collect()
+        });
+        let scored: Vec<Vec<(f64, f64)>> = scored.collect();
+        let squares = scored.iter().flatten().map(|(y, m)| (y - m).powi(2));
+        let count = scored.iter().map(Vec::len).sum();
+        let rmse = (squares.sum::<f64>() / count as f64).sqrt();
+        (count, rmse, HeldOutError::of(&scored))
     };
     let outputs = (0..outputs).map(of_output).collect();
     Ok(Some(HeldOut { series, outputs }))
@@ -90,26 +82,6 @@ pub(crate) fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, 
 pub(crate) fn held_out_rmse(node: &Node, test: &[Record]) -> Result<Vec<f64>, Error> {
     let held_out = hold_out(node, test)?.map_or_else(Vec::new, |held_out| held_out.outputs);
     Ok(held_out.into_iter().map(|(_, rmse, _)| rmse).collect())
-}
-
-/// Sums of squares of measured minus model: the total, the part of its mean, the part of a factor on the model's deviations from their
-/// mean, and the rest.
-fn error_parts(pairs: &[(f64, f64)]) -> [f64; 4] {
-    let n = pairs.len().max(1) as f64;
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
-    let (error, model) = (mean(&|(y, m)| y - m), mean(&|(_, m)| *m));
-    let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-        pairs.iter().map(|(y, m)| of(y - m, m - model)).sum()
-    };
-    let all = sum(&|e, _| e * e);
-    let offset = n * error * error;
-    let (cross, power) = (sum(&|e, m| e * m), sum(&|_, m| m * m));
-    let gain = if power > 0.0 {
-        cross * cross / power
-    } else {
-        0.0
-    };
-    [all, offset, gain, (all - offset - gain).max(0.0)]
 }
 
 /// The share of the first model's excess error on held-out records that the last model explains.
@@ -127,22 +99,4 @@ pub(crate) fn share_on_held_out(steps: &[Step], floor: &PerOutput) -> Option<f64
     let (before, after) = (mean_square(first)?, mean_square(last)?);
     // If the error is noise, there is no share to explain.
     (before > 1.0).then(|| (before - after) / (before - after.min(1.0)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_held_out_error_is_split_into_offset_gain_and_shape() {
-        // Measured: the model's deviations from 5, times 1.5, plus 2, plus an independent oscillation.
-        let model = |k: usize| if k % 4 < 2 { 6.0 } else { 4.0 };
-        let wave = |k: usize| if k.is_multiple_of(2) { 0.3 } else { -0.3 };
-        let pairs: Vec<(f64, f64)> = (0..400)
-            .map(|k| (7.0 + 1.5 * (model(k) - 5.0) + wave(k), model(k)))
-            .collect();
-        let [all, offset, gain, shape] = error_parts(&pairs).map(|sum| (sum / 400.0).sqrt());
-        assert!((offset - 2.0).abs() < 1e-12 && (gain - 0.5).abs() < 1e-12);
-        assert!((shape - 0.3).abs() < 1e-12 && (all * all - 4.34).abs() < 1e-9);
-    }
 }

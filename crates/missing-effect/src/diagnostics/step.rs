@@ -3,14 +3,13 @@
 use ct_signals::{ArModel, Record, residual_tests};
 use greybox::{Fit, Noise, Setup, robust, weighted_rms};
 
+use effect_search::failures::{FailureKind, Series, Signal, locate};
+use effect_search::{HeldOutError, OutputStep, ResidualTests};
+
 use crate::{
-    Error, HeldOutError, OutputStep, Parameter, PerOutput, ResidualTests, Step,
+    Error, Parameter, PerOutput, Step,
     base::closed_loop::widened,
-    diagnostics::{
-        held_out::hold_out,
-        locate::{Series, locate},
-        residual_tests::input_p,
-    },
+    diagnostics::{held_out::hold_out, residual_tests::input_p},
     fit::{node::Node, noise_model::NOISE_ORDER},
 };
 
@@ -112,6 +111,15 @@ pub(crate) fn report(
     let held_out = hold_out(node, test)?;
     let count = setup.outputs();
     let first = &setup.records[0];
+    let inputs: Vec<Signal> = first
+        .inputs
+        .iter()
+        .map(|input| Signal {
+            kind: FailureKind::Input,
+            name: &input.name,
+            unit: &input.unit,
+        })
+        .collect();
     let of_output = |output: usize| {
         let own = simulated.iter().zip(&residuals).skip(output).step_by(count);
         let series: Vec<Series> = setup
@@ -120,12 +128,12 @@ pub(crate) fn report(
             .zip(own)
             .map(|(record, (model, residual))| Series {
                 time: &record.time,
-                input: &record.inputs[0].values,
+                signals: record.inputs.iter().map(|u| u.values.as_slice()).collect(),
                 model,
                 residual,
             })
             .collect();
-        let failures = locate(&series, noise_floor.output(output));
+        let failures = locate(&series, &inputs, noise_floor.output(output));
         let held_out = held_out.as_ref().map(|held_out| held_out.outputs[output]);
         Ok(OutputStep {
             name: first.outputs[output].name.clone(),

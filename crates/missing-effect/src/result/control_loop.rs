@@ -42,7 +42,7 @@ pub enum NotSimulated {
         /// The record, by its name.
         record: String,
         /// Value of the reference \[output unit\].
-        #[serde(deserialize_with = "crate::result::number")]
+        #[serde(deserialize_with = "effect_search::not_finite::number")]
         value: f64,
     },
     /// The record says that the command is interpolated, but a controller holds it.
@@ -53,7 +53,7 @@ pub enum NotSimulated {
     /// The measured command disagrees with the controller's output by `mismatch`.
     OtherController {
         /// `mismatch` over the standard deviation of the command, above 0.05; not finite for a command that hardly changes.
-        #[serde(deserialize_with = "crate::result::number")]
+        #[serde(deserialize_with = "effect_search::not_finite::number")]
         share: f64,
     },
 }

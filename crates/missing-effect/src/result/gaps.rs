@@ -13,9 +13,9 @@ pub struct MendedGaps {
     #[serde(flatten)]
     pub gaps: Gaps,
     /// The fastest time constant of the plant \[s\], by a first fit.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub time_constant: f64,
     /// The longest time for which an input would have been held \[s\].
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub limit: f64,
 }

@@ -6,7 +6,6 @@ mod noise_floor;
 mod not_noise;
 mod parameter;
 mod per_output;
-mod read;
 mod record;
 mod remark;
 mod scores;
@@ -28,14 +27,10 @@ pub use self::{
     record::{Shown, ShownInput},
     remark::Remark,
     scores::{Acceptance, PlaceScore, Rankings, Rejection, Score},
-    step::{Bin, Failure, FailureKind, Failures, HeldOutError, OutputStep, ResidualTests, Step},
+    step::Step,
     unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window},
 };
-pub(crate) use self::{
-    noise_floor::Floors,
-    read::{no_number, none, number, numbers},
-    unknown::SHAPES,
-};
+pub(crate) use self::{noise_floor::Floors, unknown::SHAPES};
 
 /// Format of times without a calendar.
 fn plain_clock() -> Clock {
@@ -86,10 +81,10 @@ pub struct Diagnosis {
     pub steps: Vec<Step>,
     /// Standard deviation of the noise, in the output's unit; NaN, and not written, of several outputs.
     #[serde(
-        skip_serializing_if = "crate::result::none",
-        default = "crate::result::no_number"
+        skip_serializing_if = "effect_search::not_finite::none",
+        default = "effect_search::not_finite::no_number"
     )]
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub noise_floor: f64,
     /// The noise floor of each output, and how it was found.
     pub noise: Vec<NoiseFloor>,
@@ -123,7 +118,7 @@ pub struct Diagnosis {
     #[serde(skip)]
     pub records: Vec<Shown>,
     /// How long it took \[s\].
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub seconds: f64,
 }
 

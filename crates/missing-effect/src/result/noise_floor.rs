@@ -26,13 +26,13 @@ pub struct NoiseFloor {
     /// Name of the output.
     pub output: String,
     /// Standard deviation of the noise, in the output's unit.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub level: f64,
     /// Standard deviation of what cannot be predicted from its own past, in the output's unit.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub innovation: f64,
     /// Autoregressive coefficients of the noise: `v[k] = sum a_i v[k-i] + e[k]`; empty for white noise.
-    #[serde(deserialize_with = "crate::result::numbers")]
+    #[serde(deserialize_with = "effect_search::not_finite::numbers")]
     pub coefficients: Vec<f64>,
     /// The model whose residual it was estimated from.
     pub source: NoiseSource,

@@ -45,10 +45,10 @@ pub enum NotNoise {
         /// The output, by its name.
         output: String,
         /// Integral of the autocorrelation of the noise over positive lags \[s\]; not finite if the noise model is not stationary.
-        #[serde(deserialize_with = "crate::result::number")]
+        #[serde(deserialize_with = "effect_search::not_finite::number")]
         correlation_time: f64,
         /// The slowest time constant of the process \[s\].
-        #[serde(deserialize_with = "crate::result::number")]
+        #[serde(deserialize_with = "effect_search::not_finite::number")]
         time_constant: f64,
     },
 }

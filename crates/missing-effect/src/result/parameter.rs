@@ -9,7 +9,7 @@ pub struct Parameter {
     /// Name of the parameter, `alpha` or `overflow.rim`; initial states are `level(0)` and the like.
     pub name: String,
     /// The estimate, in `unit`.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub value: f64,
     /// Standard error, in `unit`; `None` if the data do not determine the value or it is at a bound.
     pub std_error: Option<f64>,

@@ -11,7 +11,7 @@ pub struct Shown {
     /// Whether the record was held out: not used for fits or selection.
     pub held_out: bool,
     /// Sampling instants \[s\].
-    #[serde(deserialize_with = "crate::result::numbers")]
+    #[serde(deserialize_with = "effect_search::not_finite::numbers")]
     pub time: Vec<f64>,
     /// The inputs that the model runs on; of a plant the command first.
     pub inputs: Vec<ShownInput>,
@@ -27,7 +27,7 @@ pub struct ShownInput {
     /// Unit of the signal; empty if unknown.
     pub unit: String,
     /// Samples of the signal \[unit\].
-    #[serde(deserialize_with = "crate::result::numbers")]
+    #[serde(deserialize_with = "effect_search::not_finite::numbers")]
     pub values: Vec<f64>,
 }
 

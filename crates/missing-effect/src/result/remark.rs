@@ -13,10 +13,10 @@ pub enum Remark {
         /// The output, by its name.
         output: String,
         /// The quantisation step of the readings \[output unit\].
-        #[serde(deserialize_with = "crate::result::number")]
+        #[serde(deserialize_with = "effect_search::not_finite::number")]
         step: f64,
         /// Variance of quantisation alone over the mean squared error of the model without it, 0 to 1.1: above 1 the error is smaller.
-        #[serde(deserialize_with = "crate::result::number")]
+        #[serde(deserialize_with = "effect_search::not_finite::number")]
         share: f64,
     },
     /// Effects that would explain more were not accepted: a function of time would explain as much, and the residual is not noise.
@@ -46,7 +46,7 @@ pub enum Remark {
     /// The noise is coloured, which reduces the detectability of effects clearly.
     ColouredNoise {
         /// Minimum detectable size of an effect over that in white noise of the same variance, 1.2 or more.
-        #[serde(deserialize_with = "crate::result::number")]
+        #[serde(deserialize_with = "effect_search::not_finite::number")]
         ratio: f64,
     },
 }

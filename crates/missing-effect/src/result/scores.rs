@@ -12,20 +12,20 @@ pub struct Score {
     /// The vessel or pump it acts in, where the plant has more than one.
     pub place: Option<String>,
     /// Fall of the Bayesian information criterion when it is added and everything is refitted; larger is better.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub bic_gain: f64,
     /// Simulation error after the refit, in the output's unit; NaN, and not written, of several outputs.
     #[serde(
-        skip_serializing_if = "crate::result::none",
-        default = "crate::result::no_number"
+        skip_serializing_if = "effect_search::not_finite::none",
+        default = "effect_search::not_finite::no_number"
     )]
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub rmse: f64,
     /// Error of all outputs together, each divided by the noise floor of its output.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub weighted_rmse: f64,
     /// `|p|/|j|`: the share of the effect's signature that the fitted parameters cannot compensate for.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub visibility: f64,
     /// The size that was found: the effect's leading parameter.
     pub size: Option<Parameter>,
@@ -48,17 +48,17 @@ pub struct Acceptance {
     /// Share on the held-out records; it does not affect the verdict.
     pub share_test: Option<f64>,
     /// Least `share` of a set whose residual is more than noise.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub required: f64,
     /// Least `share` of a partial explanation.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub required_partial: f64,
     /// Standard deviation of the noise that is not excess error, by output \[output unit\].
     pub floor: PerOutput,
     /// Fall of the criterion (BIC), each model with the noise model of its own residual.
     pub bic_fall: Option<f64>,
     /// Least fall for acceptance.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub required_bic_fall: f64,
     /// Conditions that the effects do not meet; empty if they are accepted.
     pub rejections: Vec<Rejection>,
@@ -101,7 +101,7 @@ pub struct PlaceScore {
     /// The vessel or pump.
     pub place: String,
     /// Likelihood relative to the best place, 0 to 1, everything else refitted.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub relative_likelihood: f64,
 }
 

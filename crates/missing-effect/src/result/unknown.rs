@@ -24,7 +24,7 @@ pub struct PlaceLikelihood {
     /// `actuator`, `vessel` (`upper` or `lower` of two) or `sensor` (`sensor upper` of several).
     pub place: String,
     /// Restricted log-likelihood below that of the best place.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub below_best: f64,
 }
 
@@ -37,10 +37,10 @@ pub struct Share {
     #[serde(deserialize_with = "variable_name")]
     pub variable: Name,
     /// Share of the fall of the squared error that is reached on parts of the data that were not fitted; 1 means all of it.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub share: f64,
     /// Standard error of the share, from its variation between the parts.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub std_error: f64,
 }
 
@@ -64,13 +64,13 @@ fn variable_name<'de, D: serde::Deserializer<'de>>(from: D) -> Result<&'static s
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Window {
     /// Begin in the record's time \[s\].
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub from: f64,
     /// End \[s\].
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub to: f64,
     /// Mean of the missing term in it, in the term's unit.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub mean: f64,
 }
 
@@ -84,24 +84,24 @@ pub struct Unknown {
     /// Every place, the most likely first.
     pub places: Vec<PlaceLikelihood>,
     /// The first record's time, by its own clock \[s\].
-    #[serde(deserialize_with = "crate::result::numbers")]
+    #[serde(deserialize_with = "effect_search::not_finite::numbers")]
     pub time: Vec<f64>,
     /// The missing term in addition to the fitted model.
-    #[serde(deserialize_with = "crate::result::numbers")]
+    #[serde(deserialize_with = "effect_search::not_finite::numbers")]
     pub value: Vec<f64>,
     /// Standard errors.
-    #[serde(deserialize_with = "crate::result::numbers")]
+    #[serde(deserialize_with = "effect_search::not_finite::numbers")]
     pub std_error: Vec<f64>,
     /// The random walk's standard deviation after one second, in the term's unit.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub intensity: f64,
     /// Standard deviation of the measurement noise, in the output's unit; with several outputs relative to the weighted mean.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub noise: f64,
     /// Windows in which the term differs clearly from zero, the strongest first.
     pub windows: Vec<Window>,
     /// Root mean square of the residual after subtraction of the term, in the output's unit.
-    #[serde(deserialize_with = "crate::result::number")]
+    #[serde(deserialize_with = "effect_search::not_finite::number")]
     pub rmse: f64,
     /// Every variable, the best first.
     pub shares: Vec<Share>,
@@ -111,13 +111,13 @@ pub struct Unknown {
     /// Unit of the variable.
     pub variable_unit: String,
     /// Knots of the shape, in the variable's unit; time since the record began.
-    #[serde(deserialize_with = "crate::result::numbers")]
+    #[serde(deserialize_with = "effect_search::not_finite::numbers")]
     pub knots: Vec<f64>,
     /// The function at the knots, without the part that the plant's own parameters explain.
-    #[serde(deserialize_with = "crate::result::numbers")]
+    #[serde(deserialize_with = "effect_search::not_finite::numbers")]
     pub ordinates: Vec<f64>,
     /// Standard errors of the ordinates.
-    #[serde(deserialize_with = "crate::result::numbers")]
+    #[serde(deserialize_with = "effect_search::not_finite::numbers")]
     pub ordinate_errors: Vec<f64>,
     /// The closest simple function, if one is close.
     pub primitive: Option<Primitive>,

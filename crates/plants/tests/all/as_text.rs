@@ -133,8 +133,11 @@ fn heads_of_either_sign_are_the_same_in_both() {
         })
         .collect();
     let model = model(&case);
-    let (mut spec, width) = (model.spec().clone(), model.spec().find("d13").unwrap());
-    spec.outputs[0].variable = width;
+    let text = Plant::ThreeTank.text();
+    let head = "  Real d13 = level_1 - level_3;\nequation\n";
+    let mut spec = ModelSpec::parse(&text.replace("equation\n", head)).unwrap();
+    spec.parameters.clone_from(&model.spec().parameters);
+    spec.outputs[0].variable = spec.find("d13").unwrap();
     let (heads, _) = run(&case, &Model::new(spec), &input);
     let crossings = heads
         .windows(2)

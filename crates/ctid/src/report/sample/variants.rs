@@ -1,8 +1,8 @@
 //! Variants of the sample: a comparison, a partial explanation, awkward names and numbers.
 
+use effect_search::{HeldOutError, OutputStep};
 use missing_effect::{
-    Acceptance, Diagnosis, Effort, HeldOutError, OutputStep, PerOutput, PlaceScore, Rankings,
-    Rejection, Verdict,
+    Acceptance, Diagnosis, Effort, PerOutput, PlaceScore, Rankings, Rejection, Verdict,
 };
 
 use super::{NOISE, PERIOD, named, two_tanks};
@@ -119,8 +119,8 @@ pub(crate) fn awkward() -> Diagnosis {
         for (from, to) in [(0, f64::NEG_INFINITY), (2, f64::INFINITY)] {
             failures.by_direction[from].from = to;
         }
-        failures.by_level[3].rms = f64::NAN;
-        failures.by_level[3].mean = f64::NAN;
+        failures.by_output[3].rms = f64::NAN;
+        failures.by_output[3].mean = f64::NAN;
         failures.by_frequency.clear();
         tests.cross_correlation.clear();
         tests.input_p = f64::NAN;
@@ -131,7 +131,7 @@ pub(crate) fn awkward() -> Diagnosis {
     diagnosis.steps[1].rmse_test = None;
     diagnosis.steps[1].outputs[0].rmse = f64::NAN;
     diagnosis.steps[1].outputs[0].rmse_test = None;
-    diagnosis.steps[1].outputs[0].failures.by_flow.clear();
+    diagnosis.steps[1].outputs[0].failures.by_input.clear();
     diagnosis.scores[2].bic_gain = f64::NAN;
     diagnosis.noise_floor = f64::NAN;
     diagnosis.noise[0].level = f64::NAN;

@@ -1,6 +1,7 @@
 //! Tables with a column for each step: parameters and errors.
 
-use missing_effect::{Diagnosis, HeldOutError, Parameter, Step};
+use effect_search::HeldOutError;
+use missing_effect::{Diagnosis, Parameter, Step};
 
 use super::{one_decimal, table};
 use crate::findings;

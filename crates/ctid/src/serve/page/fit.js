@@ -3,13 +3,17 @@ import { $, fill, figure, make, named, plot, table, units } from "./dom.js";
 import * as server from "./server.js";
 
 const BINNED = "Above the samples with the mean of each bin, below the root mean square of each bin; hatched bars fail clearly.";
-const FAILS = [
-  ["by-time", "Residual against time", "Measured minus model; shaded where it clearly fails, dashed the noise floor."],
-  ["by-level", "Against the model's output", BINNED],
-  ["by-flow", "Against the input", BINNED],
-  ["by-direction", "By direction of the model's output", "Bars: root mean square; diamonds: mean."],
-  ["by-frequency", "By frequency", "Root mean square of the residual in each octave."],
-];
+/** The places of the figures that show where a model fails. */
+function fails(report) {
+  const inputs = report.steps[0]?.outputs[0]?.failures.by_input ?? [];
+  return [
+    ["by-time", "Residual against time", "Measured minus model; shaded where it clearly fails, dashed the noise floor."],
+    ["by-output", "Against the model's output", BINNED],
+    ...inputs.map((input, k) => [`by-input-${k}`, inputs.length > 1 ? `Against the input ${input.name}` : "Against the input", BINNED]),
+    ["by-direction", "By direction of the model's output", "Bars: root mean square; diamonds: mean."],
+    ["by-frequency", "By frequency", "Root mean square of the residual in each octave."],
+  ];
+}
 
 let drawing = null;
 let view = { chosen: 0, output: 0, residualRecord: 0, sameAxes: true };
@@ -69,9 +73,12 @@ function places(report) {
     $("record-figures").dataset.of = wanted;
     $("record-figures").replaceChildren(...report.records.map((record, k) => figure(`record-${k}`, [record.name, " ", make("span", { className: "badge" }, record.held_out ? "held out" : "fitted")])));
   }
-  if (!$("fail-figures").childElementCount) {
-    const [first, ...rest] = FAILS.map((one) => figure(...one));
-    $("fail-figures").append(first, make("div", { className: "pairs" }, rest));
+  const all = fails(report);
+  const titles = all.map(([, title]) => title).join("\n");
+  if ($("fail-figures").dataset.of !== titles) {
+    $("fail-figures").dataset.of = titles;
+    const [first, ...rest] = all.map((one) => figure(...one));
+    $("fail-figures").replaceChildren(first, make("div", { className: "pairs" }, rest));
   }
 }
 

@@ -1,9 +1,13 @@
-#![allow(clippy::unwrap_used)]
+//! Where a model fails: what the residual of a known shape shows, and that noise shows nothing.
+
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use super::*;
-use crate::{Failure, FailureKind};
-use ct_signals::noise;
+use ct_model::{Model, ModelSpec};
+use ct_signals::{ArModel, Channel, Record, noise};
+use effect_search::failures::{Failure, FailureKind, Failures, Series, Signal, locate};
+use effect_search::output_steps;
+use greybox::{FitOptions, ModelSetup};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -19,12 +23,17 @@ fn located(noise: &ArModel, records: &[(&[f64], &[f64], &[f64])]) -> Failures {
         .iter()
         .map(|(time, model, residual)| Series {
             time,
-            input: model,
+            signals: vec![model, time],
             model,
             residual,
         })
         .collect();
-    locate(&series, noise)
+    let signal = |kind, name, unit| Signal { kind, name, unit };
+    let signals = [
+        signal(FailureKind::Input, "u", "V"),
+        signal(FailureKind::State, "x", "K"),
+    ];
+    locate(&series, &signals, noise)
 }
 
 fn worst(failures: &Failures, by: FailureKind) -> &Failure {
@@ -34,8 +43,9 @@ fn worst(failures: &Failures, by: FailureKind) -> &Failure {
 fn failing(failures: &Failures) -> usize {
     [
         &failures.by_time,
-        &failures.by_level,
-        &failures.by_flow,
+        &failures.by_output,
+        &failures.by_input[0].bins,
+        &failures.by_state[0].bins,
         &failures.by_direction,
         &failures.by_frequency,
     ]
@@ -53,13 +63,19 @@ fn a_failure_at_high_level_is_found_where_it_is() {
         .map(|(y, t)| 0.05 * (t * 1.7).sin() - if *y > 14.0 { 1.0 } else { 0.0 })
         .collect();
     let failures = located(&ArModel::white(0.05), &[(&time, &model, &residual)]);
-    for bin in &failures.by_level {
+    for bin in &failures.by_output {
         // The failing range begins at 14; a bin of 0.83 extends over this value.
         assert_eq!(bin.fails, bin.to > 14.0 + 0.05, "{bin:?}");
     }
-    let high = worst(&failures, FailureKind::Level);
+    let high = worst(&failures, FailureKind::Output);
     assert!(high.bin.from >= 13.2 && high.bin.mean < -0.5);
     assert!(high.error_share > high.sample_share + 0.2);
+    // The input has the values of the output here, and the state those of the time.
+    let input = worst(&failures, FailureKind::Input);
+    assert_eq!((input.signal.as_str(), input.unit.as_str()), ("u", "V"));
+    assert_eq!(input.bin, high.bin);
+    assert_eq!(failures.by_state[0].name, "x");
+    assert_eq!(failures.by_state[0].bins.len(), failures.by_time.len());
     let n = residual.len() as f64;
     let mean_square: f64 = residual.iter().map(|r| r * r).sum::<f64>() / n;
     let mean = residual.iter().sum::<f64>() / n;
@@ -128,7 +144,7 @@ fn a_failure_in_the_second_record_is_found_there() {
         &ArModel::white(0.1),
         &[(&time, &model, &right), (&time, &model, &wrong)],
     );
-    assert_eq!(failures.by_time.len(), 2 * BINS);
+    assert_eq!(failures.by_time.len(), 24);
     assert!(
         failures
             .by_time
@@ -139,4 +155,55 @@ fn a_failure_in_the_second_record_is_found_there() {
     assert_eq!(window.bin.record, Some(1));
     assert!((window.bin.from - 499.5).abs() < 1.0 && (window.bin.to - 582.75).abs() < 1.0);
     assert!(window.error_share > 0.7 && (window.sample_share - 1.0 / 24.0).abs() < 0.005);
+}
+
+/// Two tanks in series with the lower one read: what is wrong at high levels of the upper one is found there.
+#[test]
+fn a_failure_at_a_state_that_is_not_read_is_found_there() {
+    let text = "model Tanks
+      parameter Real k(min=0) = 0.1;
+      input Real u(unit=\"V\");
+      Real upper(unit=\"cm\", start=10);
+      output Real lower(unit=\"cm\", start=10);
+      equation
+        der(upper) = u - k*upper;
+        der(lower) = k*upper - k*lower;
+      end Tanks;";
+    let model = Model::new(ModelSpec::parse(text).unwrap());
+    let u: Vec<f64> = (0..800)
+        .map(|k| if k / 40 % 2 == 0 { 0.6 } else { 1.4 })
+        .collect();
+    let blank = |y: Vec<f64>| {
+        let channels = (
+            vec![Channel::new("u", "V", u.clone())],
+            vec![Channel::new("lower", "cm", y)],
+        );
+        [Record::sampled("tanks", 1.0, channels.0, channels.1)]
+    };
+    let records = blank(vec![10.0; 800]);
+    let none = BTreeMap::new();
+    let x = [0.1, 10.0, 10.0];
+    let setup = ModelSetup::new(&model, &records, &none, 1.0).unwrap();
+    let states = setup.simulate_states(&x).unwrap();
+    let lower = setup.simulate(&x).unwrap().remove(0);
+    assert_eq!(states[1], lower);
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let noise = noise::white(800, 0.02, &mut rng);
+    let readings = lower.iter().zip(&states[0]).zip(noise);
+    let readings = readings.map(|((y, upper), e)| y + e + if *upper > 13.0 { 0.3 } else { 0.0 });
+    let records = blank(readings.collect());
+    let setup = ModelSetup::new(&model, &records, &none, 1.0).unwrap();
+    let mut fit = setup.fit(&FitOptions::default()).unwrap();
+    fit.x = x.to_vec();
+    let simulated = setup.simulate(&fit.x).unwrap();
+    let steps = output_steps(&setup, &fit, &simulated, &[ArModel::white(0.02)], None);
+    let failures = &steps[0].failures;
+    assert_eq!(failures.by_state.len(), 1);
+    let found = worst(failures, FailureKind::State);
+    assert_eq!(
+        (found.signal.as_str(), found.unit.as_str()),
+        ("upper", "cm")
+    );
+    assert!(found.bin.to > 13.0 && found.bin.mean > 0.2, "{found:?}");
+    assert!(steps[0].held_out_error.is_none() && steps[0].tests.input_p.is_finite());
 }

@@ -1,27 +1,36 @@
-//! Location of model errors: the residual by time window, level, flow, direction of change and frequency.
+//! Location of model errors: the residual by time window, output, inputs, states, direction of change and frequency.
 //!
 //! A bin fails where its mean square is clearly above what the noise would show there (`expected.rs`).
 
-mod expected;
-mod worst;
-
 use ct_signals::ArModel;
 
-use self::expected::{Expected, FACTOR_OF_A_BAND, beyond_chance, transform};
-use crate::{Bin, Failures};
+use super::expected::{Expected, FACTOR_OF_A_BAND, beyond_chance, transform};
+use super::worst::worst;
+use super::{Bin, FailureKind, Failures, SignalBins};
 
 /// Number of windows, and of bins of one kind.
 const BINS: usize = 12;
 /// Bins with fewer samples are not tested.
 const FEWEST: usize = 8;
 
+/// An input or a state of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Signal<'a> {
+    /// [`FailureKind::Input`] or [`FailureKind::State`].
+    pub kind: FailureKind,
+    /// Name of the signal.
+    pub name: &'a str,
+    /// Its unit.
+    pub unit: &'a str,
+}
+
 /// One record with the signals of a model; all series are as long as `time`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Series<'a> {
     /// Sampling instants, rising \[s\].
     pub time: &'a [f64],
-    /// The input for the plots and bins of the residual \[input unit\]; empty if the model has none.
-    pub input: &'a [f64],
+    /// Values of the inputs and states, in the order of the signals \[their units\].
+    pub signals: Vec<&'a [f64]>,
     /// Output of the model \[output unit\].
     pub model: &'a [f64],
     /// Measured minus model, NaN without a measurement \[output unit\].
@@ -167,9 +176,9 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
 }
 
 /// Regions where a model fails at one output: windows record by record, the others over all records together. `series`: at least one record;
-/// `noise`: the noise of the output.
+/// `signals`: the inputs and states that the series hold; `noise`: the noise of the output.
 #[must_use]
-pub fn locate(series: &[Series], noise: &ArModel) -> Failures {
+pub fn locate(series: &[Series], signals: &[Signal], noise: &ArModel) -> Failures {
     let expected: Vec<Expected> = series
         .iter()
         .map(|one| Expected::of(noise, one.residual.len()))
@@ -189,28 +198,30 @@ pub fn locate(series: &[Series], noise: &ArModel) -> Failures {
     let Some(longest) = expected.iter().max_by_key(|expected| expected.lines.len()) else {
         return Failures::default();
     };
-    let of_all =
-        |signal: fn(&Series) -> Vec<f64>| series.iter().flat_map(signal).collect::<Vec<f64>>();
-    let residual = of_all(|one| one.residual.to_vec());
-    let by_level = by(&of_all(|one| one.model.to_vec()), &residual, longest);
-    let input = of_all(|one| one.input.to_vec());
-    let by_flow = if input.is_empty() {
-        Vec::new()
-    } else {
-        by(&input, &residual, longest)
+    let joined = |values: &dyn Fn(&Series) -> Vec<f64>| -> Vec<f64> {
+        series.iter().flat_map(values).collect()
     };
-    let by_direction = by_direction(&of_all(|one| rates(one).collect()), &residual, longest);
+    let residual = joined(&|one| one.residual.to_vec());
+    let of_kind = |kind: FailureKind| -> Vec<SignalBins> {
+        let own = signals.iter().enumerate();
+        let own = own.filter(|(_, signal)| signal.kind == kind);
+        own.map(|(i, signal)| SignalBins {
+            name: signal.name.to_string(),
+            unit: signal.unit.to_string(),
+            bins: by(&joined(&|one| one.signals[i].to_vec()), &residual, longest),
+        })
+        .collect()
+    };
+    let rate = joined(&|one| rates(one).collect());
     let mut failures = Failures {
         by_time,
-        by_level,
-        by_flow,
-        by_direction,
+        by_output: by(&joined(&|one| one.model.to_vec()), &residual, longest),
+        by_input: of_kind(FailureKind::Input),
+        by_state: of_kind(FailureKind::State),
+        by_direction: by_direction(&rate, &residual, longest),
         by_frequency: by_frequency(series, &expected),
         worst: Vec::new(),
     };
-    failures.worst = worst::worst(&residual, &failures);
+    failures.worst = worst(&residual, &failures);
     failures
 }
-
-#[cfg(test)]
-mod tests;

@@ -125,7 +125,11 @@ pub(super) fn failures<'a>(
         } else {
             String::new()
         };
-        let title = format!("Where {model} fails{of_output}");
+        let title = if output.failures.worst.is_empty() {
+            format!("Tests of the residual of {model}{of_output}")
+        } else {
+            format!("Where {model} fails{of_output}")
+        };
         text += &format!("{}\n", look.heading(&title));
         let words = FailureWords {
             clock,

@@ -48,14 +48,14 @@ impl FailureWords<'_> {
         let worst = output.failures.worst.iter();
         let said: Vec<String> = worst.map(|failure| self.of_failure(failure)).collect();
         if said.is_empty() {
+            let place = match self.input {
+                Some(_) => format!("in no window, {}, flow or direction", self.output),
+                None => {
+                    "in no window of time, at no value of a signal and in no direction".to_string()
+                }
+            };
             return vec![format!(
-                "no region stands out: in no window, {}, {} or direction does the error exceed the noise",
-                self.output,
-                if self.input.is_some() {
-                    "flow"
-                } else {
-                    "input, state"
-                },
+                "no region stands out: {place} does the error exceed the noise"
             )];
         }
         said

@@ -1,6 +1,5 @@
 //! The curves of a plant's fit, and its text.
 
-use ct_model::ModelSpec;
 use ct_signals::{Heading, ReadSummary};
 use missing_effect::{Options, Problem};
 
@@ -13,21 +12,18 @@ use crate::own_model::{Exported, commented, number};
 
 /// Reason why a plant cannot be written as Modelica; `None` if it can.
 pub(crate) fn no_text(model: &ModelFile) -> Option<&'static str> {
-    let known = model.known.outputs(model.plant);
-    if !model.effects.is_empty() || !model.terms.is_empty() {
-        return Some(
-            "--modelica: a plant with effects cannot be written as Modelica yet; write its curves with --csv",
-        );
-    }
-    let one = model.columns.inputs.len() < 2 && known == [model.plant.vessels() - 1];
-    (!one || model.plant.joined()).then_some(
-        "--modelica: a plant with several inputs or outputs, or whose upper level alone is read, cannot be written as Modelica yet; write its curves with --csv, or its equations as a model of your own",
+    (!model.effects.is_empty() || !model.terms.is_empty()).then_some(
+        "--modelica: a plant with effects cannot be written as Modelica yet; write its curves with --csv",
     )
 }
 
-/// The text of a plant of one input and one output with fitted values: names and values of its parameters, then of its levels.
+/// The text of a plant with fitted values: names and values of its parameters, then of its levels. `None` with effects.
 fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> Option<String> {
-    let mut spec = ModelSpec::parse(problem.plant.text()).ok()?;
+    if !problem.effects.is_empty() || !problem.terms.is_empty() {
+        return None;
+    }
+    let mut record = problem.records[0].clone();
+    let mut spec = problem.plant.spec_of(&problem.known, &mut record).ok()?;
     let names: Vec<String> = problem.records.iter().map(|r| r.name.clone()).collect();
     let mut head = vec![format!(
         "Written by ctid export from plant {}, fitted to {}.",
@@ -43,12 +39,6 @@ fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> 
             let error = error.unwrap_or_else(|| "none: at a bound, or not determined".to_string());
             head.push(format!("  {name}: {error}"));
         }
-        let vessel = match name.as_str() {
-            "area" | "area_upper" => 0,
-            "area_lower" => 1,
-            _ => continue,
-        };
-        parameter.value = problem.known.area[vessel].unwrap_or(parameter.value);
     }
     let levels = &values[errors.len()..];
     for (state, (_, value)) in spec.states.iter_mut().zip(levels) {

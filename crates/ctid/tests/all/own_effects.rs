@@ -71,6 +71,42 @@ fn parameter(step: &Value, name: &str) -> (f64, Option<f64>) {
     (one["value"].as_f64().unwrap(), one["std_error"].as_f64())
 }
 
+/// The lag reads too low while the block warms up; with the lag in the model, no region stands out.
+#[test]
+fn a_comparison_says_where_the_model_fails() {
+    let place = place();
+    let text = place.succeeds("compare a.csv --model m.toml --json bare.json");
+    assert!(text.contains("Where Block fails"), "{text}");
+    let bare = place.json("bare.json");
+    let output = &bare["steps"][0]["outputs"][0];
+    assert_eq!(output["name"], "y");
+    assert!(output["tests"]["whiteness_p"].as_f64().unwrap() < 1e-3);
+    let failures = &output["failures"];
+    let inputs = failures["by_input"].as_array().unwrap();
+    let names: Vec<&str> = inputs.iter().map(|u| u["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["u", "Ta"]);
+    assert_eq!(inputs[0]["unit"], "%");
+    // The only state is read.
+    assert_eq!(failures["by_state"].as_array().unwrap().len(), 0);
+    let directions = failures["by_direction"].as_array().unwrap();
+    let mean = |i: usize| directions[i]["mean"].as_f64().unwrap();
+    assert!(mean(0) > 0.5 && mean(2) < -0.5, "{directions:?}");
+    let worst = failures["worst"].as_array().unwrap();
+    assert!(!worst.is_empty());
+
+    place.write(
+        "m.toml",
+        MODEL.replace("effects = []", "effects = [\"lag(y)\"]"),
+    );
+    let text = place.succeeds("compare a.csv --model m.toml --json mended.json");
+    assert!(text.contains("Tests of the residual of Block"), "{text}");
+    let mended = place.json("mended.json");
+    let failures = &mended["steps"][0]["outputs"][0]["failures"];
+    assert_eq!(failures["worst"].as_array().unwrap().len(), 0);
+    // The state behind the lag is not read any more.
+    assert_eq!(failures["by_state"].as_array().unwrap().len(), 1);
+}
+
 #[test]
 fn what_a_diagnosis_finds_is_added_and_the_error_falls() {
     let place = place();

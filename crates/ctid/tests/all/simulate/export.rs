@@ -85,14 +85,6 @@ fn what_cannot_be_exported_is_refused_in_one_line() {
     );
     place.write(
         "tank.toml",
-        "plant = \"three-tank\"\n[known]\nmeasured = \"T3\"\n",
-    );
-    place.refuses(
-        "export tank.toml --modelica t.mo",
-        &["tank.toml: --modelica", "--csv"],
-    );
-    place.write(
-        "tank.toml",
         "plant = \"single-tank\"\neffects = [\"overflow\"]\n",
     );
     place.refuses(
@@ -127,6 +119,55 @@ fn the_curves_of_a_plant_are_exported() {
     let compared = place.result("compare tour.csv --model tour.toml");
     let rmse = compared["steps"][0]["rmse"].as_f64().unwrap();
     assert!((rms / rmse - 1.0).abs() < 1e-6, "{rms} {rmse}");
+}
+
+/// With a measured flow into the lower tank, of which both levels are read.
+#[test]
+fn a_plant_of_several_inputs_and_outputs_is_exported_as_modelica() {
+    let place = Place::new();
+    let mut text = String::from("t [s],u [V],d [l/min],a [cm],b [cm]\n");
+    let (mut upper, mut lower) = (9.0_f64, 9.0_f64);
+    for k in 0..400 {
+        let u = if k / 30 % 2 == 0 { 4.0 } else { 5.5 };
+        let d = if k / 47 % 2 == 0 { 0.0 } else { 2.0 };
+        let noise = 0.02 * (7.0 * f64::from(k)).sin();
+        text += &format!("{k},{u},{d},{:.4},{:.4}\n", upper + noise, lower - noise);
+        for _ in 0..100 {
+            let (above, below) = (5.0 * upper.sqrt(), 6.0 * lower.sqrt());
+            upper += 0.01 * (3.3 * u - above) / 20.0;
+            lower += 0.01 * (above + 1.5 * d - below) / 20.0;
+        }
+    }
+    place.write("d.csv", text);
+    place.write(
+        "tank.toml",
+        "plant = \"cascaded-tanks\"\n[known]\nmeasured = [\"upper\", \"lower\"]\ndisturbance = \"lower\"\narea_upper = 20.0\narea_lower = 20.0\n[columns]\ntime = \"t [s]\"\ninput = \"u [V]\"\ninput_2 = \"d [l/min]\"\noutput = \"a [cm]\"\noutput_2 = \"b [cm]\"\n",
+    );
+    place.succeeds("export tank.toml d.csv --modelica tank.mo --csv curves.csv");
+    place.succeeds("check tank.mo");
+    place.write(
+        "own.toml",
+        "model = \"tank.mo\"\n[columns]\ntime = \"t [s]\"\nu = \"u [V]\"\nd = \"d [l/min]\"\nlevel_upper = \"a [cm]\"\nlevel_lower = \"b [cm]\"\n",
+    );
+    let record = place.read("d.csv");
+    let inputs = record.lines().map(|line| {
+        let cells: Vec<&str> = line.split(',').take(3).collect();
+        cells.join(",") + "\n"
+    });
+    place.write("in.csv", inputs.collect::<String>());
+    place.succeeds("simulate own.toml in.csv --out y.csv");
+    let curves = place.read("curves.csv");
+    for (own, of_plant) in [
+        ("level_upper", "a model [cm]"),
+        ("level_lower", "b model [cm]"),
+    ] {
+        let own = column(&place.read("y.csv"), own);
+        let model = column(&curves, of_plant);
+        assert_eq!(own.len(), model.len());
+        for (own, model) in own.iter().zip(&model) {
+            assert!((own - model).abs() < 1e-5, "{own} {model}");
+        }
+    }
 }
 
 #[test]

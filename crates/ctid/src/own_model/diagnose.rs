@@ -65,7 +65,8 @@ pub(crate) fn said(
         text += &undetermined(&last.not_determined, look);
         if diagnosis.verdict == Verdict::Partial && last.added.is_some() {
             text.push('\n');
-            text += &fails("the model with these effects", last);
+            text += fails("the model with these effects", last).trim_end();
+            text.push('\n');
         }
     }
     text += &format!("\n{}\n", look.heading(&heading(diagnosis)));

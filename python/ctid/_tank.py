@@ -117,8 +117,8 @@ class TankFit(Fit):
         return TankDiagnosis(found.json(), found.sentences, found.html(), (found.series, found.output_units), self._parts, kept)
 
     def to_modelica(self) -> str:
-        """Raises `ModelError`: a plant has no text."""
-        return TankModel(self._parts).to_modelica()
+        """The plant as the text of a model, with the fitted values; see `TankModel.to_modelica`."""
+        return self.model.to_modelica()
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _tank_fit_of, (self._native.to_bytes(), self._indexes, self._parts)

@@ -154,8 +154,13 @@ class TankModel(Model):
         return TankFit(fitted, [index_of(record, row_count(record)) for record in records], parts)
 
     def to_modelica(self) -> str:
-        """A plant of the program has no text: raises `ModelError`."""
-        raise ModelError(f"{self.name} is a plant of the program and has no text: write its balance as a model of your own")
+        """The plant as the text of a model in Modelica, with the fitted values where it comes from a fit, otherwise those of `start`.
+
+        Levels are in the unit of their columns, time in s. Raises `ModelError` where effects are in the model, which have no text, and where
+        parameters have no values.
+        """
+        text: str = self._native.to_modelica({**self._parts["start"], **self._values})
+        return text
 
     def linearize(self, at: Mapping[str, float] | None = None) -> StateSpace:
         """The matrices of the plant about values of its levels and its command, `at={"level": 12.0, "u": 4.0}`; a linear plant needs none.

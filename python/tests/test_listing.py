@@ -47,7 +47,11 @@ def test_what_is_missing_is_found_and_added():
     frame = lagging_block()
     df, test = frame.iloc[:400], frame.iloc[400:]
     fit = ctid.Model.from_file(MODELS / "heated-block.mo").fit(df, known={"C": 52.0})
-    assert len(fit.failures()) > 0 and fit.failures_in_words()
+    failures = fit.failures()
+    assert len(failures) > 0 and fit.failures_in_words()
+    assert set(failures["by"]) <= {"time", "output", "input", "state", "direction", "frequency"}
+    named = failures["by"].isin(["input", "state"])
+    assert failures["signal"].notna().equals(named)
     d = fit.diagnose(test=test, progress=False)
     assert d.verdict in ("effect", "undecided")
     assert any("lag(" in effect for group in d.groups for effect in group)

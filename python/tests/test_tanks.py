@@ -181,6 +181,22 @@ def test_the_matrices_of_two_tanks():
     np.testing.assert_allclose((lag.A[0, 0], lag.B[0, 0]), (-1.0 / 80.0, 2.0 / 80.0))
 
 
+def test_the_text_of_a_tank(tour):
+    fit = ctid.Model.tank("single-tank", known={"area": 154.0}).fit(tour, inputs=["u"], outputs=["y"])
+    text = fit.to_modelica()
+    assert text == fit.model.to_modelica()
+    own = ctid.Model.from_text(text)
+    assert own.states == ["level"] and own.params["alpha"] == fit.params["alpha"]
+    # The same record with the text gives the same fit.
+    again = own.fit(tour, inputs={"u": "u"}, outputs={"level": "y"})
+    for name in ("pump_gain", "alpha"):
+        np.testing.assert_allclose(again.params[name], fit.params[name], rtol=1e-4)
+    known = {"disturbance": "tank"}
+    start = {"K": 2.0, "tau": 80.0, "offset": 1.0, "disturbance_gain": 0.5}
+    text = ctid.Model.tank("single-tank-linear", known=known, start=start).to_modelica()
+    assert "K*u - outflow + disturbance_gain*d" in text
+
+
 def test_what_has_no_matrices(tour):
     with pytest.raises(ctid.ModelError, match="no values of pump_gain, alpha"):
         ctid.Model.tank("single-tank", known={"area": 154.0}).linearize(at={"level": 12.0, "u": 4.0})

@@ -148,7 +148,7 @@ impl Context<'_> {
 }
 
 /// Ranges that the fitted model visits in all records.
-fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
+pub(crate) fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
     let (count, states) = (setup.parameter_count(), problem.spec.states.len());
     let mut all: Option<Visited> = None;
     for (r, record) in problem.records.iter().enumerate() {

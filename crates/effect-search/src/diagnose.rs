@@ -20,6 +20,7 @@ use crate::believed::begin;
 use crate::node::{Context, FINE, Node};
 use crate::partial::explained;
 use crate::problem::{Limit, Options, Phase, Problem};
+use crate::residual_tests::NotNoise;
 use crate::result::{Diagnosis, Verdict};
 use crate::search::Grown;
 
@@ -123,6 +124,20 @@ pub fn diagnose(
             }
             (own, confirmed) = (better.fit.clone(), better);
             not_noise = context.not_noise(&confirmed, &own)?;
+        }
+    }
+    let some = confirmed.added.len() > grown.base.added.len();
+    if some || matches!(not_noise, Some(NotNoise::Instant { .. })) {
+        let margin = if some {
+            0.0
+        } else {
+            options.thresholds.bic_margin
+        };
+        let shift = context.level_shift(&grown.base, &noise)?;
+        if let Some(shift) = shift.filter(|shift| shift.bic < confirmed.fit.bic() - margin) {
+            not_noise = Some(shift.found);
+            confirmed = grown.base.clone();
+            own = context.in_own_noise(&confirmed)?;
         }
     }
     grown.cut_short |= context.limit.leaves_out("tests of the effects one by one");

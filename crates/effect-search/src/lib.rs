@@ -17,6 +17,7 @@ mod found_model;
 mod groups;
 mod held_out;
 mod joined;
+mod level_shift;
 mod node;
 pub mod not_finite;
 mod output_step;

@@ -1,4 +1,4 @@
-model CascadedTanksLinear "two first-order lags in series about an operating point, the second one measured"
+model CascadedTanksLinear "two first-order lags in series about an operating point"
   // Units are those of the record.
   parameter Real K = 2 "rise of the level for one unit of the command";
   parameter Real tau1(min=0) = 60 "time constant of the upper tank";

@@ -1,4 +1,4 @@
-model CascadedTanks "two tanks, the upper one drains into the lower one, which is measured"
+model CascadedTanks "two tanks, the upper one drains into the lower one"
   // Units are those of the record.
   parameter Real pump_gain(min=0) = 3.3 "inflow for one unit of the command";
   parameter Real alpha_upper(min=0) = 5 "outflow coefficient of the upper tank";

@@ -1,4 +1,4 @@
-model ThreeTank "three tanks in a row, T1, T3, T2, joined by valves, an outlet at T2, pumps into T1 and T2; T3 is measured"
+model ThreeTank "three tanks in a row, T1, T3, T2, joined by valves, an outlet at T2, pumps into T1 and T2"
   // Units are those of the record.
   parameter Real pump_gain_1(min=0) = 3.4 "inflow for one unit of the command to pump 1";
   parameter Real pump_gain_2(min=0) = 3.1 "inflow for one unit of the command to pump 2";

@@ -139,7 +139,7 @@ fn kind(spec: &ModelSpec, name: &str) -> char {
         Some(Variable::Flow(_)) => 'q',
         Some(Variable::Parameter(_)) if name.starts_with("area") || name.starts_with("tau") => 's',
         Some(Variable::Parameter(_)) if name.starts_with("pump_gain") || name == "K" => 'k',
-        Some(Variable::Parameter(_)) if name.starts_with('a') => 'q',
+        Some(Variable::Parameter(_)) if name.starts_with("alpha") || name.starts_with("az") => 'q',
         _ => '?',
     }
 }

@@ -81,6 +81,15 @@ impl Tank {
         crate::linear::linearize(py, tank_text::spec(&self.file, &values)?, &at)
     }
 
+    /// The plant as the text of a model, with these values of its parameters and initial levels.
+    #[allow(
+        clippy::needless_pass_by_value,
+        reason = "made from a Python dictionary"
+    )]
+    fn to_modelica(&self, values: BTreeMap<String, f64>) -> PyResult<String> {
+        Ok(tank_text::spec(&self.file, &values)?.to_string())
+    }
+
     /// A monitor that runs the model beside the running plant.
     fn monitor(
         &self,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_model::{Given, ModelSpec};
+use ct_model::{Expression, Given, ModelSpec};
 use ctid::model_file::ModelFile;
 use pyo3::prelude::*;
 
@@ -16,15 +16,9 @@ pub fn spec(file: &ModelFile, values: &BTreeMap<String, f64>) -> PyResult<ModelS
     let on = on.into_iter().chain(terms).collect::<Vec<_>>();
     if !on.is_empty() {
         return Err(error::of_model(format!(
-            "the text of {} has no {}: an effect of a tank has no matrices; write the balance as a model of your own, or linearise the tank without it",
+            "the text of {} has no {}: an effect of a tank has neither text nor matrices; write the balance as a model of your own, or take the tank without it",
             plant.id(),
             on.join(", ")
-        )));
-    }
-    if file.known.disturbed_vessel(plant).is_some() {
-        return Err(error::of_model(format!(
-            "a model text of the plant {} cannot contain a measured disturbance: write the balance as a model of your own",
-            plant.id()
         )));
     }
     let mut spec = plant.spec(&file.known).map_err(error::of_model)?;
@@ -41,6 +35,15 @@ pub fn spec(file: &ModelFile, values: &BTreeMap<String, f64>) -> PyResult<ModelS
     for parameter in &mut spec.parameters {
         let value = values.get(parameter.about.name.as_str()).copied();
         parameter.value = value.unwrap_or(parameter.value);
+    }
+    for state in &mut spec.states {
+        if let Some(level) = values.get(&format!("{}(0)", state.about.name)) {
+            let size = Expression::Number(level.abs());
+            state.start = match level.is_sign_negative() {
+                true => Expression::Negative(Box::new(size)),
+                false => size,
+            };
+        }
     }
     Ok(spec)
 }

@@ -10,7 +10,7 @@ use super::fragment::{Action, Fragment};
 use super::port::Port;
 use super::scale::balance_unit;
 use super::visited::Visited;
-use super::{all_effects, domain, shape};
+use super::{all_effects, domain, level_shift, shape};
 use crate::expression::{Expression, Operator, Variable};
 use crate::spec::{About, Given, ModelSpec, Parameter};
 use crate::text::is_reserved;
@@ -242,6 +242,13 @@ pub fn shapes_keeping(
     kept: &BTreeMap<String, BTreeMap<String, f64>>,
 ) -> Vec<Candidate> {
     of_effects(shape::EFFECTS.iter(), spec, visited, kept)
+}
+
+/// A level shift of each output, in the order of the outputs: `level_shift(y)`. They are no candidates of a search.
+#[must_use]
+pub fn level_shifts(spec: &ModelSpec, visited: &Visited) -> Vec<Candidate> {
+    let effects = std::iter::once(&level_shift::EFFECT);
+    of_effects(effects, spec, visited, &BTreeMap::new())
 }
 
 fn of_effects(

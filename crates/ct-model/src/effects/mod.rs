@@ -36,6 +36,7 @@ mod electrical;
 mod fragment;
 mod hydraulic;
 mod input;
+mod level_shift;
 mod mechanical;
 mod output;
 mod own;
@@ -49,7 +50,8 @@ mod visited;
 
 pub use apply::{ApplyError, apply};
 pub use candidate::{
-    Candidate, EffectParameter, best_of_each_choice, candidates, candidates_keeping, shapes_keeping,
+    Candidate, EffectParameter, best_of_each_choice, candidates, candidates_keeping, level_shifts,
+    shapes_keeping,
 };
 pub use effect::{Effect, Place, Role, Starts};
 pub use own::{OwnCandidate, OwnError, OwnParameter, OwnState, own_candidate, own_candidates};

@@ -212,6 +212,18 @@ fn said_of(left: &NotNoise) -> String {
             ct_signals::duration(*from),
             ct_signals::duration(*to)
         ),
+        NotNoise::LevelShift {
+            output,
+            record,
+            at,
+            size,
+            unit,
+        } => format!(
+            "the reading of {output} in {record} changes by {} {} at {}, from one row to the next; this explains more than the candidates do",
+            numbers::significant(*size, 3),
+            shown_unit(unit),
+            ct_signals::duration(*at)
+        ),
         NotNoise::Level { output } => {
             format!("the residual of {output} depends on the model's output")
         }

@@ -103,8 +103,12 @@ fn a_comparison_says_where_the_model_fails() {
     let mended = place.json("mended.json");
     let failures = &mended["steps"][0]["outputs"][0]["failures"];
     assert_eq!(failures["worst"].as_array().unwrap().len(), 0);
-    // The state behind the lag is not read any more.
-    assert_eq!(failures["by_state"].as_array().unwrap().len(), 1);
+    // The block itself is not read any more.
+    let states = failures["by_state"].as_array().unwrap();
+    assert!(
+        states.iter().any(|state| state["name"] == "T"),
+        "{states:?}"
+    );
 }
 
 #[test]

@@ -63,6 +63,19 @@ pub enum NotNoise {
         /// Until when \[s\].
         to: f64,
     },
+    /// From one row to the next the reading changes by a constant, and no set of effects explains as much.
+    LevelShift {
+        /// The output.
+        output: String,
+        /// The record.
+        record: String,
+        /// The first row after it \[s, the record's clock\].
+        at: f64,
+        /// Change of the reading.
+        size: f64,
+        /// Unit of the output.
+        unit: String,
+    },
     /// It depends on the model's output.
     Level {
         /// The output.

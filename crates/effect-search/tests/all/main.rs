@@ -4,6 +4,7 @@
 mod design;
 mod failures;
 mod hidden;
+mod level_shift;
 mod quantisation;
 mod records;
 mod results;

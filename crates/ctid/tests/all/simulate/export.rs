@@ -141,7 +141,7 @@ fn a_plant_of_several_inputs_and_outputs_is_exported_as_modelica() {
     place.write("d.csv", text);
     place.write(
         "tank.toml",
-        "plant = \"cascaded-tanks\"\n[known]\nmeasured = [\"upper\", \"lower\"]\ndisturbance = \"lower\"\narea_upper = 20.0\narea_lower = 20.0\n[columns]\ntime = \"t [s]\"\ninput = \"u [V]\"\ninput_2 = \"d [l/min]\"\noutput = \"a [cm]\"\noutput_2 = \"b [cm]\"\n",
+        "plant = \"cascaded-tanks\"\n[known]\nmeasured = [\"upper\", \"lower\"]\ndisturbance = \"lower\"\narea_upper = 20.0\narea_lower = 20.0\n[columns]\ntime = \"t [s]\"\ninput = \"u [V]\"\ninput_2 = \"d [l/min]\"\noutput = [\"a [cm]\", \"b [cm]\"]\n",
     );
     place.succeeds("export tank.toml d.csv --modelica tank.mo --csv curves.csv");
     place.succeeds("check tank.mo");
@@ -157,12 +157,9 @@ fn a_plant_of_several_inputs_and_outputs_is_exported_as_modelica() {
     place.write("in.csv", inputs.collect::<String>());
     place.succeeds("simulate own.toml in.csv --out y.csv");
     let curves = place.read("curves.csv");
-    for (own, of_plant) in [
-        ("level_upper", "a model [cm]"),
-        ("level_lower", "b model [cm]"),
-    ] {
-        let own = column(&place.read("y.csv"), own);
-        let model = column(&curves, of_plant);
+    for output in ["a", "b"] {
+        let own = column(&place.read("y.csv"), &format!("{output} [cm]"));
+        let model = column(&curves, &format!("{output} model [cm]"));
         assert_eq!(own.len(), model.len());
         for (own, model) in own.iter().zip(&model) {
             assert!((own - model).abs() < 1e-5, "{own} {model}");
@@ -185,7 +182,7 @@ fn a_plant_is_exported_as_modelica_and_reads_back() {
         .map(|line| line.rsplit_once(',').unwrap().0.to_string() + "\n");
     place.write("in.csv", inputs.collect::<String>());
     place.succeeds("simulate own.toml in.csv --out y.csv");
-    let own = column(&place.read("y.csv"), "y");
+    let own = column(&place.read("y.csv"), "y [cm]");
     let model = column(&place.read("curves.csv"), "y model [cm]");
     assert_eq!(own.len(), model.len());
     for (own, model) in own.iter().zip(&model) {

@@ -30,7 +30,7 @@ def names(value):
     return isinstance(value, list) and all(isinstance(name, str) and name for name in value)
 
 
-check(result.get("schema") == 3, f"schema is {result.get('schema')!r} instead of 3")
+check(result.get("schema") == 4, f"schema is {result.get('schema')!r} instead of 4")
 keys = ("verdict", "effects", "groups", "places", "acceptance", "ranked", "rankings", "steps", "noise_floor", "effort", "seconds")
 for key in keys:
     check(key in result, f"no key {key!r}")

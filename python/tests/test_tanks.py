@@ -191,9 +191,10 @@ def test_the_text_of_a_tank(tour):
     again = own.fit(tour, inputs={"u": "u"}, outputs={"level": "y"})
     for name in ("pump_gain", "alpha"):
         np.testing.assert_allclose(again.params[name], fit.params[name], rtol=1e-4)
-    known = {"disturbance": "tank"}
-    start = {"K": 2.0, "tau": 80.0, "offset": 1.0, "disturbance_gain": 0.5}
-    text = ctid.Model.tank("single-tank-linear", known=known, start=start).to_modelica()
+    # A measured flow into the tank is the last input.
+    disturbed = tour.assign(d=np.where(np.arange(len(tour)) // 50 % 2, 1.0, 0.0))
+    linear = ctid.Model.tank("single-tank-linear")
+    text = linear.fit(disturbed, inputs=["u", "d"], outputs=["y"], known={"disturbance": "tank"}).to_modelica()
     assert "K*u - outflow + disturbance_gain*d" in text
 
 

@@ -111,7 +111,7 @@ impl Plant {
                 .split_once('(')
                 .unwrap_or((pattern, ""));
             let kinds = at.split(',').filter_map(|kind| kind.chars().next());
-            // An output that is a level is one of both.
+            // An output that is a level counts as both.
             let fits = |(own, port): (char, char)| own == port || own == 'h' && port == 'y';
             own == effect
                 && at.split(',').count() == ports.len()

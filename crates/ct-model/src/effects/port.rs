@@ -139,7 +139,7 @@ impl ModelSpec {
             Variable::Flow(o) => self.flows[o].value == Expression::Variable(variable),
             _ => false,
         };
-        // The name of a state stays: a flow in proportion to it has no other port.
+        // A flow that equals a state is kept: its drift and its steps have no other port.
         let is_alias = match flow.value {
             Expression::Variable(variable) => !matches!(variable, Variable::State(_)),
             _ => false,

@@ -33,6 +33,9 @@ pub enum Stop {
     NotFinite,
 }
 
+/// A relative reduction that no minimum has, however coarse the stopping criteria are.
+const LARGE: f64 = 0.01;
+
 pub(crate) struct Minimum {
     pub x: Vec<f64>,
     pub triangle: Triangle,
@@ -89,7 +92,7 @@ pub(crate) fn minimise(
         (at.cost() - at.predicted(&step)) / at.cost()
     };
     let end = |reduction: f64| {
-        if reduction <= 1e3 * stopping.cost {
+        if reduction <= (1e3 * stopping.cost).min(LARGE) {
             Stop::Converged
         } else {
             Stop::Stuck

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::{
     Error,
     fit::{
-        node::{Node, ROUGH, best_first, in_time},
+        node::{Node, ROUGH, best_first, in_time, refine},
         proposal::{Parent, Proposal, candidates, proposals, propose, realise_all},
     },
     search::{pairs::joint_pairs, residual_kind::ResidualKind},
@@ -201,12 +201,12 @@ pub(crate) fn grow<'a>(
                 taken,
             ));
         }
-        let mut nodes = realise_all(proposals, noise, ROUGH);
+        let nodes = best_first(realise_all(proposals, noise, ROUGH));
+        let mut nodes = best_first(converged(nodes, factor * breadth.beam, noise)?);
         if size == 1 {
             (grown.refitted, grown.not_refitted) = (nodes.clone(), not_refitted);
         }
         nodes.retain(Node::plausible);
-        let mut nodes = best_first(nodes);
         let mut kept = [0; 2];
         nodes.retain(|node| {
             let kept = &mut kept[usize::from(by_clock(node))];
@@ -228,6 +228,21 @@ pub(crate) fn grow<'a>(
     }
     progress(breadth.most, breadth.most);
     Ok(grown)
+}
+
+/// The sets, of which the first `best` are fitted to convergence. Along a valley of the cost a rough fit ends far from its minimum, because
+/// the linearised model predicts a small reduction there: of a record of two tanks, a drift of the sensor had 14 % more error.
+fn converged<'a>(
+    mut nodes: Vec<Node<'a>>,
+    best: usize,
+    noise: &Noise,
+) -> Result<Vec<Node<'a>>, Error> {
+    let rest = nodes.split_off(nodes.len().min(best));
+    let best: Result<Vec<Node>, Error> = nodes
+        .par_iter()
+        .map(|node| refine(node, noise, &[]))
+        .collect();
+    Ok(best?.into_iter().chain(rest).collect())
 }
 
 /// Whether a set has an effect that follows time alone.

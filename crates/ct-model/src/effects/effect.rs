@@ -58,7 +58,7 @@ pub enum Role {
 pub enum Starts {
     /// The values themselves.
     Values(&'static [f64]),
-    /// Quantiles of the signal, or the same shares of its range if no quantiles are known.
+    /// Quantiles of the signal, or the same shares of its range if no quantiles are known; between the levels of a signal that has few.
     Quantiles(&'static [f64]),
     /// Shares of the width of the signal's range.
     Widths(&'static [f64]),

@@ -67,6 +67,37 @@ impl Span {
         a + (place - below as f64) * (b - a)
     }
 
+    /// Quantiles for these shares as places of a threshold. A signal with few levels has equal quantiles, some of them at the ends of its
+    /// range; a threshold at a level or beyond the range has no effect or no derivative. Values between the levels replace them.
+    #[must_use]
+    pub fn thresholds(&self, shares: &[f64]) -> Vec<f64> {
+        let mut places: Vec<f64> = Vec::with_capacity(shares.len());
+        for place in shares.iter().map(|share| self.quantile(*share)) {
+            let inside = place > self.low && place < self.high;
+            if inside && !places.contains(&place) {
+                places.push(place);
+            }
+        }
+        if self.high <= self.low {
+            return shares.iter().map(|_| self.low).collect();
+        }
+        let levels = [self.low, self.high].into_iter().chain(places.clone());
+        let mut sorted: Vec<f64> = levels.collect();
+        sorted.sort_by(f64::total_cmp);
+        while places.len() < shares.len() {
+            let widest = (1..sorted.len())
+                .max_by(|&a, &b| {
+                    let width = |k: usize| sorted[k] - sorted[k - 1];
+                    width(a).total_cmp(&width(b)).then(b.cmp(&a))
+                })
+                .unwrap_or(1);
+            let middle = 0.5 * (sorted[widest - 1] + sorted[widest]);
+            sorted.insert(widest, middle);
+            places.push(middle);
+        }
+        places
+    }
+
     /// The range of both.
     #[must_use]
     pub fn joined(&self, other: &Self) -> Self {

@@ -17,3 +17,4 @@ mod support;
 mod threads;
 mod tolerance;
 mod units;
+mod visited;

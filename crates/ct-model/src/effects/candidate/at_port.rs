@@ -164,8 +164,8 @@ pub(super) fn candidate(
 
 pub(super) fn values(starts: Starts, span: &Span, visited: &Visited, balance: f64) -> Vec<f64> {
     let (shares, of): (&[f64], Box<dyn Fn(f64) -> f64 + '_>) = match starts {
+        Starts::Quantiles(all) => return span.thresholds(all),
         Starts::Values(all) => (all, Box::new(|share| share)),
-        Starts::Quantiles(all) => (all, Box::new(|share| span.quantile(share))),
         Starts::Range(all) => (all, Box::new(|share| span.low + share * span.width())),
         Starts::Widths(all) => (all, Box::new(|share| share * span.width())),
         Starts::Times(all) => {

@@ -1,4 +1,4 @@
-//! The plants as text, diagnosed as any model of a user, on the blind records of tanks, where these lie beside the checkout.
+//! Blind records of tanks, where these lie beside the checkout: most with the plant as text, as any model of a user.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -9,16 +9,20 @@ use ctid::input::Files;
 use effect_search::{Diagnosis, Options, Problem, Verdict, diagnose};
 use plants::Plant;
 
-/// The diagnosis of a blind record with a text of its plant, on the measured command.
-fn diagnosed(case: &str, text: &str, known: &[(&str, f64)]) -> Result<Diagnosis, Box<dyn Error>> {
+/// A blind record with its model file.
+fn files(case: &str) -> Files {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/blind/public");
-    let files = Files {
+    Files {
         data: vec![folder.join(format!("{case}.csv"))],
         test: Vec::new(),
         model: folder.join(format!("{case}.toml")),
         options: ReadOptions::default(),
-    };
-    let kernel = files.read()?.problem;
+    }
+}
+
+/// The diagnosis of a blind record with a text of its plant, on the measured command.
+fn diagnosed(case: &str, text: &str, known: &[(&str, f64)]) -> Result<Diagnosis, Box<dyn Error>> {
+    let kernel = files(case).read()?.problem;
     let spec = ModelSpec::parse(text)?;
     let mut record = kernel.records[0].clone();
     let named = |channels: &mut [Channel], names: Vec<String>| {
@@ -40,6 +44,25 @@ fn diagnosed(case: &str, text: &str, known: &[(&str, f64)]) -> Result<Diagnosis,
         builder = builder.known(*name, *value);
     }
     Ok(diagnose(&builder.build()?, &Options::default(), &|_| {})?)
+}
+
+/// The fits of two tanks follow a long valley of the cost to the drift of the sensor.
+#[test]
+#[cfg_attr(not(blind_records), ignore = "no blind records beside the checkout")]
+fn a_drift_at_the_end_of_a_valley_of_the_cost_is_found() {
+    let problem = files("case-0014").read().unwrap().problem;
+    let found = missing_effect::diagnose(&problem, &Default::default(), &|_| {}).unwrap();
+    assert_eq!(found.verdict, Verdict::Effect);
+    assert_eq!(found.effects, ["sensor_drift"]);
+}
+
+/// The pump saturates between two of the three levels of its command.
+#[test]
+#[cfg_attr(not(blind_records), ignore = "no blind records beside the checkout")]
+fn a_saturation_between_two_levels_of_the_command_is_found() {
+    let known = [("area_upper", 154.0), ("area_lower", 154.0)];
+    let found = diagnosed("case-0008", Plant::CascadedTanks.text(), &known).unwrap();
+    assert_eq!(found.effects, ["saturation(u)"]);
 }
 
 /// The pump sticks until its command has moved by more than 0.56 V, and then jumps: a play does not explain it.

@@ -191,6 +191,46 @@ pub(crate) fn minimise(
 mod tests {
     use super::*;
 
+    /// Along a curved valley every step is small beside the reduction that an undamped step promises.
+    #[test]
+    fn a_rough_fit_goes_on_along_a_curved_valley() {
+        let rows = |x: &[f64]| {
+            let steep = 1e4;
+            [
+                [-2.0 * steep * x[0], steep, -steep * (x[1] - x[0] * x[0])],
+                [1.0, 0.0, 1.0 - x[0]],
+            ]
+        };
+        let evaluate = |x: &[f64], _: f64| {
+            let mut triangle = Triangle::new(3);
+            for row in rows(x) {
+                triangle.push(&row);
+            }
+            triangle.finish();
+            Some(triangle)
+        };
+        let stopping = Stopping {
+            evaluations: 10_000,
+            cost: 1e-3,
+        };
+        let bounds = [(f64::NEG_INFINITY, f64::INFINITY); 2];
+        let begin = vec![-3.0, 9.0];
+        let found = minimise(
+            begin,
+            None,
+            &bounds,
+            stopping,
+            evaluate,
+            |_, _| false,
+            || false,
+        );
+        assert!(
+            found.stop == Stop::Converged && (found.x[0] - 1.0).abs() < 0.05,
+            "{:?}",
+            found.x
+        );
+    }
+
     #[test]
     fn a_parameter_with_one_bound_is_held_at_that_bound_alone() {
         let (above, below) = ((0.0, f64::INFINITY), (f64::NEG_INFINITY, 2.0));

@@ -173,6 +173,17 @@ pub enum Expression {
 }
 
 impl Expression {
+    /// A number of any sign: the literal numbers of a text have none.
+    #[must_use]
+    pub fn number(value: f64) -> Self {
+        let size = Self::Number(value.abs());
+        if value < 0.0 {
+            Self::Negative(Box::new(size))
+        } else {
+            size
+        }
+    }
+
     /// Calls `each` for every occurrence of a variable.
     pub fn each_variable(&self, each: &mut impl FnMut(Variable)) {
         match self {

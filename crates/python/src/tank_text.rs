@@ -38,11 +38,7 @@ pub fn spec(file: &ModelFile, values: &BTreeMap<String, f64>) -> PyResult<ModelS
     }
     for state in &mut spec.states {
         if let Some(level) = values.get(&format!("{}(0)", state.about.name)) {
-            let size = Expression::Number(level.abs());
-            state.start = match level.is_sign_negative() {
-                true => Expression::Negative(Box::new(size)),
-                false => size,
-            };
+            state.start = Expression::number(*level);
         }
     }
     Ok(spec)

@@ -73,7 +73,11 @@ pub(super) fn instance(
         action: Action::Add(Vec::new()),
     };
     // The parameters that are fitted come first, then the constants that the equations name; numbers stay in the expressions.
-    let mut own: Vec<Expression> = small.parameters.iter().map(|p| signed(p.value)).collect();
+    let mut own: Vec<Expression> = small
+        .parameters
+        .iter()
+        .map(|p| Expression::number(p.value))
+        .collect();
     for constants in [false, true] {
         for (i, parameter) in small.parameters.iter().enumerate() {
             let is_constant = parameter.given == Given::Constant;
@@ -144,15 +148,6 @@ pub(super) fn instance(
         }
     };
     Ok(fragment)
-}
-
-/// A number of any sign.
-pub(super) fn signed(value: f64) -> Expression {
-    if value < 0.0 {
-        Expression::Negative(Box::new(Expression::Number(-value)))
-    } else {
-        Expression::Number(value)
-    }
 }
 
 /// A sum; `a - b` where what is added is negative.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::candidate::{Candidate, EffectParameter};
 use super::effect::Role;
-use super::fragment::{Action, Counts, Fragment, Target, signed};
+use super::fragment::{Action, Counts, Fragment, Target};
 use super::port::Port;
 use crate::expression::{Expression, Variable};
 use crate::spec::{About, Given, ModelSpec, Parameter, State};
@@ -178,7 +178,7 @@ pub fn own_candidate(
             about: about(key, &state.unit, None, None),
             coefficient: None,
             right: Expression::Number(0.0),
-            start: signed(state.start),
+            start: Expression::number(state.start),
             fixed: state.fixed,
         });
     }

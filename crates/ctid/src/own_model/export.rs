@@ -83,7 +83,7 @@ impl FittedModel {
         // A simulation begins with the initial states of the first record.
         for (state, value) in spec.states.iter_mut().zip(&fit.x[count..]) {
             if !state.fixed {
-                state.start = number(*value);
+                state.start = Expression::number(*value);
             }
         }
         let mut head = vec![format!(
@@ -189,16 +189,6 @@ pub(crate) fn export(
         records: all,
     });
     Ok((exported, records.summaries.clone()))
-}
-
-/// A number in the notation of a text.
-pub(crate) fn number(value: f64) -> Expression {
-    let size = Expression::Number(value.abs());
-    if value < 0.0 {
-        Expression::Negative(Box::new(size))
-    } else {
-        size
-    }
 }
 
 /// A model's text under comments.

@@ -42,7 +42,7 @@ pub(crate) use self::diagnose::{
 };
 pub use self::effects::OwnEffects;
 pub use self::export::text;
-pub(crate) use self::export::{Exported, commented, export, number};
+pub(crate) use self::export::{Exported, commented, export};
 pub use self::file::{AnyModelFile, OwnModelFile, OwnSettings, Records};
 pub(crate) use self::file::{conversion, read_model};
 pub use self::fitted::{FitLimit, FittedModel, OutputScore};

@@ -1,5 +1,6 @@
 //! The curves of a plant's fit, and its text.
 
+use ct_model::Expression;
 use ct_signals::{Heading, ReadSummary};
 use missing_effect::{Options, Problem};
 
@@ -8,7 +9,7 @@ use crate::Error;
 use crate::input::{Files, Input};
 use crate::model_file::ModelFile;
 use crate::numbers;
-use crate::own_model::{Exported, commented, number};
+use crate::own_model::{Exported, commented};
 
 /// Reason why a plant cannot be written as Modelica; `None` if it can.
 pub(crate) fn no_text(model: &ModelFile) -> Option<&'static str> {
@@ -42,7 +43,7 @@ fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> 
     }
     let levels = &values[errors.len()..];
     for (state, (_, value)) in spec.states.iter_mut().zip(levels) {
-        state.start = number(*value);
+        state.start = Expression::number(*value);
     }
     if names.len() > 1 {
         head.push(format!("Initial states are those of {}.", names[0]));

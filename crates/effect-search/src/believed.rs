@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use ct_model::effects::{
-    Candidate, OwnCandidate, OwnError, Visited, candidates_keeping, own_candidates, shapes_keeping,
+    Candidate, OwnCandidate, OwnError, Visited, candidates_keeping, level_shifts, own_candidates,
+    shapes_keeping,
 };
 use ct_model::{Model, ModelSpec};
 use estimation::{Fit, Noise, Residuals, within};
@@ -79,6 +80,7 @@ pub(crate) fn begin<'a>(
         reading_steps: reading_steps.collect(),
         candidates: Vec::new(),
         shapes: Vec::new(),
+        level_shifts: Vec::new(),
         scales: None,
         tolerance: ct_model::TOLERANCE,
         limit,
@@ -99,6 +101,7 @@ pub(crate) fn begin<'a>(
         (fit, visited, tolerance)
     };
     context.tolerance = tolerance.unwrap_or(ct_model::TOLERANCE);
+    context.level_shifts = level_shifts(&problem.spec, &visited);
     let mut all = all_candidates(&problem.spec, &visited, &problem.kept, &problem.candidates)?;
     all.retain(|candidate| {
         problem.effects.contains(&candidate.id) || !problem.left_out.contains(&candidate.id)
@@ -148,7 +151,7 @@ impl Context<'_> {
 }
 
 /// Ranges that the fitted model visits in all records.
-pub(crate) fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
+fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
     let (count, states) = (setup.parameter_count(), problem.spec.states.len());
     let mut all: Option<Visited> = None;
     for (r, record) in problem.records.iter().enumerate() {

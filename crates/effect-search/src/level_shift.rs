@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use ct_model::effects::{Port, level_shifts};
+use ct_model::effects::Port;
 use estimation::{Noise, fit_from};
 use rayon::prelude::*;
 
@@ -46,12 +46,9 @@ impl Context<'_> {
             instants.extend(present.map(|row| (whitened[row].abs() / sigma, series, row)));
         }
         instants.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let visited = crate::believed::visited(self.problem, &setup, &node.fit)?;
         let mut shifted = self.clone();
         let first = shifted.candidates.len();
-        shifted
-            .candidates
-            .extend(level_shifts(&self.problem.spec, &visited));
+        shifted.candidates.extend(self.level_shifts.iter().cloned());
         let shifts = instants.into_par_iter().take(INSTANTS);
         let shifts = shifts.filter_map(|(_, series, row)| {
             let at = (series / outputs, series % outputs, row);

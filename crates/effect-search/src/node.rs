@@ -36,6 +36,8 @@ pub(crate) struct Context<'a> {
     pub candidates: Vec<Candidate>,
     /// Smooth functions, for the shape of the error that no candidate explains.
     pub shapes: Vec<Candidate>,
+    /// A level shift of each reading ([`ct_model::effects::level_shifts`]), which no search adds.
+    pub level_shifts: Vec<Candidate>,
     pub limit: Limit<'a>,
     pub thresholds: Thresholds,
 }

@@ -15,7 +15,7 @@ pub struct Stopping {
     /// Largest number of evaluations.
     pub evaluations: usize,
     /// Least relative fall of the cost: a fit ends if an undamped step has a smaller predicted reduction, or if two successive steps
-    /// reached a smaller reduction.
+    /// reached a smaller one and an undamped step does not promise much more: at most a thousand times this, and at most 1 %.
     pub cost: f64,
 }
 
@@ -33,8 +33,8 @@ pub enum Stop {
     NotFinite,
 }
 
-/// A relative reduction that no minimum has, however coarse the stopping criteria are.
-const LARGE: f64 = 0.01;
+/// Small steps end a fit only if the predicted relative reduction of an undamped step is at most this, however coarse the criteria are.
+const MUCH_MORE: f64 = 0.01;
 
 pub(crate) struct Minimum {
     pub x: Vec<f64>,
@@ -92,7 +92,7 @@ pub(crate) fn minimise(
         (at.cost() - at.predicted(&step)) / at.cost()
     };
     let end = |reduction: f64| {
-        if reduction <= (1e3 * stopping.cost).min(LARGE) {
+        if reduction <= (1e3 * stopping.cost).min(MUCH_MORE) {
             Stop::Converged
         } else {
             Stop::Stuck
@@ -199,6 +199,7 @@ mod tests {
             [
                 [-2.0 * steep * x[0], steep, -steep * (x[1] - x[0] * x[0])],
                 [1.0, 0.0, 1.0 - x[0]],
+                [0.0, 0.0, 0.5],
             ]
         };
         let evaluate = |x: &[f64], _: f64| {
@@ -210,7 +211,7 @@ mod tests {
             Some(triangle)
         };
         let stopping = Stopping {
-            evaluations: 10_000,
+            evaluations: 2000,
             cost: 1e-3,
         };
         let bounds = [(f64::NEG_INFINITY, f64::INFINITY); 2];

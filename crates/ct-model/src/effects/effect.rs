@@ -58,7 +58,8 @@ pub enum Role {
 pub enum Starts {
     /// The values themselves.
     Values(&'static [f64]),
-    /// Quantiles of the signal, or the same shares of its range if no quantiles are known; between the levels of a signal that has few.
+    /// Quantiles of the signal, or the same shares of its range if no quantiles are known; of a signal with few levels, values between
+    /// them ([`super::Span::thresholds`]).
     Quantiles(&'static [f64]),
     /// Shares of the width of the signal's range.
     Widths(&'static [f64]),

@@ -10,6 +10,9 @@ use crate::spec::{ModelSpec, Output};
 /// Number of stored quantiles of a signal, at equal distances.
 const QUANTILES: usize = 101;
 
+/// Values that differ by no more than this share of the width belong to one level of a signal.
+const SAME_LEVEL: f64 = 0.01;
+
 /// Range of the values of a variable, in its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Span {
@@ -67,35 +70,35 @@ impl Span {
         a + (place - below as f64) * (b - a)
     }
 
-    /// Quantiles for these shares as places of a threshold. A signal with few levels has equal quantiles, some of them at the ends of its
-    /// range; a threshold at a level or beyond the range has no effect or no derivative. Values between the levels replace them.
+    /// Places of a threshold: the quantiles for these shares. If a signal has no more levels than places, quantiles are levels themselves,
+    /// and most of them the most frequent ones; then the places divide the distances between the levels.
     #[must_use]
     pub fn thresholds(&self, shares: &[f64]) -> Vec<f64> {
-        let mut places: Vec<f64> = Vec::with_capacity(shares.len());
-        for place in shares.iter().map(|share| self.quantile(*share)) {
-            let inside = place > self.low && place < self.high;
-            if inside && !places.contains(&place) {
-                places.push(place);
+        let mut divided = self.levels();
+        if !(2..=shares.len()).contains(&divided.len()) {
+            return shares.iter().map(|share| self.quantile(*share)).collect();
+        }
+        let divide = |_: &f64| {
+            let width = |k: usize| divided[k] - divided[k - 1];
+            let wider = |&a: &usize, &b: &usize| width(a).total_cmp(&width(b)).then(b.cmp(&a));
+            let widest = (1..divided.len()).max_by(wider).unwrap_or(1);
+            let middle = 0.5 * (divided[widest - 1] + divided[widest]);
+            divided.insert(widest, middle);
+            middle
+        };
+        shares.iter().map(divide).collect()
+    }
+
+    /// Distinct quantiles in ascending order; one within [`SAME_LEVEL`] of the width above a level belongs to it.
+    fn levels(&self) -> Vec<f64> {
+        let mut levels: Vec<f64> = Vec::new();
+        for &value in &self.quantiles {
+            let apart = |level: &f64| value - level > SAME_LEVEL * self.width();
+            if levels.last().is_none_or(apart) {
+                levels.push(value);
             }
         }
-        if self.high <= self.low {
-            return shares.iter().map(|_| self.low).collect();
-        }
-        let levels = [self.low, self.high].into_iter().chain(places.clone());
-        let mut sorted: Vec<f64> = levels.collect();
-        sorted.sort_by(f64::total_cmp);
-        while places.len() < shares.len() {
-            let widest = (1..sorted.len())
-                .max_by(|&a, &b| {
-                    let width = |k: usize| sorted[k] - sorted[k - 1];
-                    width(a).total_cmp(&width(b)).then(b.cmp(&a))
-                })
-                .unwrap_or(1);
-            let middle = 0.5 * (sorted[widest - 1] + sorted[widest]);
-            sorted.insert(widest, middle);
-            places.push(middle);
-        }
-        places
+        levels
     }
 
     /// The range of both.

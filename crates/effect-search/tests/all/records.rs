@@ -46,17 +46,6 @@ fn level(k: usize, of: usize) -> f64 {
 
 /// A record of a model with its own parameters, the noise of each output of first order.
 pub(crate) fn record(text: &str, correlation: f64, sigma: f64, seed: u64) -> Record {
-    driven(text, level, correlation, sigma, seed)
-}
-
-/// A record of a model whose commands have these levels, by row and input.
-pub(crate) fn driven(
-    text: &str,
-    level: impl Fn(usize, usize) -> f64,
-    correlation: f64,
-    sigma: f64,
-    seed: u64,
-) -> Record {
     let spec = ModelSpec::parse(text).unwrap();
     let model = Model::new(spec);
     let parameters = model.parameters();

@@ -24,7 +24,7 @@ const OUT_OF_REACH: f64 = 0.5;
 
 /// Swap steps: the set with one of its effects replaced by each other candidate, refitted, best first.
 ///
-/// `singles`: what [`singles`](crate::fit::proposal::singles) gives with the same noise model. It contains the swaps of a single effect.
+/// `singles`: all single effects, fitted with the same noise model. They contain the swaps of a single effect.
 pub(crate) fn swaps<'a>(
     node: &Node<'a>,
     position: usize,

@@ -158,7 +158,7 @@ pub(super) fn range(rows: &[Vec<f64>]) -> f64 {
 
 /// Start of a fit of the candidate: some of its starts, with a size that has an influence.
 pub(super) fn active(candidate: &Candidate) -> Vec<f64> {
-    // Quantiles are levels at which an input is constant: a limit that passes over such a level has no derivative.
+    // Quantiles may be levels at which an input is constant: a limit that passes over such a level has no derivative.
     let of = |p: &EffectParameter| {
         let start = match p.role {
             Role::Size => p.starts[0],

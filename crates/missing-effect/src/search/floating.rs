@@ -92,7 +92,7 @@ impl<'a> Floating<'_, 'a> {
     /// A set extended by one effect at a time, as long as the criterion falls.
     fn one_at_a_time(&self, mut node: Node<'a>) -> Result<Node<'a>, Error> {
         while node.added.len() < self.most && !node.setup.leaves_out("larger sets of effects") {
-            match self.better_than(&node, self.extended(&node, None)?) {
+            match better_than(&node, self.extended(&node, None)?) {
                 Some(best) => node = best,
                 None => break,
             }
@@ -110,7 +110,7 @@ impl<'a> Floating<'_, 'a> {
                     self.extended(&lacking, Some(node.added[position]))
                 })
                 .collect::<Result<Vec<_>, Error>>()?;
-            match self.better_than(&node, others.concat()) {
+            match better_than(&node, others.concat()) {
                 Some(best) => node = self.one_at_a_time(best)?,
                 None => break,
             }
@@ -130,12 +130,10 @@ impl<'a> Floating<'_, 'a> {
         found.retain(self.accepted);
         Ok(found)
     }
+}
 
-    /// The best of the sets, if its criterion is clearly below that of the model. It is fitted to convergence, as the model is.
-    fn better_than(&self, node: &Node, sets: Vec<Node<'a>>) -> Option<Node<'a>> {
-        let best = best_first(sets).into_iter().next()?;
-        let refined = refine(&best, self.noise, &[]);
-        let best = refined.ok().filter(self.accepted).unwrap_or(best);
-        (best.gain_over(node) > BIC_MARGIN).then_some(best)
-    }
+/// The best of the sets, if its criterion is clearly below that of the model.
+fn better_than<'a>(node: &Node, sets: Vec<Node<'a>>) -> Option<Node<'a>> {
+    let best = best_first(sets).into_iter().next();
+    best.filter(|best| best.gain_over(node) > BIC_MARGIN)
 }

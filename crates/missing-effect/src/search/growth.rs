@@ -202,7 +202,7 @@ pub(crate) fn grow<'a>(
             ));
         }
         let nodes = best_first(realise_all(proposals, noise, ROUGH));
-        let mut nodes = best_first(best_refined(nodes, breadth.beam, noise));
+        let mut nodes = best_first(best_refined(nodes, factor * breadth.beam, noise));
         if size == 1 {
             (grown.refitted, grown.not_refitted) = (nodes.clone(), not_refitted);
         }
@@ -230,25 +230,12 @@ pub(crate) fn grow<'a>(
     Ok(grown)
 }
 
-/// The sets, with the best of them fitted to convergence: `each` of those with a function of time, and of the others. Along a valley of the
-/// cost a rough fit ends far from its minimum, because the linearised model predicts a small reduction there: in a record of two tanks, a
-/// drift of the sensor had 14 % more error. A set keeps its rough fit if the other one fails, or ends at the bound of a size.
-fn best_refined<'a>(mut nodes: Vec<Node<'a>>, each: usize, noise: &Noise) -> Vec<Node<'a>> {
-    let mut left = [each; 2];
-    let best: Vec<bool> = nodes
-        .iter()
-        .map(|node| {
-            let left = &mut left[usize::from(by_clock(node))];
-            let chosen = *left > 0 && node.plausible();
-            *left -= usize::from(chosen);
-            chosen
-        })
-        .collect();
-    let pairs = nodes.par_iter_mut().zip(best);
-    pairs.filter(|(_, best)| *best).for_each(|(node, _)| {
-        if let Ok(refined) = refine(node, noise, &[])
-            && refined.plausible()
-        {
+/// The sets, of which the first `best` are fitted to convergence. Along a valley of the cost a rough fit ends far from its minimum, because
+/// the linearised model predicts a small reduction there: in a record of two tanks, a drift of the sensor had 14 % more error. A set whose
+/// second fit fails keeps its rough one.
+fn best_refined<'a>(mut nodes: Vec<Node<'a>>, best: usize, noise: &Noise) -> Vec<Node<'a>> {
+    nodes.par_iter_mut().take(best).for_each(|node| {
+        if let Ok(refined) = refine(node, noise, &[]) {
             *node = refined;
         }
     });

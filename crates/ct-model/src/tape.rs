@@ -73,7 +73,24 @@ pub(crate) struct Registers<T> {
     /// Answers of the guards.
     pub answers: Vec<bool>,
     taken: Vec<bool>,
-    /// The operations on the selected branches, with the registers of their results: those that slopes need, ...
+    /// For the present branches, ...
+    selected: Selected,
+    /// ... and for earlier ones, which come again: a state that moves to and fro across a limit.
+    earlier: Vec<Selected>,
+    /// Values without derivatives: parameters, constants of the text, and expressions of these.
+    plain: Vec<bool>,
+    /// All inputs are held, and the results that depend on inputs and parameters only are computed.
+    pub held: bool,
+    /// Roots, powers and logarithms of invalid arguments are zero: they occur only on a branch that ends the step.
+    pub extended: bool,
+}
+
+/// The operations on the selected branches, with the registers of their results.
+#[derive(Debug, Clone)]
+struct Selected {
+    /// Whether the first value of each branch is selected.
+    taken: Vec<bool>,
+    /// The operations that slopes need, ...
     slopes: Vec<(Operation, Register)>,
     /// ... the operations whose results change although all inputs are held, ...
     moving: Vec<(Operation, Register)>,
@@ -81,12 +98,39 @@ pub(crate) struct Registers<T> {
     guards: Vec<(Operation, Register)>,
     outputs: Vec<(Operation, Register)>,
     all: Vec<(Operation, Register)>,
-    /// Values without derivatives: parameters, constants of the text, and expressions of these.
-    plain: Vec<bool>,
-    /// All inputs are held, and the results that depend on inputs and parameters only are computed.
-    pub held: bool,
-    /// Roots, powers and logarithms of invalid arguments are zero: they occur only on a branch that ends the step.
-    pub extended: bool,
+}
+
+/// Number of selections that are kept besides the present one.
+const EARLIER: usize = 8;
+
+impl Selected {
+    fn with_capacity(operations: usize) -> Self {
+        let list = || Vec::with_capacity(operations);
+        Self {
+            taken: Vec::new(),
+            slopes: list(),
+            moving: list(),
+            guards: list(),
+            outputs: list(),
+            all: list(),
+        }
+    }
+}
+
+impl<T: Clone> Registers<T> {
+    /// The registers with the present selection alone.
+    pub fn copied(&self) -> Self {
+        Self {
+            values: self.values.clone(),
+            answers: self.answers.clone(),
+            taken: self.taken.clone(),
+            selected: self.selected.clone(),
+            earlier: Vec::new(),
+            plain: self.plain.clone(),
+            held: self.held,
+            extended: self.extended,
+        }
+    }
 }
 
 impl Tape {
@@ -111,13 +155,10 @@ impl Tape {
             values,
             taken: taken.collect(),
             answers,
-            slopes: Vec::with_capacity(self.operations.len()),
-            moving: Vec::with_capacity(self.operations.len()),
-            guards: Vec::with_capacity(self.operations.len()),
-            outputs: Vec::with_capacity(self.operations.len()),
+            selected: Selected::with_capacity(self.operations.len()),
+            earlier: Vec::new(),
             plain: Vec::new(),
             held: false,
-            all: Vec::with_capacity(self.operations.len()),
             extended: false,
         };
         let numbers =
@@ -126,7 +167,7 @@ impl Tape {
         for register in numbers {
             registers.plain[register] = registers.values[register].same_derivatives(zero);
         }
-        self.choose_operations(&mut registers);
+        self.select(&registers.taken, &registers.plain, &mut registers.selected);
         registers
     }
 
@@ -148,18 +189,55 @@ impl Tape {
         self.of_inputs = self.made_of(|register| register != 0 && !moving.contains(&register));
     }
 
-    /// Removes operations that only unselected branches need.
+    /// Selects the operations that the present branches need.
     fn choose_operations<T: Scalar>(&self, registers: &mut Registers<T>) {
         let Registers {
             taken,
+            selected,
+            earlier,
+            plain,
+            ..
+        } = registers;
+        // The latest is the last.
+        let known = earlier.iter().position(|known| known.taken == *taken);
+        let next = match known {
+            Some(known) => earlier.remove(known),
+            None => {
+                let mut next = if earlier.len() < EARLIER {
+                    Selected::with_capacity(self.operations.len())
+                } else {
+                    earlier.remove(0)
+                };
+                self.select(taken, plain, &mut next);
+                next
+            }
+        };
+        earlier.push(std::mem::replace(selected, next));
+        if registers.held {
+            for &(operation, to) in &registers.selected.slopes {
+                if self.of_inputs[to] {
+                    run(
+                        &[(operation, to)],
+                        &mut registers.values,
+                        registers.extended,
+                    );
+                }
+            }
+        }
+    }
+
+    /// Leaves out the operations that only other branches need.
+    fn select(&self, taken: &[bool], plain: &[bool], into: &mut Selected) {
+        let Selected {
+            taken: of,
             slopes,
             moving,
             guards,
             outputs,
             all,
-            plain,
-            ..
-        } = registers;
+        } = into;
+        of.clear();
+        of.extend_from_slice(taken);
         self.needed(&self.derivatives, (taken, plain), slopes);
         self.needed(&self.read_by_guards, (taken, plain), guards);
         self.needed(&self.read_by_all, (taken, plain), all);
@@ -168,19 +246,6 @@ impl Tape {
         outputs.retain(|output| !slopes.contains(output) && !guards.contains(output));
         moving.clear();
         moving.extend(slopes.iter().filter(|(_, to)| !self.of_inputs[*to]));
-        if registers.held {
-            for &(operation, to) in registers
-                .slopes
-                .iter()
-                .filter(|(_, to)| self.of_inputs[*to])
-            {
-                run(
-                    &[(operation, to)],
-                    &mut registers.values,
-                    registers.extended,
-                );
-            }
-        }
     }
 
     /// The operations that the results depend on, in order; an operation that reads a choice reads the selected register.
@@ -265,28 +330,36 @@ impl Tape {
 
     /// Computes all registers from the time, inputs, states and delayed values, with the stored answers of the guards.
     pub fn evaluate<T: Scalar>(&self, registers: &mut Registers<T>) {
-        run(&registers.all, &mut registers.values, registers.extended);
+        run(
+            &registers.selected.all,
+            &mut registers.values,
+            registers.extended,
+        );
     }
 
     /// Evaluates the slopes of the states alone.
     pub fn evaluate_slopes<T: Scalar>(&self, registers: &mut Registers<T>) {
         let operations = if registers.held {
-            &registers.moving
+            &registers.selected.moving
         } else {
-            &registers.slopes
+            &registers.selected.slopes
         };
         run(operations, &mut registers.values, registers.extended);
     }
 
     /// The differences of guards, where the slopes have been computed.
     pub fn evaluate_guards<T: Scalar>(&self, registers: &mut Registers<T>) {
-        run(&registers.guards, &mut registers.values, registers.extended);
+        run(
+            &registers.selected.guards,
+            &mut registers.values,
+            registers.extended,
+        );
     }
 
     /// The outputs, where slopes and guards have been computed.
     pub fn evaluate_outputs<T: Scalar>(&self, registers: &mut Registers<T>) {
         run(
-            &registers.outputs,
+            &registers.selected.outputs,
             &mut registers.values,
             registers.extended,
         );

@@ -112,7 +112,7 @@ impl<T: Scalar> Sliding<T> {
         self.shares.resize(m, zero);
         for side in 0..=m {
             if side == self.sides.len() {
-                self.sides.push(registers.clone());
+                self.sides.push(registers.copied());
                 self.sides[side].held = false;
             }
             tape.copy_answers(registers, &mut self.sides[side]);

@@ -1,6 +1,6 @@
 //! Models with branches: outputs against an adaptive solver or a fine reference, derivatives against central differences.
 
-use ct_model::{Dual, Method, Scalar};
+use ct_model::{Dual, Method, Model, ModelSpec, Scalar};
 
 use crate::support::{Case, check_outside};
 
@@ -52,6 +52,33 @@ fn every_kind_of_branch() {
         lines.lines = true;
         check_outside(&lines, 1e-7);
         lines.check_derivatives(1e-5);
+    }
+}
+
+/// More combinations of branches than a simulation remembers, which come again in any order.
+#[test]
+fn branches_that_come_again() {
+    let text = |frequencies: &[f64]| {
+        let (mut declared, mut equations) = (String::new(), String::new());
+        for (i, w) in frequencies.iter().enumerate() {
+            declared += &format!("  output Real x{i}(start=1);\n");
+            equations += &format!("  der(x{i}) = u*max(sin({w}*time), 0) - 0.1*x{i};\n");
+        }
+        format!("model Several\n  input Real u;\n{declared}equation\n{equations}end Several;")
+    };
+    let inputs: Vec<f64> = (0..200).map(|k| 1.0 + f64::from(k / 7 % 3)).collect();
+    let simulated = |frequencies: &[f64]| {
+        let model = Model::new(ModelSpec::parse(&text(frequencies)).unwrap());
+        model
+            .simulate(&model.parameters(), 0.7, &[&inputs])
+            .unwrap()
+    };
+    let frequencies = [0.31, 0.47, 0.83, 1.13, 1.71];
+    let together = simulated(&frequencies);
+    for (i, w) in frequencies.iter().enumerate() {
+        let alone = &simulated(&[*w])[0];
+        let apart = together[i].iter().zip(alone).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f64::max) < 1e-8, "{w}");
     }
 }
 

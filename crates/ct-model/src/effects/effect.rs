@@ -46,8 +46,8 @@ pub enum Role {
     /// The parameter states when, where or how fast the effect acts. No output depends on it while the size of the effect is zero. A grid
     /// of starts covers it.
     Shape,
-    /// At the absent value the effect vanishes, but the outputs have no derivative with respect to the parameter there: a limit at the edge
-    /// of the visited range, a quantisation step. A grid of starts is used.
+    /// At the absent value the effect vanishes, but the outputs have no derivative with respect to the parameter there, or one that says
+    /// little of larger values: a limit at the edge of the visited range, a quantisation step, a dead zone. A grid of starts is used.
     Threshold,
     /// The parameter takes one of its start values and no value in between: upper or lower. It is not fitted.
     Choice,
@@ -61,6 +61,8 @@ pub enum Starts {
     /// Quantiles of the signal, or the same shares of its range if no quantiles are known; of a signal with few levels, values between
     /// them ([`super::Span::thresholds`]).
     Quantiles(&'static [f64]),
+    /// Half the smallest magnitude of the signal that is not zero, and quantiles of these magnitudes ([`super::Span::thresholds`]).
+    Magnitudes(&'static [f64]),
     /// Shares of the width of the signal's range.
     Widths(&'static [f64]),
     /// Values in the signal's range: shares of it, from its lower end.
@@ -79,11 +81,12 @@ pub enum Starts {
 
 /// An effect.
 ///
-/// Its text is a model: the inputs are the port (their names say which part of it: [`Place`]), the output `v` is what the effect gives, the
-/// value of a parameter is the absent one, and a `final parameter` is a [`Role::Choice`]. Constants of these names take the values that the
-/// data visit: `low`, `high`, `middle`, `width`, `first` (of the signal), `begin`, `duration`, `interval` (of the record), `zero` (of a
-/// temperature's unit above absolute zero), `balance` (the largest term of the equation). In units `port` (or `signal`), `value`, `time`
-/// and `balance` stand for those of the signal, of the parameter or flow, of the time and of the equation.
+/// Its text is a model: the inputs are the port (their names say which part of it: [`Place`]), the output `v` is what the effect gives (and
+/// `w` the part of it that the second state of a port gets, where that is not the whole), the value of a parameter is the absent one, and a
+/// `final parameter` is a [`Role::Choice`]. Constants of these names take the values that the data visit: `low`, `high`, `middle`, `width`,
+/// `first` (of the signal), `begin`, `duration`, `interval` (of the record), `zero` (of a temperature's unit above absolute zero), `balance`
+/// (the largest term of the equation). In units `port` (or `signal`), `value`, `time` and `balance` stand for those of the signal, of the
+/// parameter or flow, of the time and of the equation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
     /// Name of the effect: `lag`.

@@ -54,6 +54,8 @@ impl Counts {
 
 /// The name of the flow that an effect gives.
 const RESULT: &str = "v";
+/// The name of the part of it that the second state of a port gets, where that is not the whole.
+const RECEIVED: &str = "w";
 /// The name of the right-hand side in an effect that governs it.
 const RATE: &str = "rate";
 
@@ -122,9 +124,12 @@ pub(super) fn instance(
             of_parameters: false,
         });
     }
-    let is_result = |flow: &Flow| flow.about.name == RESULT;
-    let position = small.flows.iter().position(is_result).unwrap_or(0);
-    let result = Variable::Flow(counts.flows + position);
+    let flow = |name: &str| {
+        let position = small.flows.iter().position(|flow| flow.about.name == name);
+        position.map(|at| Variable::Flow(counts.flows + at))
+    };
+    let result = flow(RESULT).unwrap_or(Variable::Flow(counts.flows));
+    let received = flow(RECEIVED).unwrap_or(result);
     let governs = small.inputs.iter().any(|input| input.about.name == RATE);
     fragment.action = match effect.place {
         Place::Input
@@ -136,11 +141,10 @@ pub(super) fn instance(
         _ if governs => Action::Govern { result, rate },
         _ => {
             let term = |negative: bool| {
-                let value = Expression::Variable(result);
                 if negative {
-                    Expression::Negative(Box::new(value))
+                    Expression::Negative(Box::new(Expression::Variable(result)))
                 } else {
-                    value
+                    Expression::Variable(received)
                 }
             };
             let of = |&(state, negative)| (Target::State(state), term(negative));

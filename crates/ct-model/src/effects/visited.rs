@@ -101,6 +101,23 @@ impl Span {
         levels
     }
 
+    /// Range of the magnitudes that are not zero.
+    #[must_use]
+    pub fn magnitudes(&self) -> Self {
+        let (low, high) = (self.low.abs(), self.high.abs());
+        let magnitudes = self.quantiles.iter().map(|value| value.abs());
+        let mut quantiles: Vec<f64> = magnitudes.filter(|value| *value > 0.0).collect();
+        quantiles.sort_by(f64::total_cmp);
+        let around_zero = self.low < 0.0 && self.high > 0.0;
+        let least = if around_zero { 0.0 } else { low.min(high) };
+        Self {
+            low: quantiles.first().copied().unwrap_or(least),
+            high: low.max(high),
+            first: self.first.abs(),
+            quantiles,
+        }
+    }
+
     /// The range of both.
     #[must_use]
     pub fn joined(&self, other: &Self) -> Self {

@@ -101,6 +101,53 @@ fn an_absent_effect_changes_nothing() {
 }
 
 #[test]
+fn a_share_of_what_spills_reaches_the_tank_below() {
+    let tanks = |upper: &str, lower: &str| {
+        ModelSpec::parse(&format!(
+            "model Tanks
+               input Real u;
+               output Real h1(quantity=\"Level\", unit=\"cm\", start=2);
+               output Real h2(quantity=\"Level\", unit=\"cm\", start=1);
+               parameter Real a = 0.1;
+               Real q;
+             equation
+               q = a*h1;
+               der(h1) = u - q{upper};
+               der(h2) = q - 0.1*h2{lower};
+             end Tanks;"
+        ))
+        .unwrap()
+    };
+    let base = tanks("", "");
+    let all = candidates(&base, &Visited::nominal(&base));
+    let overflow = all.iter().find(|c| c.id == "overflow(h1,h2)").unwrap();
+    let mut spec = apply(&base, &[overflow]).unwrap();
+    for parameter in &mut spec.parameters {
+        let own = overflow.parameters.iter();
+        let own = own.filter(|own| own.name == parameter.about.name);
+        for own in own {
+            parameter.value = if own.short == "rim" { 6.0 } else { 0.25 };
+        }
+    }
+    let number = |name| overflow.record_numbers[name];
+    let steepness = 300.0 * number("balance") / number("width");
+    let spill = format!("{steepness:?}*max(h1 - 6, 0)");
+    let written = tanks(&format!(" - {spill}"), &format!(" + 0.25*{spill}"));
+    let simulated = [spec, written].map(|spec| {
+        let model = Model::new(spec);
+        let inputs = [[1.0; 100], [0.2; 100]].concat();
+        model
+            .simulate(&model.parameters(), 1.0, &[&inputs])
+            .unwrap()
+    });
+    let highest = simulated[0][0].iter().copied().fold(0.0, f64::max);
+    assert!((6.0..6.5).contains(&highest), "{highest}");
+    for (a, b) in simulated[0].iter().zip(&simulated[1]) {
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6));
+    }
+}
+
+#[test]
 fn a_present_effect_changes_the_outputs_and_the_text_reads_back() {
     for driven in Driven::all() {
         let base = Model::new(driven.spec.clone());

@@ -27,3 +27,32 @@ fn thresholds_are_tried_at_quantiles_and_between_few_levels() {
     let constant = Span::of(&[3.0; 9]).unwrap().thresholds(&shares);
     assert_eq!(constant, [3.0; 3]);
 }
+
+#[test]
+fn magnitudes_are_those_of_both_signs() {
+    let values: Vec<f64> = (-20..=100).map(f64::from).collect();
+    let magnitudes = Span::of(&values).unwrap().magnitudes();
+    assert_eq!((magnitudes.low, magnitudes.high), (1.0, 100.0));
+    assert_eq!(magnitudes.first, 20.0);
+    assert!(magnitudes.quantiles.is_sorted());
+    // Pulses: half the rows are zero.
+    let pulses = [[0.0; 60].as_slice(), &[10.0; 20], &[-30.0; 20]].concat();
+    let magnitudes = Span::of(&pulses).unwrap().magnitudes();
+    assert_eq!((magnitudes.low, magnitudes.high), (10.0, 30.0));
+    assert_eq!(magnitudes.thresholds(&[0.1, 0.3])[0], 20.0);
+    let below = Span::of(&[-5.0, -3.0, -4.0]).unwrap().magnitudes();
+    assert_eq!((below.low, below.high), (3.0, 5.0));
+    // Where only the range is known.
+    let range = |low, high| Span {
+        low,
+        high,
+        first: low,
+        quantiles: Vec::new(),
+    };
+    let of = |span: Span| {
+        let magnitudes = span.magnitudes();
+        (magnitudes.low, magnitudes.high)
+    };
+    assert_eq!(of(range(-2.0, 1.0)), (0.0, 2.0));
+    assert_eq!(of(range(-4.0, -1.0)), (1.0, 4.0));
+}

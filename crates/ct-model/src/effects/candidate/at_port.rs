@@ -165,6 +165,12 @@ pub(super) fn candidate(
 pub(super) fn values(starts: Starts, span: &Span, visited: &Visited, balance: f64) -> Vec<f64> {
     let (shares, of): (&[f64], Box<dyn Fn(f64) -> f64 + '_>) = match starts {
         Starts::Quantiles(all) => return span.thresholds(all),
+        Starts::Magnitudes(all) => {
+            let magnitudes = span.magnitudes();
+            let mut places = vec![0.5 * magnitudes.low];
+            places.extend(magnitudes.thresholds(all));
+            return places;
+        }
         Starts::Values(all) => (all, Box::new(|share| share)),
         Starts::Range(all) => (all, Box::new(|share| span.low + share * span.width())),
         Starts::Widths(all) => (all, Box::new(|share| share * span.width())),

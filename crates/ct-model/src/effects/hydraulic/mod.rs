@@ -1,5 +1,5 @@
 //! Effects at the levels of tanks. Other effects of tanks have general names in the catalogue: laminar outflow is `loss(h)`, a neighbouring
-//! tank `coupling(h1,h2)` or `hidden_state(h)`, an overflow out of the system `limit(h)`.
+//! tank `coupling(h1,h2)` or `hidden_state(h)`, an overflow that is lost `limit(h)`.
 
 mod curved_reading;
 mod leak_at_height;

@@ -16,8 +16,8 @@ end dead_zone;
 "#,
     parameters: &[(
         "threshold",
-        Role::Size,
-        Starts::Widths(&[0.02, 0.1, 0.25, 0.45]),
+        Role::Threshold,
+        Starts::Magnitudes(&[0.1, 0.3, 0.5, 0.75]),
     )],
     physics: "The actuator does nothing until the command exceeds a threshold, of either sign: friction, a valve's overlap, a pump's starting voltage.",
     confused_with: &["constant(x)", "nonlinearity(u)", "backlash(u)"],

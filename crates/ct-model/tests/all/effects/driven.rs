@@ -162,6 +162,8 @@ pub(super) fn active(candidate: &Candidate) -> Vec<f64> {
     let of = |p: &EffectParameter| {
         let start = match p.role {
             Role::Size => p.starts[0],
+            // A larger dead zone empties both tanks.
+            Role::Threshold if p.short == "threshold" => p.starts[0],
             // Stiction has tests of its own.
             Role::Choice if p.short == "jump" => p.starts[0],
             _ => p.starts[p.starts.len() / 2],

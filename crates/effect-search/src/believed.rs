@@ -82,6 +82,7 @@ pub(crate) fn begin<'a>(
         shapes: Vec::new(),
         level_shifts: Vec::new(),
         scales: None,
+        ties: Vec::new(),
         tolerance: ct_model::TOLERANCE,
         limit,
         thresholds: options.thresholds,
@@ -114,6 +115,7 @@ pub(crate) fn begin<'a>(
         model,
         fit,
     };
+    context.ties = context.ties(&bare);
     let mut node = bare;
     for id in &problem.effects {
         node = context.with_listed(node, id)?;

@@ -31,6 +31,7 @@ mod result;
 mod score;
 mod search;
 mod thresholds;
+mod ties;
 mod unknown;
 
 pub use believed::{Believed, all_candidates, believed};

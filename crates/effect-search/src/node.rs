@@ -38,6 +38,8 @@ pub(crate) struct Context<'a> {
     pub shapes: Vec<Candidate>,
     /// A level shift of each reading ([`ct_model::effects::level_shifts`]), which no search adds.
     pub level_shifts: Vec<Candidate>,
+    /// For each candidate the first one with a collinear sensitivity ([`Context::ties`]); empty where they are not known.
+    pub ties: Vec<usize>,
     pub limit: Limit<'a>,
     pub thresholds: Thresholds,
 }
@@ -222,8 +224,11 @@ impl Context<'_> {
     }
 
     /// Whether a candidate may be added to a set: a candidate that repeats another one only in addition to it, because alone the two are
-    /// equal.
+    /// equal; a candidate with the sensitivity of one of the set never.
     pub fn may_stand_beside(&self, candidate: usize, added: &[usize]) -> bool {
+        if self.is_tied_to_one_of(candidate, added) {
+            return false;
+        }
         let repeated = self.candidates[candidate].repeats.as_ref();
         repeated.is_none_or(|id| added.iter().any(|&i| self.candidates[i].id == *id))
     }

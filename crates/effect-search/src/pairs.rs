@@ -32,22 +32,15 @@ pub(crate) fn joint_scores(
         return Vec::new();
     };
     let weights = &base.fit.weights;
-    let samples = context.samples() as usize;
-    let every = (samples * 3 * trials.len()).div_ceil(MOST_VALUES).max(1);
+    let every = every_nth(context, 3 * trials.len());
     let Some(believed) = whitened(&own, (0..own.columns).collect(), noise, weights, every) else {
         return Vec::new();
     };
     let p = believed.ncols() - 1;
     let basis = basis_of(&believed.columns(0, p).into_owned());
-    let project = |column: &mut DVector<f64>| {
-        for unit in basis.column_iter() {
-            let along = unit.dot(column);
-            column.axpy(-along, &unit, 1.0);
-        }
-    };
     let residual = believed.column(p).into_owned();
     let mut left = residual.clone();
-    project(&mut left);
+    project(&basis, &mut left);
     let columns: Vec<Vec<DVector<f64>>> = trials
         .par_iter()
         .map(|trial| {
@@ -55,8 +48,8 @@ pub(crate) fn joint_scores(
             let mut columns = columns.unwrap_or_default();
             columns.retain_mut(|column| {
                 let before = column.norm();
-                project(column);
-                project(column);
+                project(&basis, column);
+                project(&basis, column);
                 let after = column.norm();
                 if after > NOTHING * before && after.is_finite() && after > 0.0 {
                     *column /= after;
@@ -97,7 +90,8 @@ pub(crate) fn joint_scores(
             (fall - chosen.len() as f64 * rows.ln(), a, b)
         })
         .filter(|&(_, a, b)| {
-            !columns[a].is_empty() && !columns[b].is_empty() && single[a].is_finite()
+            let tied = context.is_tied_to_one_of(trials[a].candidate, &[trials[b].candidate]);
+            !tied && !columns[a].is_empty() && !columns[b].is_empty() && single[a].is_finite()
         })
         .collect();
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -143,8 +137,22 @@ fn columns_of(
     Some(columns)
 }
 
+/// Stride of the rows that keeps this number of columns below [`MOST_VALUES`] in all.
+pub(crate) fn every_nth(context: &Context, columns: usize) -> usize {
+    let values = context.samples() as usize * columns;
+    values.div_ceil(MOST_VALUES).max(1)
+}
+
+/// The part of a column that is orthogonal to orthonormal columns.
+pub(crate) fn project(basis: &DMatrix<f64>, column: &mut DVector<f64>) {
+    for unit in basis.column_iter() {
+        let along = unit.dot(column);
+        column.axpy(-along, &unit, 1.0);
+    }
+}
+
 /// Selected columns of all present rows, whitened and weighted, every n-th column entry.
-fn whitened(
+pub(crate) fn whitened(
     all: &Rows,
     chosen: Vec<usize>,
     noise: &Noise,
@@ -165,7 +173,7 @@ fn whitened(
 }
 
 /// Orthonormal columns that span those of a matrix.
-fn basis_of(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn basis_of(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let mut units: Vec<DVector<f64>> = Vec::new();
     for column in matrix.column_iter() {
         let mut column = column.into_owned();

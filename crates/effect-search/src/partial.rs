@@ -16,6 +16,7 @@
 //!
 //! A larger set is taken where each further effect leaves at most a half of what a smaller set leaves.
 
+use ct_model::effects::EffectParameter;
 use ct_signals::{ArModel, Record};
 use estimation::{Fit, Noise, fit_from, prewhitened};
 use rayon::prelude::*;
@@ -142,16 +143,21 @@ impl Context<'_> {
         all / independent.max(f64::MIN_POSITIVE)
     }
 
-    /// Whether a parameter of these effects is at a bound.
+    /// Whether a parameter of these effects is at a bound that is not one of its starts: such a bound is a value like others, as that all
+    /// of a spill reaches the next tank.
     fn at_a_bound(&self, node: &Node, effects: &[usize]) -> bool {
         let errors = node.fit.std_errors();
-        let parameters = effects.iter().flat_map(|&i| {
-            let fitted = self.candidates[i].parameters.iter();
-            fitted.filter(|p| p.role != ct_model::effects::Role::Choice)
+        let fitted = effects.iter().flat_map(|&i| {
+            let own = self.candidates[i].parameters.iter();
+            own.filter(|p| p.role != ct_model::effects::Role::Choice)
         });
-        let names: Vec<&String> = parameters.map(|p| &p.name).collect();
-        let mut all = node.spec().parameters.iter().zip(errors);
-        all.any(|(parameter, error)| error.is_none() && names.contains(&&parameter.about.name))
+        let fitted: Vec<&EffectParameter> = fitted.collect();
+        let values = node.fit.x.iter().zip(errors);
+        let mut all = node.spec().parameters.iter().zip(values);
+        all.any(|(parameter, (value, error))| {
+            let mut own = fitted.iter().filter(|p| p.name == parameter.about.name);
+            error.is_none() && own.any(|p| !p.starts.contains(value))
+        })
     }
 
     /// The part of the mean squared error that a set explains on parts of the records that it was not fitted to: a quarter of each record

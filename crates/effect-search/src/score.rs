@@ -228,15 +228,14 @@ impl Context<'_> {
                 stepped[at] = within(stepped[at] + d, setup.bounds()[at]);
             }
             // A size outside its bound explains nothing.
-            let forbidden = smooth
-                && candidate
-                    .parameters
-                    .iter()
-                    .zip(&places)
-                    .any(|(own, place)| {
-                        let stays = |at: usize| stepped[at] == own.absent;
-                        own.role == Role::Size && place.is_some_and(stays)
-                    });
+            let forbidden = candidate
+                .parameters
+                .iter()
+                .zip(&places)
+                .any(|(own, place)| {
+                    let stays = |at: usize| x[at] == own.absent && stepped[at] == own.absent;
+                    matches!(own.role, Role::Size | Role::Threshold) && place.is_some_and(stays)
+                });
             let predicted = if forbidden {
                 triangle.cost()
             } else {

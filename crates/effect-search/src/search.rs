@@ -145,7 +145,7 @@ impl Context<'_> {
     pub fn grow_on(&self, grown: Grown, noise: &Noise, max_effects: usize) -> Result<Grown, Error> {
         let Grown {
             base,
-            singles,
+            mut singles,
             mut best,
             among,
             mut beam,
@@ -156,14 +156,14 @@ impl Context<'_> {
         let mut size = first_size.max(best.added.len());
         loop {
             beam = best_first(beam);
-            beam.truncate(self.thresholds.beam);
+            self.converge(&mut beam, [&mut fitted, &mut singles], noise);
+            beam = best_first(beam);
             let Some(first) = beam.first() else { break };
             let gain = first.gain_over(&best);
             if gain > 0.0 {
                 best = first.clone();
             }
-            let longer = beam.iter().any(|node| node.added.len() >= size);
-            if gain < self.thresholds.growth_margin && longer && size > first_size
+            if gain < self.thresholds.growth_margin && size > first_size
                 || size >= base.added.len() + max_effects
             {
                 break;
@@ -174,10 +174,11 @@ impl Context<'_> {
             }
             size += 1;
             let enough = self.thresholds.beam_share * beam[0].gain_over(&base);
+            beam.retain(|node| node.gain_over(&base) >= enough);
+            beam = self.distinct(beam, noise);
             let parents: Vec<Node> = beam
                 .iter()
                 .filter(|node| node.added.len() < base.added.len() + max_effects)
-                .filter(|node| node.gain_over(&base) >= enough)
                 .cloned()
                 .collect();
             for parent in &parents {
@@ -192,14 +193,17 @@ impl Context<'_> {
                     .take(self.thresholds.refits)
                     .collect();
                 for child in self.refits(parent, &best, noise) {
-                    let same = |known: &Node| same_set(known, &child);
-                    if !beam.iter().any(same) {
-                        fitted.push(child.clone());
-                        beam.push(child);
+                    match fitted.iter_mut().find(|known| same_set(known, &child)) {
+                        Some(known) if known.fit.cost <= child.fit.cost => continue,
+                        Some(known) => *known = child.clone(),
+                        None => fitted.push(child.clone()),
                     }
+                    beam.retain(|known| !same_set(known, &child));
+                    beam.push(child);
                 }
             }
         }
+        sort_by_criterion(&mut singles);
         best = self.refitted(&best, noise, FINE)?;
         Ok(Grown {
             base,
@@ -210,6 +214,65 @@ impl Context<'_> {
             fitted,
             cut_short,
         })
+    }
+
+    /// Fits the best sets to convergence. Along a valley of the cost a rough fit ends far from its minimum, because the linearised model
+    /// predicts a small reduction there. `lists`: further copies of the same sets.
+    fn converge(&self, sets: &mut [Node], lists: [&mut Vec<Node>; 2], noise: &Noise) {
+        let best = sets.len().min(self.thresholds.converged);
+        sets[..best].par_iter_mut().for_each(|set| {
+            if self.limit.passed() {
+                return;
+            }
+            if let Ok(converged) = self.refitted(set, noise, FINE)
+                && converged.fit.cost < set.fit.cost
+            {
+                *set = converged;
+            }
+        });
+        for copy in lists.into_iter().flatten() {
+            let set = sets[..best].iter().find(|set| same_set(copy, set));
+            if let Some(set) = set.filter(|set| set.fit.cost < copy.fit.cost) {
+                *copy = set.clone();
+            }
+        }
+    }
+
+    /// The sets that are extended, at most as many as the beam is wide: sets, best first, without those that differ little from a better
+    /// set with as many effects. Two such sets, with a dead zone and with a constant flow, say, have similar extensions, and would fill the
+    /// beam. The difference of two sets is that of their whitened residuals.
+    fn distinct(&self, sets: Vec<Node>, noise: &Noise) -> Vec<Node> {
+        let residual = |set: &Node| -> Option<Vec<f64>> {
+            let series = estimation::residuals(&self.setup(&set.model).ok()?, &set.fit.x)?;
+            let weights = &set.fit.weights;
+            let weighted = |(i, series): (usize, Vec<f64>)| {
+                let weight = weights[i % weights.len()];
+                let present = move |e: f64| if e.is_nan() { 0.0 } else { weight * e };
+                series.into_iter().map(present)
+            };
+            let whitened = noise.whiten(&series).into_iter().enumerate();
+            Some(whitened.flat_map(weighted).collect())
+        };
+        let residuals: Vec<Option<Vec<f64>>> = sets.par_iter().map(residual).collect();
+        let squares = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+        let mut chosen: Vec<(Node, Option<Vec<f64>>)> = Vec::new();
+        for (set, own) in sets.into_iter().zip(residuals) {
+            if chosen.len() >= self.thresholds.beam {
+                break;
+            }
+            let is_same = |(other, of_other): &(Node, Option<Vec<f64>>)| {
+                let (Some(own), Some(of_other)) = (&own, of_other) else {
+                    return false;
+                };
+                let apart: Vec<f64> = own.iter().zip(of_other).map(|(a, b)| a - b).collect();
+                other.added.len() == set.added.len()
+                    && squares(&apart) < self.thresholds.same_residual.powi(2) * squares(of_other)
+            };
+            if !chosen.iter().any(is_same) {
+                chosen.push((set, own));
+            }
+        }
+        chosen.into_iter().map(|(set, _)| set).collect()
     }
 
     /// Whether a candidate might lower the criterion.

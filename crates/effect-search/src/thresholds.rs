@@ -62,6 +62,11 @@ pub struct Thresholds {
     pub kept_candidates: usize,
     /// Beam width: number of sets that are extended in parallel (1 or more). Chosen, for time.
     pub beam: usize,
+    /// Number of best sets that are fitted to convergence before they are compared (1 or more). Chosen, for time.
+    pub converged: usize,
+    /// Of two sets with as many effects only the better one is extended if the norm of the difference of their whitened residuals is below
+    /// this share of the norm of the better one's (0 to 1). Chosen.
+    pub same_residual: f64,
     /// A set of the beam is extended if its fall of the criterion is at least this share of the best set's fall (0 to 1). Chosen.
     pub beam_share: f64,
     /// Number of candidates, those with the best scores, that are fitted in addition to a set (1 or more). Chosen, for time.
@@ -190,6 +195,8 @@ impl Thresholds {
         pair_refits: 8,
         kept_candidates: 40,
         beam: 4,
+        converged: 6,
+        same_residual: 0.15,
         beam_share: 0.6,
         refits: 8,
         fall_factor: 2.0,

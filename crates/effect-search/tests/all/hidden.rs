@@ -39,6 +39,62 @@ fn lagging() -> String {
         .replace("end Block", "  25*der(s) = T - s;\nend Block")
 }
 
+/// A linear model with an offset: a command that is always above the dead zone would only shift the offset.
+#[test]
+fn a_dead_zone_within_the_commands_of_a_linear_model_is_named() {
+    let linear = |right: &str| {
+        format!(
+            "model Linear
+               parameter Real K = 0.8;
+               parameter Real tau(min=1) = 80;
+               parameter Real c = 1;
+               input Real u;
+               output Real y = x;
+               Real x(start=20);
+             equation
+               tau*der(x) = {right} - x;
+             end Linear;"
+        )
+    };
+    let mut record = record(&linear("c + K*max(u + 8 - 20, 0)"), 0.0, 0.1, 3);
+    for u in &mut record.inputs[0].values {
+        *u += 8.0;
+    }
+    let diagnosis = found(&problem(&linear("c + K*u"), record));
+    assert!(names(&diagnosis, "dead_zone(u)"), "{:?}", diagnosis.groups);
+    let last = diagnosis.steps.last().unwrap();
+    let effect = |id: &str| diagnosis.effects == [id];
+    // At a lower limit of the command the model is the same with another offset.
+    let name = if effect("dead_zone(u)") {
+        "dead_zone_u_threshold"
+    } else {
+        assert!(effect("saturation(u)"), "{:?}", diagnosis.effects);
+        "saturation_u_limit"
+    };
+    let threshold = last.parameters.iter().find(|p| p.name == name).unwrap();
+    assert!((threshold.value - 20.0).abs() < 0.5, "{}", threshold.value);
+}
+
+/// Two drifts of one gain are a drift with a curvature: one of them is named, and no record shows which.
+#[test]
+fn the_drift_of_a_gain_is_named_once() {
+    let drifts = ["gain_drift(u)", "drift(g)"];
+    let both = |group: &Vec<String>| drifts.iter().all(|id| group.iter().any(|i| i == id));
+    let factor = "(1 + 0.3*time/2500 + 0.06*(time/2500)^2)";
+    let hidden = block(&format!("g*{factor}*u - k*(T - Ta)"));
+    let record = record(&hidden, 0.0, 0.3, 9);
+    let diagnosis = found(&problem(BLOCK, record.clone()));
+    assert!(both(&diagnosis.groups[0]), "{:?}", diagnosis.groups);
+    let named = |id: &&str| diagnosis.effects.iter().any(|effect| effect == id);
+    assert_eq!(drifts.iter().filter(|id| named(id)).count(), 1);
+    // Nor is it added to a model that has it under the other name.
+    let mut listed = problem(BLOCK, record);
+    listed.effects = vec![drifts[0].to_string()];
+    let again = found(&listed);
+    let ids = again.groups.iter().flatten().chain(&again.effects);
+    assert!(ids.clone().all(|id| id != drifts[1]), "{:?}", again.groups);
+}
+
 #[test]
 fn what_is_hidden_is_named() {
     let lagging = lagging();

@@ -1,0 +1,108 @@
+//! Candidates with collinear sensitivities: the drift of an input's gain and the drift of the parameter that the input is multiplied by.
+//!
+//! Each of two such candidates explains what the other one explains, to first order. Together they explain their second-order difference at
+//! most, such as a drift with a curvature, and no record shows which of them is which: a set has one of them, the group of this effect
+//! names both. The sensitivities are those of the model without effects, projected off those of its parameters.
+
+use std::sync::Arc;
+
+use ct_model::effects::Role;
+use estimation::{Noise, rows};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::node::{Context, Node};
+use crate::pairs::{basis_of, every_nth, project, whitened};
+
+/// Two columns are collinear if the sine of the angle between them is below this: derivatives are exact up to the tolerance of the simulation.
+const SAME_DIRECTION: f64 = 1e-4;
+/// A column of which the believed parameters explain all but this share has no direction of its own.
+const NOTHING: f64 = 1e-3;
+
+impl Context<'_> {
+    /// For each candidate, the first one with a collinear sensitivity: itself if there is none. `bare`: the model without effects.
+    pub fn ties(&self, bare: &Node) -> Vec<usize> {
+        let mut first: Vec<usize> = (0..self.candidates.len()).collect();
+        let every = every_nth(self, self.candidates.len());
+        let Some(believed) = self.sensitivities(bare, every) else {
+            return first;
+        };
+        let basis = basis_of(&believed);
+        let directions: Vec<Option<DVector<f64>>> = first
+            .par_iter()
+            .map(|&i| {
+                if self.limit.passed() {
+                    return None;
+                }
+                let column = self.direction(bare, i, every)?;
+                // No prior depends on an effect.
+                let mut column = column.resize_vertically(believed.nrows(), 0.0);
+                let before = column.norm();
+                project(&basis, &mut column);
+                project(&basis, &mut column);
+                let after = column.norm();
+                (after > NOTHING * before).then(|| column / after)
+            })
+            .collect();
+        let same = |a: usize, b: usize| match (&directions[a], &directions[b]) {
+            (Some(a), Some(b)) => 1.0 - a.dot(b).powi(2) < SAME_DIRECTION.powi(2),
+            _ => false,
+        };
+        for i in 0..first.len() {
+            first[i] = (0..i).find(|&j| first[j] == j && same(j, i)).unwrap_or(i);
+        }
+        first
+    }
+
+    /// Sensitivities of the outputs to the parameters of a set that are not at a bound, and below them the rows of the priors; `None` if it
+    /// has no such parameter.
+    fn sensitivities(&self, set: &Node, every: usize) -> Option<DMatrix<f64>> {
+        let interior = set.fit.interior().to_vec();
+        if interior.is_empty() {
+            return None;
+        }
+        let all = rows(&self.setup(&set.model).ok()?, &set.fit.x)?;
+        let mut priors = Vec::new();
+        all.each_prior(&interior, set.fit.prior_weight(), |row| {
+            priors.extend_from_slice(row);
+        });
+        let white = Noise::white(set.spec().outputs.len());
+        let columns = interior.len();
+        let of_samples = whitened(&all, interior, &white, &set.fit.weights, every)?;
+        let of_priors = DMatrix::from_row_slice(priors.len() / columns, columns, &priors);
+        let rows = of_samples.nrows() + of_priors.nrows();
+        let mut both = of_samples.resize_vertically(rows, 0.0);
+        let first = rows - of_priors.nrows();
+        both.rows_mut(first, of_priors.nrows())
+            .copy_from(&of_priors);
+        Some(both)
+    }
+
+    /// Sensitivity of the outputs to the size of a candidate where it is absent; `None` for a candidate with more than one parameter.
+    fn direction(&self, bare: &Node, i: usize, every: usize) -> Option<DVector<f64>> {
+        let [own] = &self.candidates[i].parameters[..] else {
+            return None;
+        };
+        if own.role != Role::Size {
+            return None;
+        }
+        let model = Arc::new(self.model(&[i]).ok()?);
+        let setup = self.setup(&model).ok()?;
+        let mut x = self.transfer(bare, &model, setup.start());
+        let mut parameters = model.spec().parameters.iter();
+        let at = parameters.position(|p| p.about.name == own.name)?;
+        x[at] = own.absent;
+        let all = rows(&setup.with_free(&[at]), &x)?;
+        let white = Noise::white(bare.spec().outputs.len());
+        let matrix = whitened(&all, vec![0], &white, &bare.fit.weights, every)?;
+        Some(matrix.column(0).into_owned())
+    }
+
+    /// Whether a set has another candidate with the same sensitivity.
+    pub fn is_tied_to_one_of(&self, candidate: usize, added: &[usize]) -> bool {
+        let tie = |i: usize| self.ties.get(i).copied().unwrap_or(i);
+        added
+            .iter()
+            .any(|&i| i != candidate && tie(i) == tie(candidate))
+    }
+}

@@ -204,7 +204,9 @@ impl Context<'_> {
             }
         }
         sort_by_criterion(&mut singles);
-        best = self.refitted(&best, noise, FINE)?;
+        let all = fitted.iter().chain([&best]);
+        let least = all.min_by(|a, b| self.with_margin(a).total_cmp(&self.with_margin(b)));
+        best = self.refitted(least.unwrap_or(&best), noise, FINE)?;
         Ok(Grown {
             base,
             singles,
@@ -214,6 +216,12 @@ impl Context<'_> {
             fitted,
             cut_short,
         })
+    }
+
+    /// The criterion, with the margin of the acceptance test for each effect. A pair must be better by this margin than every single effect,
+    /// not only than its own two: a parameter that depends on two temperatures fits as well as radiation does.
+    fn with_margin(&self, set: &Node) -> f64 {
+        set.fit.bic() + self.thresholds.bic_margin * set.added.len() as f64
     }
 
     /// Fits the best sets to convergence. Along a valley of the cost a rough fit ends far from its minimum, because the linearised model

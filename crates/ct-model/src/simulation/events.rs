@@ -39,6 +39,33 @@ impl<T: Scalar> SimulationState<T> {
         found
     }
 
+    /// The error of a step within which an equation has no value, if it has values at both ends and no branch changes: intermediate values
+    /// may lie beyond a limit, such as those of a level that rises from zero with a slope of zero. The step is computed.
+    pub(super) fn across(
+        &mut self,
+        tape: &Tape,
+        interval: Interval<'_>,
+        h: T,
+        delays: &Delays<T>,
+    ) -> Option<f64> {
+        self.work.registers.extended = true;
+        self.work.begun = false;
+        let error = self.attempt(tape, interval, h, delays);
+        let stays = error.is_finite() && self.first_event(tape, interval, h, delays).is_none();
+        self.work.registers.extended = false;
+        self.work.begun = false;
+        if !stays {
+            return None;
+        }
+        let next = self.work.next.clone();
+        let drive = Drive::new(interval, delays);
+        drive.load(tape, &mut self.work, self.time + h, &next);
+        self.work.evaluate_slopes(tape, &drive);
+        let slopes = tape.derivatives.iter();
+        let mut slopes = slopes.map(|&register| self.work.registers.values[register].value());
+        slopes.all(f64::is_finite).then_some(error)
+    }
+
     /// Switches branches at the end of a step that ends at an event; the registers hold the inputs and states at that time.
     pub(super) fn change(&mut self, tape: &Tape, drive: &Drive<'_, T>, change: Change) {
         let Step {

@@ -170,6 +170,11 @@ impl<T: Scalar> SimulationState<T> {
             let mut beyond = None;
             if error.is_nan() {
                 beyond = self.branch_before(tape, interval, h, delays);
+                if beyond.is_none()
+                    && let Some(across) = self.across(tape, interval, h, delays)
+                {
+                    error = across;
+                }
             }
             if let Some((event, error_there)) = &beyond {
                 (h, error) = (event.after, *error_there);

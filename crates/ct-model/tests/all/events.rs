@@ -2,7 +2,7 @@
 
 use ct_model::{Dual, Method, Model, ModelSpec, Scalar};
 
-use crate::support::{Case, check_outside};
+use crate::support::{Case, check_outside, model};
 
 /// A mass on a spring, swinging, with a force that has branches, and a store that takes it up. A force that jumps does so by the place:
 /// nothing slides.
@@ -79,6 +79,54 @@ fn branches_that_come_again() {
         let alone = &simulated(&[*w])[0];
         let apart = together[i].iter().zip(alone).map(|(a, b)| (a - b).abs());
         assert!(apart.fold(0.0, f64::max) < 1e-8, "{w}");
+    }
+}
+
+/// Two tanks that have run empty fill again: the lower level rises from zero with a slope of zero.
+#[test]
+fn empty_tanks_fill_again() {
+    let text = "model Tanks
+       input Real u;
+       output Real a(start=1);
+       output Real b(start=1);
+       Real q;
+     equation
+       q = sqrt(max(a, 0));
+       der(a) = u - q;
+       der(b) = q - sqrt(max(b, 0));
+     end Tanks;";
+    let model = model(text);
+    let inputs: Vec<f64> = (0..60).map(|k| f64::from(u8::from(k >= 20))).collect();
+    let simulated = model.simulate(&[], 0.5, &[&inputs]).unwrap();
+    for level in &simulated {
+        assert!(level[20].abs() < 1e-9, "{}", level[20]);
+        assert!(level.iter().all(|h| *h > -1e-9));
+    }
+    // A fine reference from the moment that the inflow begins.
+    let (mut a, mut b) = (0.0_f64, 0.0_f64);
+    let parts = 200_000;
+    let step = 0.5 / f64::from(parts);
+    for k in 21..60 {
+        for _ in 0..parts {
+            // The midpoint rule.
+            let slopes = |a: f64, b: f64| {
+                let q = a.max(0.0).sqrt();
+                (1.0 - q, q - b.max(0.0).sqrt())
+            };
+            let (da, db) = slopes(a, b);
+            let (da, db) = slopes(a + 0.5 * step * da, b + 0.5 * step * db);
+            (a, b) = (a + step * da, b + step * db);
+        }
+        assert!(
+            (simulated[0][k] - a).abs() < 1e-6,
+            "{k}: {} {a}",
+            simulated[0][k]
+        );
+        assert!(
+            (simulated[1][k] - b).abs() < 1e-6,
+            "{k}: {} {b}",
+            simulated[1][k]
+        );
     }
 }
 

@@ -287,9 +287,17 @@ impl Context<'_> {
             .collect();
         let choice =
             |place: &Place| -> Vec<f64> { choices.iter().map(|&at| place.x[at]).collect() };
+        // A start at which the effect is absent comes in addition to those at which it is present.
+        let is_absent = |place: &Place| {
+            let own = candidate.parameters.iter().zip(&places);
+            let mut thresholds = own.filter(|(own, _)| own.role == Role::Threshold);
+            thresholds.any(|(own, at)| at.is_some_and(|at| place.x[at] == own.absent))
+        };
+        let further = usize::from(scored.iter().any(is_absent));
         if !smooth {
             // The presence of the effect changes the derivatives of the other parameters.
-            scored = best_of_each_choice(scored, choice, self.thresholds.linearised_starts);
+            let most = self.thresholds.linearised_starts + further;
+            scored = best_of_each_choice(scored, choice, most);
             scored = scored
                 .into_iter()
                 .filter_map(|Place { x, .. }| {
@@ -310,7 +318,7 @@ impl Context<'_> {
         let kept = if smooth && scored.len() == 1 {
             1
         } else {
-            self.thresholds.kept_starts
+            self.thresholds.kept_starts + further
         };
         let cost = |x: &[f64]| {
             let squares = estimation::squares(&setup, x, noise);

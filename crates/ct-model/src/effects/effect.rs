@@ -61,7 +61,7 @@ pub enum Starts {
     /// Quantiles of the signal, or the same shares of its range if no quantiles are known; of a signal with few levels, values between
     /// them ([`super::Span::thresholds`]).
     Quantiles(&'static [f64]),
-    /// Half the smallest magnitude of the signal that is not zero, and quantiles of these magnitudes ([`super::Span::thresholds`]).
+    /// Zero, half the smallest magnitude of the signal that is not zero, and quantiles of these magnitudes ([`super::Span::thresholds`]).
     Magnitudes(&'static [f64]),
     /// Shares of the width of the signal's range.
     Widths(&'static [f64]),

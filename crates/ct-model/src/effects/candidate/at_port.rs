@@ -167,7 +167,7 @@ pub(super) fn values(starts: Starts, span: &Span, visited: &Visited, balance: f6
         Starts::Quantiles(all) => return span.thresholds(all),
         Starts::Magnitudes(all) => {
             let magnitudes = span.magnitudes();
-            let mut places = vec![0.5 * magnitudes.low];
+            let mut places = vec![0.0, 0.5 * magnitudes.low];
             places.extend(magnitudes.thresholds(all));
             return places;
         }

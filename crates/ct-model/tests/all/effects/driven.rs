@@ -163,7 +163,7 @@ pub(super) fn active(candidate: &Candidate) -> Vec<f64> {
         let start = match p.role {
             Role::Size => p.starts[0],
             // A larger dead zone empties both tanks.
-            Role::Threshold if p.short == "threshold" => p.starts[0],
+            Role::Threshold if p.short == "threshold" => p.starts[1],
             // Stiction has tests of its own.
             Role::Choice if p.short == "jump" => p.starts[0],
             _ => p.starts[p.starts.len() / 2],

@@ -15,55 +15,40 @@ const SPEED: f64 = 1e-4;
 
 impl<T: Scalar> SimulationState<T> {
     /// For a step within which an equation has no value: the branch change before that point, for example of `sqrt(max(x, 0))` at zero, and
-    /// the error of the step up to it. That step is the last one computed.
+    /// the error of the step up to it. Without a branch change it is the whole step, if the equations have values at its end: intermediate
+    /// values may lie beyond a limit, such as those of a level that rises from zero with a slope of zero. That step is the last one computed.
     pub(super) fn branch_before(
         &mut self,
         tape: &Tape,
         interval: Interval<'_>,
         h: T,
         delays: &Delays<T>,
-    ) -> Option<(Event<T>, f64)> {
+    ) -> Option<(Option<Event<T>>, f64)> {
         self.work.registers.extended = true;
         self.work.begun = false;
-        let error = self.attempt(tape, interval, h, delays);
-        let event = error
-            .is_finite()
+        let mut error = self.attempt(tape, interval, h, delays);
+        let is_finite = error.is_finite();
+        let event = is_finite
             .then(|| self.first_event(tape, interval, h, delays))
             .flatten();
-        let found = event.map(|event| {
-            let error = self.attempt(tape, interval, event.after, delays);
-            (event, error)
-        });
+        if let Some(event) = &event {
+            error = self.attempt(tape, interval, event.after, delays);
+        }
         self.work.registers.extended = false;
         self.work.begun = false;
-        found
+        let is_valid = is_finite
+            && (event.is_some() || self.ends_with_values(tape, &Drive::new(interval, delays), h));
+        is_valid.then_some((event, error))
     }
 
-    /// The error of a step within which an equation has no value, if it has values at both ends and no branch changes: intermediate values
-    /// may lie beyond a limit, such as those of a level that rises from zero with a slope of zero. The step is computed.
-    pub(super) fn across(
-        &mut self,
-        tape: &Tape,
-        interval: Interval<'_>,
-        h: T,
-        delays: &Delays<T>,
-    ) -> Option<f64> {
-        self.work.registers.extended = true;
-        self.work.begun = false;
-        let error = self.attempt(tape, interval, h, delays);
-        let stays = error.is_finite() && self.first_event(tape, interval, h, delays).is_none();
-        self.work.registers.extended = false;
-        self.work.begun = false;
-        if !stays {
-            return None;
-        }
+    /// Whether the slopes at the end of the last step are finite.
+    fn ends_with_values(&mut self, tape: &Tape, drive: &Drive<'_, T>, h: T) -> bool {
         let next = self.work.next.clone();
-        let drive = Drive::new(interval, delays);
         drive.load(tape, &mut self.work, self.time + h, &next);
-        self.work.evaluate_slopes(tape, &drive);
-        let slopes = tape.derivatives.iter();
-        let mut slopes = slopes.map(|&register| self.work.registers.values[register].value());
-        slopes.all(f64::is_finite).then_some(error)
+        self.work.evaluate_slopes(tape, drive);
+        let values = &self.work.registers.values;
+        let mut slopes = tape.derivatives.iter().map(|&i| values[i].value());
+        slopes.all(f64::is_finite)
     }
 
     /// Switches branches at the end of a step that ends at an event; the registers hold the inputs and states at that time.

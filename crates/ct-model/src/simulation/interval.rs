@@ -169,15 +169,12 @@ impl<T: Scalar> SimulationState<T> {
             let mut error = self.attempt(tape, interval, h, delays);
             let mut beyond = None;
             if error.is_nan() {
-                beyond = self.branch_before(tape, interval, h, delays);
-                if beyond.is_none()
-                    && let Some(across) = self.across(tape, interval, h, delays)
-                {
-                    error = across;
+                let found = self.branch_before(tape, interval, h, delays);
+                if let Some((event, error_there)) = found {
+                    h = event.as_ref().map_or(h, |event| event.after);
+                    error = error_there;
+                    beyond = event;
                 }
-            }
-            if let Some((event, error_there)) = &beyond {
-                (h, error) = (event.after, *error_there);
             }
             if (error > 1.0 || error.is_nan()) && h.value() > shortest {
                 // A NaN error asks for a much shorter step.
@@ -193,10 +190,7 @@ impl<T: Scalar> SimulationState<T> {
                 return Err(NoSolution { time: now });
             }
             let is_new = beyond.is_none();
-            let event = match beyond {
-                Some((event, _)) => Some(event),
-                None => self.first_event(tape, interval, h, delays),
-            };
+            let event = beyond.or_else(|| self.first_event(tape, interval, h, delays));
             let is_short = !whole || error > 0.5 || self.length < h.value() * LONGER;
             if event.is_none() && is_short {
                 let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, LONGER);

@@ -11,7 +11,7 @@ use serde::Deserialize;
 pub enum EffortLevel {
     /// 5 s
     Quick,
-    /// 20 s; 40 s for a model of your own
+    /// 40 s
     #[default]
     Normal,
     /// 10 min
@@ -28,18 +28,9 @@ impl EffortLevel {
             Self::Thorough => Duration::from_secs(600),
         }
     }
-
-    /// Time limit for a user's own model, which is simulated in small steps and has more candidates.
-    #[must_use]
-    pub fn limit_of_own_model(self) -> Duration {
-        match self {
-            Self::Normal => 2 * self.limit(),
-            other => other.limit(),
-        }
-    }
 }
 
-/// A limit in words: `20 s`, `10 min`.
+/// A limit in words: `40 s`, `10 min`.
 pub(crate) fn limit_text(seconds: f64) -> String {
     if seconds >= 120.0 {
         format!("{:.0} min", seconds / 60.0)
@@ -61,15 +52,7 @@ mod tests {
         for (level, limit) in EffortLevel::value_variants().iter().zip(limits) {
             let value = level.to_possible_value().expect("none is skipped");
             let help = value.get_help().map(ToString::to_string);
-            let mut said = limit_text(limit.as_secs_f64());
-            let own = level.limit_of_own_model();
-            if own != limit {
-                said += &format!(
-                    "; {} for a model of your own",
-                    limit_text(own.as_secs_f64())
-                );
-            }
-            assert_eq!(help, Some(said));
+            assert_eq!(help, Some(limit_text(limit.as_secs_f64())));
         }
     }
 }

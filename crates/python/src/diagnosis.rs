@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use ctid::effort::EffortLevel;
 use ctid::own_model::{Records, design, diagnosed_page};
 use effect_search::Failures;
 use effect_search::Options;
@@ -139,7 +138,7 @@ impl Diagnosis {
         time_limit: Option<f64>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(String, f64)> {
-        let limit = crate::fit::limit(effort, time_limit, EffortLevel::limit_of_own_model)?;
+        let limit = crate::fit::limit(effort, time_limit)?;
         let limits = Limits {
             inputs,
             ranges,

@@ -6,7 +6,6 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 use ct_signals::ReadOptions;
-use ctid::effort::EffortLevel;
 use ctid::own_model::{Comparison, Document, FitLimit, FittedModel, compared_page, diagnose};
 use effect_search::Options;
 use greybox::FitOptions;
@@ -286,7 +285,7 @@ impl Fit {
         seed: u64,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Diagnosis> {
-        let limit = limit(effort, time_limit, EffortLevel::limit_of_own_model)?;
+        let limit = limit(effort, time_limit)?;
         let mut frames = self.frames.to_vec();
         let fitted = frames.len();
         frames.extend(contents(&test));

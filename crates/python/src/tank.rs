@@ -310,7 +310,7 @@ impl TankFit {
         seed: u64,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
-        let limit = crate::fit::limit(effort, time_limit, EffortLevel::limit)?;
+        let limit = crate::fit::limit(effort, time_limit)?;
         let mut frames = self.frames[..self.fitted].to_vec();
         frames.extend(contents(&test));
         work::run(py, progress.as_ref(), |stop, phases| {

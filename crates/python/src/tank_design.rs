@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use ctid::effort::EffortLevel;
 use ctid::output::Written;
 use missing_effect::design::{Limits, design};
 use pyo3::prelude::*;
@@ -27,7 +26,7 @@ pub fn tank_design(
     time_limit: Option<f64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
-    let limit = crate::fit::limit(effort, time_limit, EffortLevel::limit)?;
+    let limit = crate::fit::limit(effort, time_limit)?;
     let limits = Limits {
         range,
         slew,

@@ -3,7 +3,7 @@
 use super::delays::{Delays, POINTS};
 use super::events::Event;
 use super::step::{Drive, Interval};
-use super::{Method, NoSolution, SimulationState, explicit, implicit};
+use super::{Method, NoSolution, SimulationState, explicit, implicit, order_four};
 use crate::scalar::Scalar;
 use crate::tape::Tape;
 
@@ -22,6 +22,10 @@ pub(super) const MOST_STEPS: usize = 50_000;
 const STEPS_PER_INTERVAL: usize = 300;
 /// If an interval has more steps than this, the model is tested for stiffness.
 const MANY_STEPS: usize = 40;
+/// The least tolerance for steps of order four.
+const LEAST_FOR_ORDER_FOUR: f64 = 1e-8;
+/// The most steps of order five before order four is attempted again.
+const MOST_OF_ORDER_FIVE: u32 = 64;
 /// The model is stiff if the step length times the norm of the Jacobian is above this: stability, not accuracy, then limits the steps.
 const STABILITY: f64 = 1.5;
 
@@ -166,7 +170,16 @@ impl<T: Scalar> SimulationState<T> {
             }
             let whole = limit.value() <= longest * STRETCH;
             let mut h = if whole { limit } else { T::constant(longest) };
+            self.order_four = whole && self.may_take_order_four(delays);
             let mut error = self.attempt(tape, interval, h, delays);
+            if self.order_four {
+                let is_accurate = error <= 1.0;
+                self.note_order_four(is_accurate);
+                if !is_accurate {
+                    self.order_four = false;
+                    error = self.attempt(tape, interval, h, delays);
+                }
+            }
             let mut beyond = None;
             if error.is_nan() {
                 let found = self.branch_before(tape, interval, h, delays);
@@ -192,7 +205,7 @@ impl<T: Scalar> SimulationState<T> {
             let is_new = beyond.is_none();
             let event = beyond.or_else(|| self.first_event(tape, interval, h, delays));
             let is_short = !whole || error > 0.5 || self.length < h.value() * LONGER;
-            if event.is_none() && is_short {
+            if event.is_none() && is_short && !self.order_four {
                 let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, LONGER);
                 if !whole || error > 0.5 || grown > self.length {
                     self.length = grown.max(shortest);
@@ -258,6 +271,31 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
+    /// Whether the next step may be one of order four: not with the accuracy of results, nor where the past of a delay is interpolated, which
+    /// needs the stages of order five.
+    fn may_take_order_four(&mut self, delays: &Delays<T>) -> bool {
+        if self.method != Method::Explicit
+            || self.tolerance < LEAST_FOR_ORDER_FOUR
+            || delays.all.iter().any(|delay| !delay.known_ahead)
+        {
+            return false;
+        }
+        let (waiting, _) = &mut self.order_five;
+        *waiting = waiting.saturating_sub(1);
+        *waiting == 0
+    }
+
+    /// After a step of order four that is not accurate enough, more and more steps of order five come before the next attempt.
+    fn note_order_four(&mut self, is_accurate: bool) {
+        let (waiting, after_failure) = &mut self.order_five;
+        if is_accurate {
+            *after_failure = 1;
+        } else {
+            *after_failure = (2 * *after_failure).min(MOST_OF_ORDER_FIVE);
+            *waiting = *after_failure;
+        }
+    }
+
     pub(super) fn note_largest(&mut self) {
         for (largest, x) in self.largest.iter_mut().zip(&self.state) {
             *largest = largest.max(x.value().abs());
@@ -297,6 +335,10 @@ impl<T: Scalar> SimulationState<T> {
                 let scale = (&self.scale[..], self.tolerance);
                 implicit::step(tape, &mut self.work, jacobian, &drive, at, scale)
                     .unwrap_or(f64::NAN)
+            }
+            _ if self.order_four => {
+                order_four::step(tape, &mut self.work, &drive, at);
+                order_four::error(&self.work, h.value(), &self.scale)
             }
             _ => {
                 explicit::step(tape, &mut self.work, &drive, at);

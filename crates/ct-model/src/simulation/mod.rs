@@ -2,8 +2,9 @@
 //!
 //! - Models without delays whose equations are linear in the states are integrated exactly from sample to sample: for held inputs in all
 //!   cases, for linearly interpolated inputs if the equations are linear in the inputs too.
-//! - All other models are integrated by an explicit method of order five with step-size control. If its steps become far shorter than the
-//!   error requires, the model is stiff, and an implicit method of order four continues ([`Method`]).
+//! - All other models are integrated by an explicit method of order five with step-size control, or of order four where the tolerance is
+//!   large and the sampling interval short. If its steps become far shorter than the error requires, the model is stiff, and an implicit
+//!   method of order four continues ([`Method`]).
 //! - Steps end where an input jumps, where a jump leaves a delay, and where a branch changes (`if`, `min`, `max`, `abs`, `sign`). Such a
 //!   time depends on the parameters, and the step length carries its derivative, so that the later states have the derivatives of the exact
 //!   solution.
@@ -19,6 +20,7 @@ mod interval;
 mod memory;
 mod model;
 mod numbers;
+mod order_four;
 mod owners;
 mod sliding;
 mod step;
@@ -42,7 +44,7 @@ use crate::tape::Tape;
 pub enum Method {
     /// Exact steps of a linear model.
     Exact,
-    /// Explicit Runge-Kutta steps of order five (Dormand and Prince).
+    /// Explicit Runge-Kutta steps of order five (Dormand and Prince), or of order four where these are accurate enough.
     Explicit,
     /// Implicit Runge-Kutta steps of order four, for stiff models.
     Implicit,
@@ -80,6 +82,10 @@ pub struct SimulationState<T> {
     steps_left: usize,
     /// Step length that the error of the last step allows.
     length: f64,
+    /// The present step is one of order four.
+    order_four: bool,
+    /// Number of steps of order five before order four is attempted again, now and after the next failure.
+    order_five: (u32, u32),
     rise: Vec<f64>,
     /// The inputs at the end of the last interval.
     last: Vec<f64>,
@@ -137,6 +143,8 @@ impl<T: Scalar> SimulationState<T> {
             largest: initial.iter().map(|x| x.value().abs()).collect(),
             steps_left: MOST_STEPS,
             length: f64::INFINITY,
+            order_four: false,
+            order_five: (0, 1),
             rise: vec![0.0; tape.inputs],
             last: vec![0.0; tape.inputs],
             last_length: 0.0,

@@ -37,6 +37,7 @@ fn case(path: &Path) -> (String, Case) {
         time: rows.iter().map(|row| row[0]).collect(),
         inputs: rows.iter().map(|row| row[1..=count].to_vec()).collect(),
         lines: read("toml").contains("hold = \"first\""),
+        tolerance: ct_model::TOLERANCE,
     };
     (
         path.file_stem().unwrap().to_string_lossy().into_owned(),

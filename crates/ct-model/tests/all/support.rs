@@ -9,6 +9,7 @@ pub struct Case {
     pub time: Vec<f64>,
     pub inputs: Vec<Vec<f64>>,
     pub lines: bool,
+    pub tolerance: f64,
 }
 
 pub fn model(text: &str) -> Model {
@@ -22,6 +23,7 @@ impl Case {
             time: (0..rows).map(|k| step * k as f64).collect(),
             inputs: (0..rows).map(input).collect(),
             lines: false,
+            tolerance: ct_model::TOLERANCE,
         }
     }
 
@@ -31,7 +33,8 @@ impl Case {
         parameters: &[T],
         initial: &[T],
     ) -> (Vec<Vec<T>>, Method) {
-        let mut simulation = Simulation::new(&self.model, parameters, initial, 0.0);
+        let mut simulation =
+            Simulation::new(&self.model, parameters, initial, 0.0).with_tolerance(self.tolerance);
         let mut rows = Vec::new();
         for k in 0..self.time.len() {
             let mut y = vec![T::constant(0.0); self.model.spec().outputs.len()];

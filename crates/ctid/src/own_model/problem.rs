@@ -17,7 +17,7 @@ pub type RecordNumbers = BTreeMap<String, BTreeMap<String, f64>>;
 pub(crate) fn options(seed: u64, effort: EffortLevel) -> Options<'static> {
     Options {
         seed,
-        time_limit: Some(effort.limit_of_own_model()),
+        time_limit: Some(effort.limit()),
         interrupt: Some(interrupt::flag()),
         ..Options::default()
     }

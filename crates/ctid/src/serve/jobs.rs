@@ -187,15 +187,9 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
         },
         begun: Instant::now(),
         limit: match task {
-            Task::Diagnose { effort, .. } => Some(match &work {
-                Input::Plant(_) => effort.limit(),
-                Input::Own(_) => effort.limit_of_own_model(),
-            }),
-            Task::Design { .. } | Task::Compare => match &work {
-                Input::Plant(_) if matches!(task, Task::Compare) => None,
-                Input::Plant(_) => Some(missing_effect::TIME_LIMIT),
-                Input::Own(_) => Some(EffortLevel::default().limit_of_own_model()),
-            },
+            Task::Diagnose { effort, .. } => Some(effort.limit()),
+            Task::Compare if matches!(work, Input::Plant(_)) => None,
+            Task::Design { .. } | Task::Compare => Some(EffortLevel::default().limit()),
             Task::Chain(_) => None,
         },
         stop: stop.clone(),

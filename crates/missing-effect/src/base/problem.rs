@@ -55,7 +55,7 @@ pub struct Options<'a> {
 }
 
 /// Time limit of the interactive program. [`Options::default`] has none, so that results do not depend on the computer.
-pub const TIME_LIMIT: Duration = Duration::from_secs(20);
+pub const TIME_LIMIT: Duration = Duration::from_secs(40);
 
 impl Default for Options<'_> {
     fn default() -> Self {

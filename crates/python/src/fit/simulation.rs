@@ -12,11 +12,7 @@ use std::time::Duration;
 use crate::error;
 
 /// Time limit of a search.
-pub fn limit(
-    effort: &str,
-    seconds: Option<f64>,
-    of: impl Fn(EffortLevel) -> Duration,
-) -> PyResult<Duration> {
+pub fn limit(effort: &str, seconds: Option<f64>) -> PyResult<Duration> {
     let effort = match effort {
         "quick" => EffortLevel::Quick,
         "normal" => EffortLevel::Normal,
@@ -28,7 +24,7 @@ pub fn limit(
         }
     };
     match seconds {
-        None => Ok(of(effort)),
+        None => Ok(effort.limit()),
         Some(seconds) => Duration::try_from_secs_f64(seconds)
             .map_err(|_| error::of_model("time_limit is a number of seconds above zero")),
     }

@@ -262,7 +262,7 @@ impl Work {
 
 fn options(effort: EffortLevel, interrupt: &AtomicBool) -> Options<'_> {
     Options {
-        time_limit: Some(effort.limit_of_own_model()),
+        time_limit: Some(effort.limit()),
         interrupt: Some(interrupt),
         ..Options::default()
     }

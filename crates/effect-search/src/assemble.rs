@@ -21,6 +21,8 @@ pub(crate) struct Finding<'a> {
     /// The believed model.
     pub base: &'a Node,
     pub last: &'a Node,
+    /// Rounding effects of the last model that no search found, but the readings show.
+    pub rounded: Vec<usize>,
     /// The fit that gives the reported noise: the last model with the noise model of its own residual.
     pub own: &'a Fit,
     pub verdict: Verdict,
@@ -42,6 +44,7 @@ pub(crate) fn assemble(
     let Finding {
         base,
         last,
+        rounded,
         own,
         verdict,
         groups,
@@ -101,7 +104,9 @@ pub(crate) fn assemble(
     if verdict == Verdict::Adequate {
         ranked.push("none".to_string());
     }
-    ranked.extend(singles.iter().map(|single| single.effect.clone()));
+    ranked.extend(context.ids(&rounded));
+    let others = singles.iter().map(|single| single.effect.clone());
+    ranked.extend(others.filter(|id| !context.ids(&rounded).contains(id)));
     let noise = outputs.iter().zip(own.noise.iter());
     let noise = noise.map(|(output, noise)| NoiseFloor {
         output: output.name.clone(),

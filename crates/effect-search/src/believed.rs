@@ -133,6 +133,7 @@ impl Context<'_> {
         let no_start = || Error::NoStart { id: id.to_string() };
         let trial = self.trial(&node, i, &white)?.ok_or_else(no_start)?;
         let mut starts = trial.starts;
+        starts.extend(self.rounding_starts(&node, i, &trial.model)?);
         if let Some(kept) = self.problem.kept.get(id) {
             let mut start = starts.first().ok_or_else(no_start)?.clone();
             let bounds = self.setup(&trial.model)?.bounds().to_vec();

@@ -8,7 +8,8 @@
 //! 4. Residual tests check whether the residual is noise. If it is not, or if many effects were needed, sets of effects that do not depend
 //!    on time are searched once more; if the residual is still not noise, the set that explains the largest part of the error is selected
 //!    from all sets.
-//! 5. The result of the residual tests determines the verdict; effects that the data cannot distinguish form groups.
+//! 5. The result of the residual tests determines the verdict; effects that the data cannot distinguish form groups. Rounding that the
+//!    readings show is added without a test: the criterion hardly falls.
 
 use ct_signals::ArModel;
 use estimation::Noise;
@@ -169,8 +170,27 @@ pub fn diagnose(
     if verdict_of(&[]) == Verdict::Unexplained {
         confirmed = grown.base.clone();
     }
-    let (confirmed, groups) = context.groups(confirmed, &grown.base, &noise, slowness)?;
-    let verdict = verdict_of(&groups);
+    let (mut confirmed, mut groups) = context.groups(confirmed, &grown.base, &noise, slowness)?;
+    let mut verdict = verdict_of(&groups);
+    let is_answer = matches!(
+        verdict,
+        Verdict::Adequate | Verdict::Effect | Verdict::Undecided
+    );
+    let before = confirmed.added.len();
+    if is_answer {
+        // No acceptance test: rounding is shown by the readings.
+        let most = (base.added.len() + options.max_effects).saturating_sub(before);
+        (confirmed, own) = context.with_rounding(confirmed, own, most);
+        groups.extend(
+            confirmed.added[before..]
+                .iter()
+                .map(|&rounded| vec![rounded]),
+        );
+        if verdict == Verdict::Adequate && confirmed.added.len() > before {
+            verdict = Verdict::Effect;
+        }
+    }
+    let rounded = confirmed.added[before..].to_vec();
     let (last_set, last_fit) = if verdict == Verdict::Unexplained {
         (&base, context.in_own_noise(&base)?)
     } else {
@@ -200,6 +220,7 @@ pub fn diagnose(
     let finding = Finding {
         base: &base,
         last: &confirmed,
+        rounded,
         own: &last_fit,
         unknown,
         verdict,

@@ -126,7 +126,7 @@ pub struct Diagnosis {
     pub share: Option<f64>,
     /// Structure in the residual of the last model that is not noise.
     pub not_noise: Option<NotNoise>,
-    /// Outputs whose readings are rounded, if rounding causes a large part of the last residual.
+    /// Outputs whose readings are rounded, if rounding causes a large part of the last residual and no effect describes it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub quantisation: Vec<Quantisation>,
     /// The unexplained error of the last model; `None` if its residual is noise.

@@ -170,7 +170,7 @@ impl<T: Scalar> SimulationState<T> {
             }
             let whole = limit.value() <= longest * STRETCH;
             let mut h = if whole { limit } else { T::constant(longest) };
-            self.order_four = whole && self.may_take_order_four(delays);
+            self.order_four = whole && self.may_take_order_four(tape);
             let mut error = self.attempt(tape, interval, h, delays);
             if self.order_four {
                 let is_accurate = error <= 1.0;
@@ -271,12 +271,13 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
-    /// Whether the next step may be one of order four: not with the accuracy of results, nor where the past of a delay is interpolated, which
-    /// needs the stages of order five.
-    fn may_take_order_four(&mut self, delays: &Delays<T>) -> bool {
+    /// Whether the next step may be one of order four: not with the accuracy of results, nor where slopes depend on time, whose error its
+    /// estimate does not contain.
+    fn may_take_order_four(&mut self, tape: &Tape) -> bool {
         if self.method != Method::Explicit
             || self.tolerance < LEAST_FOR_ORDER_FOUR
-            || delays.all.iter().any(|delay| !delay.known_ahead)
+            || tape.reads_time
+            || !self.work.registers.held
         {
             return false;
         }

@@ -124,3 +124,30 @@ fn the_error_of_order_four_is_of_order_four() {
         assert!((12.0..22.0).contains(&ratio), "{rows}: {ratio}");
     }
 }
+
+#[test]
+fn what_moves_within_an_interval_is_as_accurate() {
+    // The states do not act on their slopes: an error estimate from slopes at one time would not see these errors.
+    let waves = "model Waves
+  parameter Real c = 1e-5;
+  input Real u;
+  output Real fast(start=0);
+  output Real slow(start=20);
+  output Real volume(start=0);
+equation
+  der(fast) = sin(6.283185307179586*time/1.25);
+  der(slow) = c*(25 - slow^2) + 0.02*sin(1.5707963267948966*time);
+  der(volume) = sqrt(u + 0.1);
+end Waves;";
+    let mut case = Case::new(waves, 60, 1.0, |k| vec![(k % 2) as f64]);
+    case.lines = true;
+    let fine = case.plain().0;
+    case.tolerance = 1e-7;
+    for output in 0..3 {
+        let range = Case::range(&fine, output);
+        for (own, fine) in case.plain().0.iter().zip(&fine) {
+            let error = (own[output] - fine[output]).abs();
+            assert!(error < 1e-5 * range, "output {output}: {error} of {range}");
+        }
+    }
+}

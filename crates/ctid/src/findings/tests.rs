@@ -93,7 +93,7 @@ fn what_was_left_out_is_said_with_how_to_get_more() {
     let mut diagnosis = sample::two_tanks();
     assert!(effort(&diagnosis.effort, Reader::Commands).is_empty());
     diagnosis.effort = Effort {
-        limit: Some(20.0),
+        limit: Some(40.0),
         left_out: vec![
             "pairs of effects".into(),
             "refits from random starts".into(),
@@ -103,7 +103,7 @@ fn what_was_left_out_is_said_with_how_to_get_more() {
     assert_eq!(
         effort(&diagnosis.effort, Reader::Commands),
         [
-            "Left out by the time limit of 20 s: pairs of effects; refits from random starts.",
+            "Left out by the time limit of 40 s: pairs of effects; refits from random starts.",
             "For a longer search: `--effort thorough` (limit 10 min)."
         ]
     );

@@ -155,7 +155,10 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
         rounding(&of, rounded.step, shown_unit(&rounded.unit), rounded.share)
     }));
     let many = Thresholds::DEFAULT.many_effects;
-    if diagnosis.effects.len() >= many {
+    // Rounding, which the readings show, compensates for nothing.
+    let effects = diagnosis.effects.iter();
+    let searched = effects.filter(|id| !id.starts_with("quantisation("));
+    if searched.count() >= many {
         all.push(format!(
             "{many} effects or more together may compensate for an effect that is not among the candidates: treat them as a description of the records until each is confirmed."
         ));

@@ -127,7 +127,7 @@ fn a_partial_answer_shows_its_test_its_places_and_its_limit() {
         "where it acts, with relative likelihood: upper tank 1.00, lower tank 0.31: not determined</li>",
         "<h3>Two rankings</h3>",
         "<th scope=\"row\">Its offset</th>",
-        "<p>Left out by the time limit of 20 s: swap steps between pairs of effects.</p>",
+        "<p>Left out by the time limit of 40 s: swap steps between pairs of effects.</p>",
         "<p>For a longer search: <code>--effort thorough</code> (limit 10 min).</p>",
     ] {
         assert!(page.contains(part), "{part}");

@@ -14,7 +14,7 @@ fn a_partial_answer_is_told_with_all_that_belongs_to_it() {
         "Where + overflow (upper) fails",
         "- overflow: upper tank 1.00, lower tank 0.31: not determined",
         "1 overflow sensor_saturation 2 sensor_saturation overflow",
-        "Left out by the time limit of 20 s: swap steps between pairs of effects.",
+        "Left out by the time limit of 40 s: swap steps between pairs of effects.",
         "`--effort thorough`",
     ] {
         assert!(flat.contains(part), "{part}: {told}");

@@ -1,23 +1,48 @@
 //! Readings of a coarse converter: rounded together with their noise, or with noise added after the rounding.
 
 use ct_signals::{Record, noise};
-use effect_search::Verdict;
+use effect_search::{Options, Problem, Verdict, believed};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::records::{BLOCK, found, names, problem, record};
+use crate::records::{BLOCK, PAIR, found, names, problem, record};
 
 fn rounded(record: &mut Record, step: f64) {
-    for y in &mut record.outputs[0].values {
+    for y in record.outputs.iter_mut().flat_map(|y| &mut y.values) {
         *y = step * (*y / step).round();
     }
 }
 
-#[test]
-fn rounding_of_reading_and_noise_is_reported_and_needs_no_effect() {
+/// A block whose readings are rounded together with noise of a fifth of the step.
+fn noise_and_rounding() -> Problem {
     let mut record = record(BLOCK, 0.0, 0.1, 7);
     rounded(&mut record, 0.5);
-    let diagnosis = found(&problem(BLOCK, record));
+    problem(BLOCK, record)
+}
+
+#[test]
+fn rounding_of_reading_and_noise_is_named() {
+    let diagnosis = found(&noise_and_rounding());
+    assert_eq!(diagnosis.verdict, Verdict::Effect);
+    assert_eq!(diagnosis.groups, [["quantisation(y)"]]);
+    assert_eq!(diagnosis.quantisation, []);
+    let [base, with] = &diagnosis.steps[..] else {
+        panic!("{} steps", diagnosis.steps.len());
+    };
+    assert!(with.rmse < base.rmse, "{:?}, {:?}", with.rmse, base.rmse);
+    let value = |name: &str| {
+        let own = with.parameters.iter().find(|p| p.name == name);
+        own.unwrap().value
+    };
+    assert!((value("quantisation_y_step") - 0.5).abs() < 2e-3);
+    assert!((value("quantisation_y_dither") - 0.2).abs() < 0.06);
+}
+
+#[test]
+fn rounding_that_is_not_to_be_named_is_reported() {
+    let mut problem = noise_and_rounding();
+    problem.left_out.insert("quantisation(y)".to_string());
+    let diagnosis = found(&problem);
     assert_eq!(diagnosis.verdict, Verdict::Adequate);
     let [rounded] = &diagnosis.quantisation[..] else {
         panic!("{:?}", diagnosis.quantisation);
@@ -33,6 +58,38 @@ fn rounding_of_reading_and_noise_is_reported_and_needs_no_effect() {
         (rounding / 0.0308..1.0).contains(&rounded.share),
         "{rounded:?}"
     );
+}
+
+#[test]
+fn rounding_of_every_output_is_named() {
+    let mut record = record(PAIR, 0.0, 0.1, 7);
+    rounded(&mut record, 0.5);
+    let mut effects = found(&problem(PAIR, record)).effects;
+    effects.sort();
+    assert_eq!(effects, ["quantisation(y1)", "quantisation(y2)"]);
+}
+
+#[test]
+fn a_model_that_rounds_by_itself_lacks_no_rounding() {
+    let model = BLOCK.replace("= T;", "= quantise(T, 0.5);");
+    let mut record = record(BLOCK, 0.0, 0.1, 7);
+    rounded(&mut record, 0.5);
+    let found = found(&problem(&model, record));
+    assert!(!names(&found, "quantisation(y)"), "{:?}", found.groups);
+}
+
+/// Of a model file, without the values that a diagnosis found.
+#[test]
+fn a_listed_rounding_begins_with_what_the_readings_show() {
+    let mut problem = noise_and_rounding();
+    problem.effects = vec!["quantisation(y)".to_string()];
+    let listed = believed(&problem, &Options::default()).unwrap().spec;
+    let value = |name: &str| {
+        let own = listed.parameters.iter().find(|p| p.about.name == name);
+        own.unwrap().value
+    };
+    assert!((value("quantisation_y_step") - 0.5).abs() < 2e-3);
+    assert!((value("quantisation_y_dither") - 0.2).abs() < 0.06);
 }
 
 #[test]

@@ -9,10 +9,12 @@
 mod compile;
 mod guard;
 mod operation;
+mod selection;
 
 use self::guard::Branch;
 pub(crate) use self::guard::Guard;
 use self::operation::{Operation, run};
+use self::selection::Selected;
 use crate::scalar::Scalar;
 
 /// Index of a value in the registers.
@@ -85,38 +87,6 @@ pub(crate) struct Registers<T> {
     pub extended: bool,
 }
 
-/// The operations on the selected branches, with the registers of their results.
-#[derive(Debug, Clone)]
-struct Selected {
-    /// Whether the first value of each branch is selected.
-    taken: Vec<bool>,
-    /// The operations that slopes need, ...
-    slopes: Vec<(Operation, Register)>,
-    /// ... the operations whose results change although all inputs are held, ...
-    moving: Vec<(Operation, Register)>,
-    /// ... the operations that guards need in addition to the slopes, those that outputs need in addition to both, and all.
-    guards: Vec<(Operation, Register)>,
-    outputs: Vec<(Operation, Register)>,
-    all: Vec<(Operation, Register)>,
-}
-
-/// Number of selections that are kept besides the present one.
-const EARLIER: usize = 8;
-
-impl Selected {
-    fn with_capacity(operations: usize) -> Self {
-        let list = || Vec::with_capacity(operations);
-        Self {
-            taken: Vec::new(),
-            slopes: list(),
-            moving: list(),
-            guards: list(),
-            outputs: list(),
-            all: list(),
-        }
-    }
-}
-
 impl<T: Clone> Registers<T> {
     /// The registers with the present selection alone.
     pub fn copied(&self) -> Self {
@@ -187,110 +157,6 @@ impl Tape {
             || !self.delays.is_empty();
         let moving = self.state(0)..self.first_constant;
         self.of_inputs = self.made_of(|register| register != 0 && !moving.contains(&register));
-    }
-
-    /// Selects the operations that the present branches need.
-    fn choose_operations<T: Scalar>(&self, registers: &mut Registers<T>) {
-        let Registers {
-            taken,
-            selected,
-            earlier,
-            plain,
-            ..
-        } = registers;
-        // The latest is the last.
-        let known = earlier.iter().position(|known| known.taken == *taken);
-        let next = match known {
-            Some(known) => earlier.remove(known),
-            None => {
-                let mut next = if earlier.len() < EARLIER {
-                    Selected::with_capacity(self.operations.len())
-                } else {
-                    earlier.remove(0)
-                };
-                self.select(taken, plain, &mut next);
-                next
-            }
-        };
-        earlier.push(std::mem::replace(selected, next));
-        if registers.held {
-            for &(operation, to) in &registers.selected.slopes {
-                if self.of_inputs[to] {
-                    run(
-                        &[(operation, to)],
-                        &mut registers.values,
-                        registers.extended,
-                    );
-                }
-            }
-        }
-    }
-
-    /// Leaves out the operations that only other branches need.
-    fn select(&self, taken: &[bool], plain: &[bool], into: &mut Selected) {
-        let Selected {
-            taken: of,
-            slopes,
-            moving,
-            guards,
-            outputs,
-            all,
-        } = into;
-        of.clear();
-        of.extend_from_slice(taken);
-        self.needed(&self.derivatives, (taken, plain), slopes);
-        self.needed(&self.read_by_guards, (taken, plain), guards);
-        self.needed(&self.read_by_all, (taken, plain), all);
-        guards.retain(|guard| !slopes.contains(guard));
-        self.needed(&self.outputs, (taken, plain), outputs);
-        outputs.retain(|output| !slopes.contains(output) && !guards.contains(output));
-        moving.clear();
-        moving.extend(slopes.iter().filter(|(_, to)| !self.of_inputs[*to]));
-    }
-
-    /// The operations that the results depend on, in order; an operation that reads a choice reads the selected register.
-    fn needed(
-        &self,
-        results: &[Register],
-        (taken, plain): (&[bool], &[bool]),
-        into: &mut Vec<(Operation, Register)>,
-    ) {
-        let first = self.first_operation;
-        let chosen = |mut register: Register| {
-            while let Some(i) = register.checked_sub(first)
-                && let Operation::Select(branch, a, b) = self.operations[i]
-            {
-                register = if taken[branch] { a } else { b };
-            }
-            register
-        };
-        let mut needed = vec![false; self.operations.len()];
-        for result in results {
-            if let Some(i) = result.checked_sub(first) {
-                needed[i] = true;
-            }
-        }
-        into.clear();
-        for i in (self.once..self.operations.len()).rev() {
-            if !needed[i] {
-                continue;
-            }
-            let operation = match self.operations[i] {
-                Operation::Select(..) => Operation::Copy(chosen(first + i)),
-                other => match other.with(chosen) {
-                    Operation::Multiply(a, b) if plain[b] => Operation::Scale(a, b),
-                    Operation::Multiply(a, b) if plain[a] => Operation::Scale(b, a),
-                    other => other,
-                },
-            };
-            for register in operation.reads().into_iter().flatten() {
-                if let Some(i) = register.checked_sub(first) {
-                    needed[i] = true;
-                }
-            }
-            into.push((operation, first + i));
-        }
-        into.reverse();
     }
 
     /// For each delay, whether its signal depends on inputs, parameters and time alone.

@@ -5,7 +5,7 @@ use std::error::Error;
 use ctid_tests::Rig;
 use effect_search::{Diagnosis, Options, Problem, diagnose};
 
-use crate::record::Answer;
+use crate::outcome::Answer;
 
 /// The diagnosis with the text of the plant, on the measured command. The effects are those of the catalogue of tanks.
 pub fn diagnosed(rig: &Rig, kernel: &missing_effect::Problem) -> Result<Diagnosis, Box<dyn Error>> {

@@ -7,6 +7,7 @@
 
 mod as_text;
 mod mark;
+mod outcome;
 mod record;
 mod table;
 
@@ -25,8 +26,9 @@ use std::{
 use clap::Parser;
 use ctid_tests::{Drive, draw::Levels};
 use indicatif::{ProgressBar, ProgressStyle};
+use outcome::Outcome;
 use plants::{CATALOGUE, EffectInfo};
-use record::{Job, Outcome, kinds_of_unknown};
+use record::{Job, kinds_of_unknown};
 use serde_json::json;
 
 /// Structural error over noise.

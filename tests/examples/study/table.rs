@@ -8,7 +8,8 @@ use ctid_tests::Drive;
 use missing_effect::Verdict;
 
 use self::sections::{Nulls, counted, pairs, times, unknowns};
-use crate::record::{Answer, Job, Outcome, condition};
+use crate::outcome::{Answer, Outcome};
+use crate::record::{Job, condition};
 
 /// Open or closed loop, white or coloured noise.
 const CONDITIONS: [(Drive, bool); 4] = [

@@ -1,14 +1,14 @@
 //! Effects at the ports of models: every effect at every port is added, gives the outputs of the original model at its absent value, and
 //! has derivatives that agree with differences.
 
+mod derivatives;
 mod driven;
+mod rounding;
 
 use std::collections::BTreeMap;
 
-use ct_model::effects::{
-    Candidate, Role, Visited, all_effects, apply, candidates, candidates_keeping,
-};
-use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation, unit_warnings};
+use ct_model::effects::{Candidate, Visited, all_effects, apply, candidates, candidates_keeping};
+use ct_model::{Method, Model, ModelSpec, Simulation, unit_warnings};
 
 use self::driven::{BLOCK, Driven, active, largest_difference, range};
 
@@ -147,69 +147,6 @@ fn a_share_of_what_spills_reaches_the_tank_below() {
     }
 }
 
-/// With noise before the rounding the reading is the mean of the rounded readings, and depends smoothly on the step.
-#[test]
-fn readings_that_are_rounded_with_noise_have_the_mean_of_rounded_readings() {
-    let spec = ModelSpec::parse(
-        "model Ramp input Real u; output Real y = x; Real x(start=0.3); equation der(x) = u; end Ramp;",
-    )
-    .unwrap();
-    let all = candidates(&spec, &Visited::nominal(&spec));
-    let candidate = all.iter().find(|c| c.id == "quantisation(y)").unwrap();
-    let model = Model::new(apply(&spec, &[candidate]).unwrap());
-    let names: Vec<&str> = model
-        .spec()
-        .parameters
-        .iter()
-        .map(|p| p.about.name.as_str())
-        .collect();
-    let at = |name: &str| names.iter().position(|known| *known == name).unwrap();
-    let (dither, step) = (at("quantisation_y_dither"), at("quantisation_y_step"));
-    let run = |share: Dual<2>, width: Dual<2>| -> Vec<Dual<2>> {
-        let mut parameters: Vec<_> = model.parameters().into_iter().map(Dual::constant).collect();
-        parameters[dither] = share;
-        parameters[step] = width;
-        let mut simulation = Simulation::new(&model, &parameters, &[Dual::constant(0.3)], 0.0);
-        let mut y = [Dual::constant(0.0)];
-        let rows = (1..60).map(|k| {
-            simulation.read(&[0.07], &mut y);
-            simulation.advance(&[0.07], &[0.07], f64::from(k)).unwrap();
-            y[0]
-        });
-        rows.collect()
-    };
-    for (share, tolerance) in [(0.1, 1e-3), (0.2, 3e-5), (0.4, 3e-5)] {
-        let width = 0.8;
-        let rows = run(Dual::variable(share, 1), Dual::variable(width, 0));
-        let h = 1e-6;
-        let moved =
-            |by: [f64; 2]| run(Dual::constant(share + by[1]), Dual::constant(width + by[0]));
-        let both = [[h, 0.0], [0.0, h]].map(|by| (moved(by), moved(by.map(|h| -h))));
-        for (k, y) in rows.iter().enumerate() {
-            let x = 0.3 + 0.07 * k as f64;
-            // The integral over normal noise, by the midpoint rule.
-            let parts = 200_000;
-            let (mut sum, mut weights) = (0.0, 0.0);
-            for i in 0..parts {
-                let z = 7.0 * ((2 * i + 1) as f64 / f64::from(parts) - 1.0);
-                let weight = (-0.5 * z * z).exp();
-                sum += weight * ((x + share * width * z) / width).round() * width;
-                weights += weight;
-            }
-            let mean = sum / weights;
-            assert!(
-                (y.re - mean).abs() < tolerance,
-                "{share}, {x}: {} {mean}",
-                y.re
-            );
-            for (slope, (more, less)) in y.eps.iter().zip(&both) {
-                let difference = (more[k].re - less[k].re) / (2.0 * h);
-                assert!((slope - difference).abs() < 1e-6, "{share}, {x}");
-            }
-        }
-    }
-}
-
 #[test]
 fn a_present_effect_changes_the_outputs_and_the_text_reads_back() {
     for driven in Driven::all() {
@@ -248,126 +185,6 @@ fn a_present_effect_changes_the_outputs_and_the_text_reads_back() {
                 "{}\n{text}",
                 candidate.id
             );
-        }
-    }
-}
-
-/// Derivatives by the parameters of the effect at a point against differences: central ones, or to one side at a bound.
-fn check_derivatives(driven: &Driven, candidate: &Candidate, at: &[f64], tolerance: f64) {
-    const LANES: usize = 4;
-    let model = Model::new(apply(&driven.spec, &[candidate]).unwrap());
-    let first = driven.spec.parameters.len();
-    let mut parameters = model.parameters();
-    parameters[first..first + at.len()].copy_from_slice(at);
-    let plain = driven.run(&model, &parameters);
-    let scale = range(&plain);
-    let mut corners = 0;
-    for (i, own) in candidate.parameters.iter().enumerate() {
-        // The staircase has no derivatives; those of a smooth one are compared in another test.
-        if own.role == Role::Choice || candidate.id.starts_with("quantisation") {
-            continue;
-        }
-        let duals: Vec<Dual<LANES>> = parameters
-            .iter()
-            .enumerate()
-            .map(|(k, value)| {
-                if k == first + i {
-                    Dual::variable(*value, 0)
-                } else {
-                    Dual::constant(*value)
-                }
-            })
-            .collect();
-        let exact = driven.run(&model, &duals);
-        let typical = own.starts.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        // Near a limit, a short step.
-        let share = if own.role == Role::Threshold {
-            1e-5
-        } else {
-            1e-4
-        };
-        let step = share * typical.max(at[i].abs());
-        let moved = |by: f64| {
-            let mut parameters = parameters.clone();
-            parameters[first + i] += by;
-            driven.run(&model, &parameters)
-        };
-        let one_sided = at[i] - 2.0 * step < own.bounds.0;
-        let near = [moved(step), moved(2.0 * step)];
-        let far = (!one_sided).then(|| [moved(-step), moved(-2.0 * step)]);
-        for (k, row) in exact.iter().enumerate() {
-            for (y, own_value) in row.iter().enumerate() {
-                let of = |rows: &Vec<Vec<f64>>| rows[k][y];
-                let difference = match &far {
-                    None => (4.0 * of(&near[0]) - of(&near[1]) - 3.0 * of(&plain)) / (2.0 * step),
-                    Some(far) => {
-                        let one = of(&near[0]) - of(&far[0]);
-                        let two = of(&near[1]) - of(&far[1]);
-                        (8.0 * one - two) / (12.0 * step)
-                    }
-                };
-                let error = (own_value.eps[0] - difference).abs() * typical;
-                // At a corner the derivative is that of one of its sides.
-                let slopes = far.iter().flat_map(|far| {
-                    let slope = |a: &Vec<Vec<f64>>, b: &Vec<Vec<f64>>, h: f64| (of(a) - of(b)) / h;
-                    [
-                        slope(&near[0], &plain, step),
-                        slope(&near[1], &near[0], step),
-                        slope(&plain, &far[0], step),
-                        slope(&far[0], &far[1], step),
-                    ]
-                });
-                let slopes: Vec<f64> = slopes.collect();
-                let (low, high) = slopes
-                    .iter()
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| {
-                        (l.min(*s), h.max(*s))
-                    });
-                if error >= tolerance * scale && !slopes.is_empty() {
-                    corners += 1;
-                    let reach = tolerance * scale / typical;
-                    let slope = own_value.eps[0];
-                    assert!(
-                        slope > low - reach && slope < high + reach,
-                        "{} by {} at {at:?}, row {k}: {slope} is none of {slopes:?}",
-                        candidate.id,
-                        own.short
-                    );
-                    continue;
-                }
-                assert!(
-                    error < tolerance * scale,
-                    "{} by {} at {at:?}, row {k}: {} against {difference}",
-                    candidate.id,
-                    own.short,
-                    own_value.eps[0]
-                );
-            }
-        }
-    }
-    let rows = plain.len() * plain[0].len() * candidate.parameters.len();
-    assert!(
-        50 * corners <= rows,
-        "{}: {corners} of {rows}",
-        candidate.id
-    );
-}
-
-#[test]
-fn derivatives_are_those_of_differences() {
-    for driven in Driven::all() {
-        for candidate in driven.with_shapes() {
-            check_derivatives(&driven, &candidate, &active(&candidate), 1e-4);
-        }
-    }
-}
-
-#[test]
-fn derivatives_where_the_effect_is_absent_are_those_of_differences() {
-    for driven in Driven::all() {
-        for candidate in driven.with_shapes().iter().filter(|c| c.is_smooth()) {
-            let absent: Vec<f64> = candidate.parameters.iter().map(|p| p.absent).collect();
-            check_derivatives(&driven, candidate, &absent, 1e-4);
         }
     }
 }

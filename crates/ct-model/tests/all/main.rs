@@ -13,6 +13,7 @@ mod refused;
 mod round_trip;
 mod shared;
 mod simulated;
+mod sliding;
 mod support;
 mod threads;
 mod tolerance;

@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::{BELOW, CONDITIONS, MARGIN, listed, median, named_condition, ratio, shown};
-use crate::record::{Answer, Job, Outcome, unknown_name};
+use crate::outcome::{Answer, Outcome};
+use crate::record::{Job, unknown_name};
 
 /// Results of records without a missing effect.
 #[derive(Default)]

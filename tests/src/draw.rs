@@ -310,7 +310,7 @@ pub fn without_noise(rig: &Rig, seed: u64) -> Record {
     silent.run(&mut ChaCha8Rng::seed_from_u64(seed))
 }
 
-/// The believed model, refitted to the record without noise; `None` where the rig leaves its levels.
+/// The model without the effect, fitted to the record without noise; `None` if a level leaves its range.
 fn misfit(rig: &Rig, seed: u64, near: Option<&[f64]>, more: usize) -> Option<Fit> {
     let records = [without_noise(rig, seed)];
     let read = rig.known().outputs(rig.plant);

@@ -196,7 +196,7 @@ impl Onset {
             if k == self.row
                 && let Some((placed, values)) = &self.effect
             {
-                // The effects are sorted into the chain, but there is only one.
+                // With only one effect, its parameters are the last ones.
                 let theta = [rig.theta.as_slice(), values].concat();
                 let levels = simulator.levels()[..rig.plant.vessels()].to_vec();
                 let with = structure.with(*placed).ok()?;

@@ -104,7 +104,7 @@ impl Outcome {
                 "a signal is NaN, infinite or too large (the regressor is above 1e30, an output error above 1e100); leave it out"
             }
             Self::BadStep => {
-                "its step must be above 0 and at most 1e30 s, with eta dt at most 300; check the clock"
+                "its step dt must be above 0 and at most 1e30 s, and eta dt, with the forgetting rate eta, at most 300; check its time"
             }
             Self::BadSize => "its regressor needs one entry for each parameter",
             Self::Stopped => "the estimator has stopped before; health() gives the reason",

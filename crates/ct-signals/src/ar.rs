@@ -41,7 +41,7 @@ use crate::{Error, Whitener};
 /// Partial correlations keep this distance from -1 and 1, so that even a constant or a sine gives a stable predictor.
 pub(crate) const MARGIN: f64 = 1e-9;
 /// A smaller sum of squares counts as zero, because products would underflow.
-pub(crate) const NOTHING: f64 = 1e-200;
+pub(crate) const NEGLIGIBLE: f64 = 1e-200;
 
 /// A stationary autoregressive process of mean 0.
 ///

@@ -23,7 +23,7 @@
 //! `p + 2` for each iteration of a refinement. In all 20 to 50 times Burg's recursion where 30 % of 2000 samples are missing, and about
 //! 100 times for every third sample only.
 
-use crate::ar::{LogProduct, MARGIN, NOTHING};
+use crate::ar::{LogProduct, MARGIN, NEGLIGIBLE};
 use crate::{ArModel, StationaryNoise};
 
 /// Step of the differences, in a partial correlation.
@@ -112,7 +112,7 @@ fn of_series(series: &Series<impl Whiten>, max_order: usize) -> ArModel {
     let penalty = (n as f64).ln();
     let mut k: Vec<f64> = Vec::new();
     let mut at = series.whitened(&k);
-    if at.squares < NOTHING {
+    if at.squares < NEGLIGIBLE {
         return ArModel::white(0.0);
     }
     let mut best = (at.deviance, k.clone(), at.clone());
@@ -133,7 +133,7 @@ fn of_series(series: &Series<impl Whiten>, max_order: usize) -> ArModel {
         if order > 1 && before - at.deviance > penalty {
             series.refine(&mut k, &mut at, ROUGH);
         }
-        if at.squares < NOTHING {
+        if at.squares < NEGLIGIBLE {
             return ArModel::white(0.0);
         }
         let bic = at.deviance + order as f64 * penalty;
@@ -246,7 +246,7 @@ impl<W: Whiten> Series<'_, W> {
     fn refine(&self, k: &mut Vec<f64>, at: &mut Whitened, enough: f64) {
         let all: Vec<usize> = (0..k.len()).collect();
         for _ in 0..ITERATIONS {
-            if !self.step(k, at, &all, enough) || at.squares < NOTHING {
+            if !self.step(k, at, &all, enough) || at.squares < NEGLIGIBLE {
                 return;
             }
         }

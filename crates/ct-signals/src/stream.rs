@@ -114,8 +114,8 @@ impl Rows {
         };
         if is_row(&cells, columns) {
             let outputs = columns.outputs.len().max(1);
-            // Position of the first channel: after the time, or after the reference.
             let inputs = usize::from(!columns.without_inputs);
+            // Column of the first channel: 1 after the time, 2 after the time and a reference.
             let first = match cells.len().checked_sub(outputs + inputs) {
                 Some(1) => 1,
                 Some(2) if inputs > 0 => 2,

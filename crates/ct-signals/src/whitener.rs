@@ -121,8 +121,7 @@ impl Whitener {
         1.0 / (scale * scale)
     }
 
-    /// The row of the next instant is lost. The rows after it come out whitened all the same, with variance `sigma^2` and independent of
-    /// each other: until `p` of them have come, the lost ones are estimated from their neighbours.
+    /// The row of the next instant is lost. Later rows are whitened too, with variance `sigma^2` and independent of each other: until `p` of them have come, the lost ones are estimated from their neighbours.
     ///
     /// Lost rows before the first of a record change nothing.
     pub fn skip(&mut self) {

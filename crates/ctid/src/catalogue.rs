@@ -151,7 +151,7 @@ fn applies_to(effect: &'static EffectInfo) -> impl Iterator<Item = Plant> {
 
 fn place(effect: &'static EffectInfo) -> String {
     match effect.place {
-        Place::Actuator => "at the actuator, between the command and the inflow; of two pumps either, `ctid add --where pump_1|pump_2`".to_string(),
+        Place::Actuator => "at the actuator, between the command and the inflow; with two pumps, choose one: `ctid add --where pump_1|pump_2`".to_string(),
         Place::Vessel => {
             let names = |vessels: usize| {
                 let several = applies_to(effect).find(|plant| plant.vessels() == vessels);
@@ -163,14 +163,14 @@ fn place(effect: &'static EffectInfo) -> String {
             };
             let of_two = match names(2)[..] {
                 [] => "in the balance of a single vessel".to_string(),
-                [only] => format!("in a vessel's balance; of two vessels the {only} one"),
-                _ => "in a vessel's balance; of two vessels either, `ctid add --where upper|lower`"
+                [only] => format!("in a vessel's balance; with two vessels, the {only} one"),
+                _ => "in a vessel's balance; with two vessels, choose one: `ctid add --where upper|lower`"
                     .to_string(),
             };
             match &names(3)[..] {
                 [] => of_two,
-                [only] => format!("{of_two}; of three tanks {only}"),
-                _ => format!("{of_two}; of three tanks any, `T1|T2|T3`"),
+                [only] => format!("{of_two}; with three tanks, {only}"),
+                _ => format!("{of_two}; with three tanks, choose one: `T1|T2|T3`"),
             }
         }
         Place::Sensor => {

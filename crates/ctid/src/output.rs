@@ -298,7 +298,7 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
         return false;
     };
     match kind {
-        // A record does not contain its author, and a text may have been edited by hand.
+        // A record has no mark of the program, and a model file may have been edited by hand.
         Kind::Record | Kind::Model => false,
         Kind::Report => {
             let mut head = Vec::new();

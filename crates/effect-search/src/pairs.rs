@@ -12,8 +12,8 @@ use crate::score::Trial;
 
 /// Number of values in all columns above which rows are thinned out.
 const MOST_VALUES: usize = 20_000_000;
-/// A column whose projection residual is below this share counts as linearly dependent.
-const NOTHING: f64 = 1e-6;
+/// Columns are left out whose projection residual is below this share of their norm, and changes below this share of the residual's norm.
+const DEPENDENT: f64 = 1e-6;
 /// Ridge of the small systems, as a share of the squared length.
 const RIDGE: f64 = 1e-9;
 
@@ -51,7 +51,7 @@ pub(crate) fn joint_scores(
                 project(&basis, column);
                 project(&basis, column);
                 let after = column.norm();
-                if after > NOTHING * before && after.is_finite() && after > 0.0 {
+                if after > DEPENDENT * before && after.is_finite() && after > 0.0 {
                     *column /= after;
                     true
                 } else {
@@ -131,7 +131,7 @@ fn columns_of(
     let mut columns: Vec<DVector<f64>> = (0..last).map(|j| matrix.column(j).into_owned()).collect();
     // Residual of the believed model minus the residual of this start: the response to the effect.
     let change = residual - matrix.column(last);
-    if change.norm() > NOTHING * residual.norm() {
+    if change.norm() > DEPENDENT * residual.norm() {
         columns.push(change);
     }
     Some(columns)

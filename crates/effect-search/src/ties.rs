@@ -17,7 +17,7 @@ use crate::pairs::{basis_of, every_nth, project, whitened};
 /// Two columns are collinear if the sine of the angle between them is below this: derivatives are exact up to the tolerance of the simulation.
 const SAME_DIRECTION: f64 = 1e-4;
 /// A column of which the believed parameters explain all but this share has no direction of its own.
-const NOTHING: f64 = 1e-3;
+const DEPENDENT: f64 = 1e-3;
 
 impl Context<'_> {
     /// For each candidate, the first one with a collinear sensitivity: itself if there is none. `bare`: the model without effects.
@@ -41,7 +41,7 @@ impl Context<'_> {
                 project(&basis, &mut column);
                 project(&basis, &mut column);
                 let after = column.norm();
-                (after > NOTHING * before).then(|| column / after)
+                (after > DEPENDENT * before).then(|| column / after)
             })
             .collect();
         let same = |a: usize, b: usize| match (&directions[a], &directions[b]) {

@@ -52,7 +52,7 @@ pub enum Error {
     },
     /// A bandwidth for which the filters pass nothing, or only rounding errors.
     #[error(
-        "--bandwidth is {found:e} 1/s, but the filters need one from {low:.1e} to {high:.1e} 1/s for this record; without the option it is found"
+        "--bandwidth is {found:e} 1/s, but must be from {low:.1e} to {high:.1e} 1/s for this record; leave out the option, and the program chooses it"
     )]
     Bandwidth {
         /// Given value, 1/s.

@@ -57,7 +57,7 @@ pub enum Error {
     },
     /// An output without any reading.
     #[error(
-        "{record}: no reading of the output is there; give a part of the record that has some, or leave it out"
+        "{record}: the output has no measured samples; give a part of the record that has some, or leave out the record"
     )]
     NoReading {
         /// Name of the record.

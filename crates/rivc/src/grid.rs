@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use ct_lti::Hold;
 
 /// Parts of a step below this share of it are none.
-const NOTHING: f64 = 1e-9;
+const NEGLIGIBLE: f64 = 1e-9;
 
 /// A stretch on which an input runs on a line.
 #[derive(Debug, Clone, Copy)]
@@ -99,9 +99,9 @@ impl Held<'_> {
         let n = self.values.len();
         let mut whole = delay.floor();
         let mut part = delay - whole;
-        if part < NOTHING {
+        if part < NEGLIGIBLE {
             part = 0.0;
-        } else if part > 1.0 - NOTHING {
+        } else if part > 1.0 - NEGLIGIBLE {
             part = 0.0;
             whole += 1.0;
         }
@@ -155,7 +155,7 @@ impl Held<'_> {
             let begin = now - delay;
             let last = passed.checked_sub(1);
             let before = self.value(last, share(last, begin));
-            let small = NOTHING * time.get(k + 1).map_or(0.0, |next| next - now);
+            let small = NEGLIGIBLE * time.get(k + 1).map_or(0.0, |next| next - now);
             while passed < time.len() && time[passed] <= begin + small {
                 passed += 1;
             }

@@ -7,13 +7,13 @@ use ctid_examples::model_records::DrivenModel;
 
 use super::Series;
 
-/// A loop: which input answers to which output, with the gain \[input unit per output unit\] and the integral time in rows.
+/// A loop: its input and its output, with the gain \[input unit per output unit\] and the integral time in rows.
 fn controller(model: &str) -> (usize, usize, f64, f64) {
     match model {
         "heated-block" => (0, 0, 3.0, 25.0),
         "coupled-heaters" => (0, 0, 3.0, 40.0),
         "dc-motor" => (0, 1, 0.08, 15.0),
-        // The delay of a row takes more damping from this oscillator than it has where the gain is above 7.
+        // With a gain above 7, the controller's delay of one sample makes this lightly damped oscillator unstable.
         "mass-spring" => (0, 0, 4.0, 100.0),
         "house" => (0, 0, 1.5, 20.0),
         "bioreactor" => (0, 0, -0.02, 60.0),

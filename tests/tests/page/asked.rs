@@ -85,7 +85,7 @@ fn a_search_has_an_effort_and_an_end() {
     for (body, limit) in [
         (r#"{"what": "diagnose", "effort": "quick"}"#, json!(5)),
         (r#"{"what": "diagnose", "effort": "thorough"}"#, json!(600)),
-        (r#"{"what": "diagnose"}"#, json!(20)),
+        (r#"{"what": "diagnose"}"#, json!(40)),
         (r#"{"what": "compare"}"#, json!(null)),
     ] {
         let state = tab.post("/api/run", body.as_bytes()).json();

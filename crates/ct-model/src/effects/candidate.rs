@@ -233,8 +233,8 @@ pub fn candidates_keeping(
     of_effects(all_effects(), spec, visited, kept)
 }
 
-/// Smooth functions of the variables, at all ports of a model: `shape(x,u)`, `course(x)`. They are no candidates of a search. `kept`: as in
-/// [`candidates_keeping`].
+/// Smooth functions of a state or an input, `shape(x,u)`, or of time, `course(x)`, at all ports of a model. Searches do not use them.
+/// `kept`: as in [`candidates_keeping`].
 #[must_use]
 pub fn shapes_keeping(
     spec: &ModelSpec,

@@ -113,8 +113,8 @@ const RECORD_NUMBERS: [&str; 10] = [
 ];
 
 impl Effect {
-    /// Constants of the text whose values come from the range of the data: `low`, `duration`. With the same constants the effect means the
-    /// same on another record.
+    /// Constants of the effect's text whose values come from the range of the data: `low`, `duration`. With the same constants the effect is
+    /// the same for another record.
     #[must_use]
     pub fn record_numbers(&self) -> Vec<&'static str> {
         // A test reads every text.

@@ -1,6 +1,6 @@
 //! Burg's method: the reflection coefficients of several stretches at once, and the order that the record supports.
 
-use super::{ArModel, MARGIN, NOTHING, check_not_infinite};
+use super::{ArModel, MARGIN, NEGLIGIBLE, check_not_infinite};
 use crate::{Error, ar_missing};
 
 /// Orders that leave fewer samples than this for each coefficient are not tried.
@@ -44,7 +44,7 @@ impl ArModel {
         } = Burg::new(segments, max_order);
         let mut best: Option<(f64, ArModel)> = None;
         for (order, sum) in squares.into_iter().enumerate() {
-            if sum < NOTHING {
+            if sum < NEGLIGIBLE {
                 return Ok(ArModel::white(0.0));
             }
             let mut model = ArModel::of_stationary(&reflections[..order], 1.0);

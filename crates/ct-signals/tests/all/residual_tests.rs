@@ -320,7 +320,7 @@ fn lags_without_pairs_do_not_count() {
             *x = f64::NAN;
         }
     }
-    // Every third sample only: equal to the test of the series of these samples.
+    // With two of three samples missing, the result is that of the series of the others.
     let (whole, thin) = (ljung_box(&sampled, 6, 0), ljung_box(&x, 18, 0));
     assert_relative_eq!(whole.unwrap(), thin.unwrap(), max_relative = 1e-9);
     assert!(matches!(

@@ -166,7 +166,7 @@ impl Identify {
                 return Err(Error::file(
                     path,
                     format!(
-                        "the model names a second input, \"{second}\", which of the methods srivc and rivc alone fit: choose one of them, use `ctid compare`, or delete it where that pump stood still or nothing was disturbed"
+                        "the model has a second input, \"{second}\", and only the methods srivc and rivc fit two inputs: choose one of them, use `ctid compare`, or delete the input if it was constant"
                     ),
                 ));
             }

@@ -142,7 +142,7 @@ pub fn of_warning(warning: &Warning) -> String {
             "the model is so slow that its initial state still matters at the end of the record: record longer".to_owned()
         }
         Warning::NoFilterBounds { n } => format!(
-            "no bounds on the error filter guarantee convergence for plants around the start, for n = {n}; compare with --method ct-rls"
+            "no bounds on the error filter guarantee convergence for plants near the initial model, for n = {n}; compare with --method ct-rls"
         ),
         Warning::ConvergenceNotGuaranteed => {
             "the error filter's bounds do not guarantee convergence for the plant that was found (C/A - 1/2 is not strictly positive real): \

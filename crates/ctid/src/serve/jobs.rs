@@ -38,7 +38,7 @@ pub(super) enum Task {
         max_effects: Option<NonZeroU8>,
         effort: EffortLevel,
     },
-    /// Designs the experiment within these limits that distinguishes two effects of a group of the diagnosis.
+    /// Designs an experiment within these limits: it distinguishes two effects that the diagnosis could not distinguish.
     Design {
         group: usize,
         between: [String; 2],

@@ -218,7 +218,7 @@ fn steps_longer_than_the_time_constant_do_not_become_it() {
             .any(|w| matches!(w, Warning::BelowStep { .. }));
         (found.parameters[0].value, told)
     };
-    // The remaining error comes from the output between samples, which is not linear: a warning is given if it is the larger error.
+    // Between samples the output is not linear, which biases the estimate; steps longer than a time constant give a warning.
     let (short, told) = time_constant(|k| if k % 2 == 0 { 0.5 } else { 1.5 });
     assert!((short - 20.0).abs() < 0.2 && !told, "{short}");
     let (turns, told) = time_constant(|k| if k % 2 == 0 { 5.0 } else { 25.0 });

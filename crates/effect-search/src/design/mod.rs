@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use comparison::Comparison;
 pub use limits::{Limits, NoExperiment};
-pub use power::{PLENTY, Power, Prospect, by_use, power, prospect, times_as_long};
+pub use power::{Power, Prospect, SUFFICIENT_POWER, by_use, power, prospect, times_as_long};
 pub use result::{
     Alternative, Design, Experiment, InputRange, InputSequence, InputSequenceKind, Reach, Sequences,
 };

@@ -34,19 +34,19 @@ pub enum Prospect {
 }
 
 /// A higher power has no further use: the decision is certain even if the effect is half as large as estimated.
-pub const PLENTY: f64 = 200.0;
+pub const SUFFICIENT_POWER: f64 = 200.0;
 /// The criterion decides if the difference exceeds this.
 const BIC_MARGIN: f64 = Thresholds::DEFAULT.bic_margin;
 /// Excursions with a smaller difference are equal.
 const SAME_EXCURSION: f64 = 0.1;
 /// Probability from which a decision is nearly certain, ...
-const SURE: f64 = 0.9;
+const NEARLY_CERTAIN: f64 = 0.9;
 /// ... and from which it is likely.
 const LIKELY: f64 = 0.5;
 /// Noncentrality below which two models give the same response.
-const NOTHING: f64 = 1.0;
-/// Quantile of the required probability for a longer experiment.
-const WANTED: f64 = 1.645;
+const SAME_RESPONSE: f64 = 1.0;
+/// The 0.95 quantile of the normal distribution: how long an experiment has to be for a decision of this probability.
+const QUANTILE: f64 = 1.645;
 
 /// The probability that the criterion of the false one ends above that of the true one by more than 6: their
 /// difference, `ahead` before, is normal with mean `ahead + lambda` and variance `4 lambda`.
@@ -72,9 +72,9 @@ pub fn power(if_true: [f64; 2], ahead: [f64; 2]) -> Power {
 /// Expected result for a power.
 #[must_use]
 pub fn prospect(power: &Power) -> Prospect {
-    if power.power < NOTHING {
+    if power.power < SAME_RESPONSE {
         Prospect::Twins
-    } else if power.decides >= SURE {
+    } else if power.decides >= NEARLY_CERTAIN {
         Prospect::Decides
     } else if power.decides >= LIKELY {
         Prospect::May
@@ -92,7 +92,7 @@ pub fn times_as_long(power: &Power, ahead: [f64; 2]) -> Option<f64> {
         return None;
     }
     let needed = |ahead: f64| {
-        let root = WANTED + (WANTED * WANTED + (BIC_MARGIN - ahead)).max(0.0).sqrt();
+        let root = QUANTILE + (QUANTILE * QUANTILE + (BIC_MARGIN - ahead)).max(0.0).sqrt();
         root * root
     };
     let times = |i: usize| needed(ahead[i]) / power.if_true[i];
@@ -103,7 +103,7 @@ pub fn times_as_long(power: &Power, ahead: [f64; 2]) -> Option<f64> {
 /// excursions outside the range of the records, as a share of that range.
 #[must_use]
 pub fn by_use((a, out_a): (&Power, f64), (b, out_b): (&Power, f64)) -> Ordering {
-    let useful = |power: &Power| power.power.min(PLENTY);
+    let useful = |power: &Power| power.power.min(SUFFICIENT_POWER);
     let excursion = |out: f64| (out / SAME_EXCURSION).floor();
     useful(b)
         .total_cmp(&useful(a))

@@ -31,7 +31,7 @@ pub(crate) const WHOLE: f64 = 0.9;
 pub(crate) const PART: f64 = 0.38;
 
 /// A noise floor below this share of the error counts as zero.
-const NOTHING: f64 = 1e-9;
+const NEGLIGIBLE: f64 = 1e-9;
 
 /// Grade of the explanation by a set of effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -278,7 +278,7 @@ pub(crate) fn explained(base: &Node, last: &Node, floor: &[f64]) -> Result<f64, 
     let (before, after) = (series(base)?, series(last)?);
     // With a noise floor of zero, all of the error is to be explained.
     let rms = base.setup.rms_per_output(&before);
-    let least = |(floor, rms): (&f64, &f64)| floor.max(NOTHING * rms).max(f64::MIN_POSITIVE);
+    let least = |(floor, rms): (&f64, &f64)| floor.max(NEGLIGIBLE * rms).max(f64::MIN_POSITIVE);
     let scales: Vec<f64> = floor.iter().zip(&rms).map(least).collect();
     let mean_square = |series: &[Vec<f64>]| base.setup.weighted_rms(series, &scales).powi(2);
     let (before, after) = (mean_square(&before), mean_square(&after));

@@ -65,7 +65,7 @@ impl Walk {
         largest: 1.0,
         fitted_again: true,
     };
-    /// A small walk that starts at zero, for a comparison with effects that are nearly an offset.
+    /// [`Self::SMALL`] from zero: it has no offset, and does not describe what effects close to an offset describe.
     pub const SMALL_FROM_ZERO: Self = Self {
         anywhere: false,
         ..Self::SMALL

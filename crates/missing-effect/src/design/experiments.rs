@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use ct_signals::Record;
-use effect_search::design::{PLENTY, Sequence, by_use, power, sequences};
+use effect_search::design::{SUFFICIENT_POWER, Sequence, by_use, power, sequences};
 use greybox::Triangle;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
@@ -338,7 +338,7 @@ impl Search<'_, '_> {
         let instead = || !self.leaves_out("what could be done instead");
         let again = instead().then(|| self.again(bounds, &before)).flatten();
         // With ample power no wider range is needed.
-        let wider = if best.power.power < PLENTY && instead() {
+        let wider = if best.power.power < SUFFICIENT_POWER && instead() {
             self.wider(bounds, seed, &before)?
         } else {
             None

@@ -242,7 +242,7 @@ fn joined<'a>(
     predicted: f64,
 ) -> Option<Proposal<'a>> {
     let mut structure = first.setup.structure.with(second.placed).ok()?;
-    // A start that was selected from the residual for one effect is a start for the other one too.
+    // The first has no period or quantisation step of its own: those of the second are used.
     let picked = &second.setup.structure.scales;
     if structure.scales.period == 0.0 {
         structure.scales.period = picked.period;

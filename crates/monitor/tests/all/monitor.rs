@@ -77,7 +77,7 @@ fn model() -> Model {
     Model::new(Plant::SingleTank, known)
 }
 
-/// The first and the last alarm of a leak that begins at 4000 s, which was seen, named and dated.
+/// The first and the last alarm for a leak that begins at 4000 s: it is detected in time, and named with its onset.
 fn first_and_last<'a>(alarms: &[&'a Alarm]) -> (&'a Alarm, &'a Alarm) {
     let first = alarms.first().unwrap();
     // A time constant is 100 s.

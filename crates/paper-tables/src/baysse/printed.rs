@@ -22,7 +22,7 @@ pub struct Simulated {
     pub iterations: Option<Printed>,
 }
 
-const NOTHING: Simulated = Simulated {
+const NOT_PRINTED: Simulated = Simulated {
     mean: [None; 2],
     variance: [None; 2],
     distance: None,
@@ -34,7 +34,7 @@ pub const INSTRUMENTS: Simulated = Simulated {
     mean: [p(5.91416, 5), p(90.3202, 4)],
     variance: [p(4.84e-4, 6), p(2.08, 2)],
     distance: p(196.89, 2),
-    ..NOTHING
+    ..NOT_PRINTED
 };
 
 /// Table I: the method without normalisation.

@@ -121,7 +121,7 @@ impl Settings {
         sum / (steps + 1) as f64
     }
 
-    /// Share of the distance to `K u` that the tank covers in a step, 0 to 1.
+    /// The factor of one step, `y += factor (K u - y)`, 0 to 1.
     pub(super) fn share(&self, rule: Rule) -> f64 {
         let part = self.dt / self.time_constant;
         match rule {

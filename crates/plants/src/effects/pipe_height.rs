@@ -39,7 +39,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
 }
 
 /// Levels up to this one count as zero.
-const NOTHING: f64 = 1e-100;
+const NEGLIGIBLE: f64 = 1e-100;
 
 struct PipeHeight<T>(T);
 
@@ -53,7 +53,7 @@ impl<T: Scalar> Law<T> for PipeHeight<T> {
     }
     fn outflow(&self, level: &T, outflow: &mut T, _t: &T) {
         // An empty tank has no outflow, whatever the pipe's height. The threshold also keeps the square of a level from underflow.
-        if level.value() > NOTHING {
+        if level.value() > NEGLIGIBLE {
             // alpha sqrt(H) sqrt(1 + h/H): the factor is exactly one at h = 0.
             *outflow = *outflow * (self.0 / *level + 1.0).sqrt();
         }

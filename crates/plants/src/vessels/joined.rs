@@ -167,7 +167,7 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         T::constant(slope / self.area(i, &level).value())
     }
 
-    /// A step, cut into parts that are accurate at the roots and stable.
+    /// A step in parts that are stable, and short enough for the square roots of low levels.
     pub(super) fn joined_part(&mut self, h: T, q: &Inflow<T>, t: f64, watch: &mut Watch<T>) {
         // Only the copy itself has no copy, and the copy is never stepped.
         let Some(mut values) = self.values.take() else {

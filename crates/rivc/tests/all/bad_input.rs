@@ -62,7 +62,7 @@ fn records() {
     says(&of(bad), &["the output is inf at sample 7"]);
     let mut bad = record(400);
     bad.output.fill(f64::NAN);
-    says(&of(bad), &["no reading of the output"]);
+    says(&of(bad), &["the output has no measured samples"]);
     let mut bad = record(400);
     bad.output[3..].fill(f64::NAN);
     says(&of(bad), &["3 samples besides 397", "reading is missing"]);

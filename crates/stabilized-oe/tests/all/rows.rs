@@ -282,10 +282,10 @@ fn a_penalty_is_relaxed_exactly_and_never_passed() {
     assert!(acted > 50 && obeyed > 50, "{acted} {obeyed}");
 }
 
-/// First order with noise, which draws `c_1` to 0. The row `c_1 >= a_1/2`, for which `C^/A^ - 1/2` is positive real, is kept; but as it
-/// couples, it draws `a_1` down with `c_1`. A row on `c^` alone, `c_1 >= 8`, leaves `theta^` where it belongs.
+/// First order with noise, which biases `c_1` towards 0. The constraint `c_1 >= a_1/2`, for which `C^/A^ - 1/2` is positive real, holds; but
+/// as it couples the two, `a_1` is biased towards 0 too. The constraint `c_1 >= 8`, of `c^` alone, does not bias `theta^`.
 #[test]
-fn a_row_that_couples_draws_theta_along() {
+fn a_coupled_constraint_biases_theta() {
     let run = |f: f64, chi: f64, weight: f64| {
         let weights = Weights::least_squares(0.02).unwrap();
         let theta = ContinuousRls::new(SVector::from([5.0, 0.5]), SMatrix::identity(), weights);

@@ -78,7 +78,7 @@ pub(crate) fn partial_of(mut diagnosis: Diagnosis) -> Diagnosis {
         disagree: true,
     };
     diagnosis.effort = Effort {
-        limit: Some(20.0),
+        limit: Some(40.0),
         left_out: vec!["swap steps between pairs of effects".into()],
         interrupted: false,
     };

@@ -234,7 +234,7 @@ fn constant_gains(gains: &[ConstantGain]) -> String {
     section(
         "constant",
         sentences::CONSTANT_GAINS,
-        "The paper prints no figures of the diagonal one. Medians of the runs; E is the criterion, s.",
+        "The paper prints no values for the diagonal gain. Medians of the runs; E: the criterion [s].",
         &table(
             "Constant gains",
             "<tr><th scope=\"col\">Gain</th><th scope=\"col\">Rule</th><th scope=\"col\" class=\"number\">E250</th>\

@@ -104,9 +104,11 @@ pub(crate) fn assemble(
     if verdict == Verdict::Adequate {
         ranked.push("none".to_string());
     }
-    ranked.extend(context.ids(&rounded));
-    let others = singles.iter().map(|single| single.effect.clone());
-    ranked.extend(others.filter(|id| !context.ids(&rounded).contains(id)));
+    let rounded = context.ids(&rounded);
+    let others = singles.iter().map(|single| &single.effect);
+    let others: Vec<String> = others.filter(|id| !rounded.contains(id)).cloned().collect();
+    ranked.extend(rounded);
+    ranked.extend(others);
     let noise = outputs.iter().zip(own.noise.iter());
     let noise = noise.map(|(output, noise)| NoiseFloor {
         output: output.name.clone(),

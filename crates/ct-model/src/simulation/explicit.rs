@@ -3,7 +3,7 @@
 //! **Reference**: J. R. Dormand, P. J. Prince, J. Computational and Applied Mathematics 6 (1980) 19-26; E. Hairer, S. P. Nørsett,
 //! G. Wanner, Solving Ordinary Differential Equations I, 2nd edition, table II.5.2 and, for the interpolation, section II.6.
 
-use super::step::{Drive, Step};
+use super::step::{Drive, Step, largest};
 use crate::scalar::Scalar;
 use crate::tape::Tape;
 
@@ -85,11 +85,7 @@ pub(super) fn step<T: Scalar>(
         } else {
             time + h * NODES[stage]
         };
-        let next = std::mem::take(&mut work.next);
-        drive.load(tape, work, at, &next);
-        work.next = next;
-        work.evaluate_slopes(tape, drive);
-        work.keep_slope(tape, stage);
+        work.evaluate_next(tape, drive, at, stage);
     }
     work.begun = true;
 }
@@ -128,10 +124,7 @@ pub(super) fn error<T: Scalar>(work: &Step<T>, h: f64, scale: &[f64]) -> f64 {
         let sum: f64 = slopes.map(|(k, e)| k[i].value() * e).sum();
         (h * sum).abs() / scale[i]
     };
-    // A maximum that propagates NaN.
-    (0..n)
-        .map(of)
-        .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
+    largest((0..n).map(of))
 }
 
 /// The states at a share of the last step, by interpolation.

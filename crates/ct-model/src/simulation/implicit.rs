@@ -7,7 +7,7 @@
 
 use nalgebra::DMatrix;
 
-use super::step::{Drive, Step};
+use super::step::{Drive, Step, largest};
 use crate::scalar::{Dual, Scalar};
 use crate::tape::{Registers, Tape};
 
@@ -193,5 +193,5 @@ pub(super) fn step<T: Scalar>(
     });
     let errors = inverse * errors;
     let shares = errors.iter().zip(scale).map(|(e, s)| e.abs() / s);
-    Some(shares.fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a }))
+    Some(largest(shares))
 }

@@ -9,7 +9,7 @@
 //! section II.4 for embedded methods.
 
 use super::explicit::STAGES;
-use super::step::{Drive, Step};
+use super::step::{Drive, Step, largest};
 use crate::scalar::Scalar;
 use crate::tape::Tape;
 
@@ -43,7 +43,7 @@ pub(super) fn step<T: Scalar>(
                 };
             }
         }
-        evaluate(tape, work, drive, (time, h, *node), stage);
+        work.evaluate_next(tape, drive, time + h * *node, stage);
     }
     for (i, (next, x)) in work.next.iter_mut().zip(x).enumerate() {
         let slope = |stage: usize| work.slopes[stage * n + i] * WEIGHTS[stage];
@@ -54,23 +54,8 @@ pub(super) fn step<T: Scalar>(
             *x + h * mean
         };
     }
-    evaluate(tape, work, drive, (time, h, 1.0), END);
+    work.evaluate_next(tape, drive, time + h, END);
     work.begun = true;
-}
-
-/// Stores the slope at `work.next`, a share of the step after its beginning.
-fn evaluate<T: Scalar>(
-    tape: &Tape,
-    work: &mut Step<T>,
-    drive: &Drive<'_, T>,
-    (time, h, share): (T, T, f64),
-    stage: usize,
-) {
-    let next = std::mem::take(&mut work.next);
-    drive.load(tape, work, time + h * share, &next);
-    work.next = next;
-    work.evaluate_slopes(tape, drive);
-    work.keep_slope(tape, stage);
 }
 
 /// The error of the step relative to the tolerance: at most one for an acceptable step.
@@ -79,6 +64,5 @@ pub(super) fn error<T: Scalar>(work: &Step<T>, h: f64, scale: &[f64]) -> f64 {
     let at = |stage: usize| work.slopes[stage * n..].iter();
     let pairs = at(END).zip(at(3)).zip(scale);
     let shares = pairs.map(|((a, b), scale)| (ERROR * h * (a.value() - b.value())).abs() / scale);
-    // A maximum that propagates NaN.
-    shares.fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
+    largest(shares)
 }

@@ -41,6 +41,15 @@ impl<T: Scalar> Step<T> {
         }
     }
 
+    /// Evaluates the slopes at a time for the states of `next`, and stores them as those of a stage.
+    pub fn evaluate_next(&mut self, tape: &Tape, drive: &Drive<'_, T>, time: T, stage: usize) {
+        let next = std::mem::take(&mut self.next);
+        drive.load(tape, self, time, &next);
+        self.next = next;
+        self.evaluate_slopes(tape, drive);
+        self.keep_slope(tape, stage);
+    }
+
     /// Sets the guards on which the states slide to their sides again, whatever the signs of their differences.
     pub fn follow_sliding(&mut self, tape: &Tape) {
         self.sliding.follow(tape, &mut self.registers);
@@ -62,6 +71,11 @@ impl<T: Scalar> Step<T> {
             *slope = self.registers.values[register];
         }
     }
+}
+
+/// The largest of the states' errors, or NaN if one is NaN.
+pub(super) fn largest(errors: impl Iterator<Item = f64>) -> f64 {
+    errors.fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
 }
 
 /// A sampling interval and the inputs in it, each linear in time.

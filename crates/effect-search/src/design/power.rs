@@ -45,7 +45,7 @@ const NEARLY_CERTAIN: f64 = 0.9;
 const LIKELY: f64 = 0.5;
 /// Noncentrality below which two models give the same response.
 const SAME_RESPONSE: f64 = 1.0;
-/// The 0.95 quantile of the normal distribution: how long an experiment has to be for a decision of this probability.
+/// The 0.95 quantile of the normal distribution: a longer experiment is to decide with this probability.
 const QUANTILE: f64 = 1.645;
 
 /// The probability that the criterion of the false one ends above that of the true one by more than 6: their

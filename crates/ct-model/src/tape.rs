@@ -49,6 +49,8 @@ pub(crate) struct Tape {
     pub reads_time: bool,
     /// Registers that guards read.
     read_by_guards: Vec<Register>,
+    /// Registers that guards and outputs read.
+    read_by_samples: Vec<Register>,
     /// Registers that are made of parameters and inputs alone.
     pub of_inputs: Vec<bool>,
     /// Registers that any operation reads.
@@ -145,6 +147,8 @@ impl Tape {
     fn note_results(&mut self) {
         let guards = self.guards.iter().map(|guard| guard.difference);
         self.read_by_guards = guards.collect();
+        let outputs = self.outputs.iter().copied();
+        self.read_by_samples = self.read_by_guards.iter().copied().chain(outputs).collect();
         let delays = self.delays.iter().flat_map(|&(what, by)| [what, by]);
         let plays = self.plays.iter().flat_map(|play| [play.from, play.to]);
         let all = self.derivatives.iter().chain(&self.read_by_guards);
@@ -229,6 +233,24 @@ impl Tape {
             &mut registers.values,
             registers.extended,
         );
+    }
+
+    /// The differences of guards and the outputs, where the inputs are held.
+    pub fn evaluate_readings<T: Scalar>(&self, registers: &mut Registers<T>) {
+        run(
+            &registers.selected.readings,
+            &mut registers.values,
+            registers.extended,
+        );
+    }
+
+    /// Whether the difference of a guard has left the side of its answer, or has no value.
+    pub fn is_any_crossed<T: Scalar>(&self, registers: &Registers<T>) -> bool {
+        let mut guards = self.guards.iter().zip(&registers.answers);
+        guards.any(|(guard, &answer)| {
+            let difference = registers.values[guard.difference].value();
+            difference.is_nan() || guard.is_crossed(answer, difference)
+        })
     }
 
     /// Evaluates the tape with the branch of every guard chosen by its present difference.

@@ -46,7 +46,7 @@ const STATE_REACH: f64 = 300.0;
 /// Number of iterations of the output weights.
 const WEIGHTINGS: usize = 3;
 /// Tolerance of simulations in fits from many starts, whose best result is fitted again with the tolerance of the setup, ...
-const START_TOLERANCE: f64 = 1e-7;
+const START_TOLERANCE: f64 = 1e-6;
 /// ... and the least relative fall of their cost.
 const START_COST: f64 = 1e-6;
 /// Largest change of an output by the tolerance of the simulation, as a share of its noise.
@@ -184,7 +184,7 @@ impl<'a> ModelSetup<'a> {
         Self { tolerance, ..self }
     }
 
-    /// The largest tolerance, up to 1e-7, with which the outputs change by at most a hundredth of their noise, the standard deviation at each
+    /// The largest tolerance, up to 1e-6, with which the outputs change by at most a hundredth of their noise, the standard deviation at each
     /// output: that of [`ct_model::TOLERANCE`] where no larger one is sufficient, or the simulation is not finite.
     #[must_use]
     pub fn sufficient_tolerance(&self, x: &[f64], noise: &[f64]) -> f64 {
@@ -293,7 +293,7 @@ impl<'a> ModelSetup<'a> {
     }
 
     /// Fits from many starts. Outputs are weighted by their noise, estimated from the part of the residual that its past does not predict:
-    /// a model error at one output does not increase the weight of the others. All starts are simulated with a tolerance of at least 1e-7; the
+    /// a model error at one output does not increase the weight of the others. All starts are simulated with a tolerance of at least 1e-6; the
     /// best end is fitted again with that of the setup.
     ///
     /// # Errors

@@ -14,6 +14,8 @@ pub(super) struct Piece<T> {
     pub begin: T,
     pub length: T,
     pub values: [T; POINTS],
+    /// All values and their derivatives are equal, as those of a held input are.
+    is_constant: bool,
     /// Number of jumps before the piece.
     jumps: usize,
 }
@@ -21,6 +23,9 @@ pub(super) struct Piece<T> {
 impl<T: Scalar> Piece<T> {
     /// The interpolating polynomial of degree four through the piece's points.
     fn at(&self, time: T) -> T {
+        if self.is_constant {
+            return self.values[0];
+        }
         let share = (time - self.begin) / self.length;
         let z = share.value() * (POINTS - 1) as f64;
         let mut of = [(share, 0.0); POINTS + 1];
@@ -91,10 +96,13 @@ impl<T: Scalar> Delay<T> {
 
     /// Stores the values of the expression over an interval.
     pub fn push(&mut self, begin: T, length: T, values: [T; POINTS]) {
+        let first = values[0];
+        let is_first = |value: &T| value.value() == first.value() && value.same_derivatives(first);
         self.pieces.push_back(Piece {
             begin,
             length,
             values,
+            is_constant: values.iter().all(is_first),
             jumps: self.gone_in,
         });
     }

@@ -127,19 +127,70 @@ pub(super) fn error<T: Scalar>(work: &Step<T>, h: f64, scale: &[f64]) -> f64 {
     largest((0..n).map(of))
 }
 
-/// The states at a share of the last step, by interpolation.
-pub(super) fn within<T: Scalar>(work: &Step<T>, x: &[T], h: T, share: f64, into: &mut [T]) {
+/// The error of the derivatives in the step, relative to the tolerance: a share of the derivative of each state, before or after the step,
+/// or of its change.
+pub(super) fn error_of_derivatives<T: Scalar>(
+    work: &Step<T>,
+    x: &[T],
+    h: f64,
+    tolerance: f64,
+) -> f64 {
     let n = x.len();
-    for i in 0..n {
-        let slope = |stage: usize| work.slopes[stage * n + i];
-        let rise = work.next[i] - x[i];
-        let first = h * slope(0) - rise;
-        let second = rise - h * slope(STAGES - 1) - first;
-        let mut bend = T::constant(0.0);
-        for (stage, d) in BEND.into_iter().enumerate() {
-            bend = bend + slope(stage) * d;
+    let of = |i: usize| {
+        let mut sum = T::constant(0.0);
+        for (k, e) in work.slopes.chunks_exact(n).zip(ERROR) {
+            sum = sum + k[i] * e;
         }
-        let inner = second + h * bend * (1.0 - share);
-        into[i] = x[i] + (rise + (first + inner * share) * (1.0 - share)) * share;
+        let sizes = x[i].slopes().iter().zip(work.next[i].slopes());
+        let sizes = sizes.zip(work.slopes[i].slopes());
+        let lanes = sum.slopes().iter().zip(sizes);
+        largest(lanes.map(|(error, ((before, after), slope))| {
+            let size = before.abs().max(after.abs()).max((h * slope).abs());
+            // Without an error: a lane on which the state does not depend.
+            if *error == 0.0 {
+                0.0
+            } else {
+                (h * error).abs() / (tolerance * size)
+            }
+        }))
+    };
+    largest((0..n).map(of))
+}
+
+/// The states within a step, by interpolation of order four.
+pub(super) struct Interpolation<T> {
+    /// For each state: the value at the beginning, then the coefficients of the terms of order one to four.
+    coefficients: Vec<[T; 5]>,
+}
+
+impl<T: Scalar> Interpolation<T> {
+    pub fn new(states: usize) -> Self {
+        Self {
+            coefficients: vec![[T::constant(0.0); 5]; states],
+        }
+    }
+
+    /// Sets the interpolation to that over the step computed last, of length `h` from `x`.
+    pub fn over(&mut self, work: &Step<T>, x: &[T], h: T) {
+        let n = x.len();
+        for (i, (coefficients, &x)) in self.coefficients.iter_mut().zip(x).enumerate() {
+            let slope = |stage: usize| work.slopes[stage * n + i];
+            let rise = work.next[i] - x;
+            let first = h * slope(0) - rise;
+            let second = rise - h * slope(STAGES - 1) - first;
+            let mut bend = T::constant(0.0);
+            for (stage, d) in BEND.into_iter().enumerate() {
+                bend = bend + slope(stage) * d;
+            }
+            *coefficients = [x, rise, first, second, h * bend];
+        }
+    }
+
+    /// The states at a share of the step.
+    pub fn at(&self, share: f64, into: &mut [T]) {
+        let rest = 1.0 - share;
+        for (into, &[x, rise, first, second, bend]) in into.iter_mut().zip(&self.coefficients) {
+            *into = x + (rise + (first + (second + bend * rest) * share) * rest) * share;
+        }
     }
 }

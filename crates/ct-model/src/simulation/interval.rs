@@ -2,6 +2,7 @@
 
 use super::delays::{Delays, POINTS};
 use super::events::Event;
+use super::explicit::Interpolation;
 use super::step::{Drive, Interval};
 use super::{Method, NoSolution, SimulationState, explicit, implicit, order_four};
 use crate::scalar::Scalar;
@@ -28,6 +29,20 @@ const LEAST_FOR_ORDER_FOUR: f64 = 1e-8;
 const MOST_OF_ORDER_FIVE: u32 = 64;
 /// The model is stiff if the step length times the norm of the Jacobian is above this: stability, not accuracy, then limits the steps.
 const STABILITY: f64 = 1.5;
+
+/// Ratio of the next attempt to a step whose error is too large; a NaN error asks for a much shorter step.
+pub(super) fn shorter(error: f64) -> f64 {
+    if error.is_finite() {
+        (0.9 * error.powf(-0.2)).clamp(0.1, 0.9)
+    } else {
+        0.1
+    }
+}
+
+/// Ratio of the next step to one whose error is acceptable.
+pub(super) fn longer(error: f64) -> f64 {
+    (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, LONGER)
+}
 
 impl<T: Scalar> SimulationState<T> {
     /// Evaluates the guards at the beginning of an interval, and stores the known values of delayed expressions.
@@ -96,18 +111,37 @@ impl<T: Scalar> SimulationState<T> {
         }
         let count = delays.all.len();
         let mut values = vec![[T::constant(0.0); POINTS]; count];
+        let inside = (!ahead && self.method != Method::Implicit).then(|| {
+            let mut inside = Interpolation::new(tape.states);
+            inside.over(&self.work, &self.state, length);
+            inside
+        });
+        // What is made of held inputs is constant.
+        let is_held = ahead
+            && interval.rise.iter().all(|rise| *rise == 0.0)
+            && delays
+                .all
+                .iter()
+                .zip(&tape.delays)
+                .all(|(delay, &(what, _))| !delay.known_ahead || tape.of_inputs[what]);
         for point in 0..POINTS {
+            if is_held && point > 0 {
+                for values in &mut values {
+                    values[point] = values[0];
+                }
+                continue;
+            }
             let share = point as f64 / (POINTS - 1) as f64;
             let mut state = std::mem::take(&mut self.scratch);
             state.copy_from_slice(&self.state);
             if !ahead {
-                match self.method {
-                    Method::Implicit => {
+                match &inside {
+                    None => {
                         for (i, x) in state.iter_mut().enumerate() {
                             *x = *x + (self.work.next[i] - *x) * share;
                         }
                     }
-                    _ => explicit::within(&self.work, &self.state, length, share, &mut state),
+                    Some(inside) => inside.at(share, &mut state),
                 }
             }
             let drive = Drive::new(interval, delays);
@@ -190,13 +224,7 @@ impl<T: Scalar> SimulationState<T> {
                 }
             }
             if (error > 1.0 || error.is_nan()) && h.value() > shortest {
-                // A NaN error asks for a much shorter step.
-                let factor = if error.is_finite() {
-                    (0.9 * error.powf(-0.2)).clamp(0.1, 0.9)
-                } else {
-                    0.1
-                };
-                self.length = (h.value() * factor).max(shortest);
+                self.length = (h.value() * shorter(error)).max(shortest);
                 continue;
             }
             if !error.is_finite() {
@@ -206,7 +234,7 @@ impl<T: Scalar> SimulationState<T> {
             let event = beyond.or_else(|| self.first_event(tape, interval, h, delays));
             let is_short = !whole || error > 0.5 || self.length < h.value() * LONGER;
             if event.is_none() && is_short && !self.order_four {
-                let grown = h.value() * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, LONGER);
+                let grown = h.value() * longer(error);
                 if !whole || error > 0.5 || grown > self.length {
                     self.length = grown.max(shortest);
                 }

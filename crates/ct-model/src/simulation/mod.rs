@@ -23,6 +23,7 @@ mod numbers;
 mod order_four;
 mod owners;
 mod sliding;
+mod span;
 mod step;
 
 pub use self::interval::TOLERANCE;
@@ -34,6 +35,7 @@ use self::delays::{Delay, Delays};
 use self::exact::Exact;
 use self::implicit::Jacobian;
 use self::interval::MOST_STEPS;
+use self::span::Span;
 use self::step::{Drive, Interval, Step};
 use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
@@ -86,6 +88,7 @@ pub struct SimulationState<T> {
     order_four: bool,
     /// Number of steps of order five before order four is attempted again, now and after the next failure.
     order_five: (u32, u32),
+    span: Span<T>,
     rise: Vec<f64>,
     /// The inputs at the end of the last interval.
     last: Vec<f64>,
@@ -145,6 +148,7 @@ impl<T: Scalar> SimulationState<T> {
             length: f64::INFINITY,
             order_four: false,
             order_five: (0, 1),
+            span: Span::new(tape.states),
             rise: vec![0.0; tape.inputs],
             last: vec![0.0; tape.inputs],
             last_length: 0.0,
@@ -170,6 +174,7 @@ impl<T: Scalar> SimulationState<T> {
             // The reading is that at the end of the last step.
             tape.evaluate_outputs(&mut self.work.registers);
         } else {
+            self.span.end();
             self.work.registers.held = false;
             drive.load(tape, &mut self.work, self.time, &self.state);
             if self.begun {
@@ -181,8 +186,8 @@ impl<T: Scalar> SimulationState<T> {
         }
         self.ended_within = false;
         self.read.copy_from_slice(inputs);
-        // At the beginning of an interval, a jump may leave a delay and a play operator may move.
-        self.computed = tape.delays.is_empty() && tape.plays.is_empty();
+        // At the beginning of an interval, a jump may leave a delay and a play operator may move. Within a span, slopes are not computed.
+        self.computed = tape.delays.is_empty() && tape.plays.is_empty() && !self.span.is_active();
         for (output, &register) in outputs.iter_mut().zip(&tape.outputs) {
             *output = self.work.registers.values[register];
         }
@@ -250,8 +255,7 @@ impl<T: Scalar> SimulationState<T> {
         let result = if self.exact.is_some() {
             self.step_exactly(tape, from, &rise, length)
         } else {
-            self.begin_interval(tape, interval, until, delays);
-            self.steps(tape, interval, until, delays)
+            self.step_over(tape, interval, until, delays)
         };
         self.rise = rise;
         self.computed = false;
@@ -262,6 +266,32 @@ impl<T: Scalar> SimulationState<T> {
         } else {
             Err(NoSolution { time: begin })
         }
+    }
+
+    /// Steps over one interval, or the part in it of a span over several.
+    fn step_over(
+        &mut self,
+        tape: &Tape,
+        interval: Interval<'_>,
+        until: f64,
+        delays: &mut Delays<T>,
+    ) -> Result<(), NoSolution> {
+        let held = interval.rise.iter().all(|rise| *rise == 0.0);
+        let is_still = self.begun && held && interval.from == self.last;
+        if !is_still {
+            self.span.end();
+        }
+        let is_within = self.span.is_active() && self.go_on_in_span(tape, interval, until, delays);
+        if !is_within {
+            self.begin_interval(tape, interval, until, delays);
+            let begins = is_still && self.begin_span(tape, interval, delays);
+            if !(begins && self.go_on_in_span(tape, interval, until, delays)) {
+                return self.steps(tape, interval, until, delays);
+            }
+        }
+        // The registers hold what outputs and guards need.
+        self.ended_within = true;
+        Ok(())
     }
 
     /// Changes from exact steps to explicit ones: the inputs are no longer held, and the model is nonlinear in them.

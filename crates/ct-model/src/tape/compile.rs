@@ -114,6 +114,7 @@ impl Tape {
                 .collect(),
             reads_time: false,
             read_by_guards: Vec::new(),
+            read_by_samples: Vec::new(),
             of_inputs: Vec::new(),
             read_by_all: Vec::new(),
             first_delayed,

@@ -16,6 +16,8 @@ pub(super) struct Selected {
     /// ... the operations that guards need in addition to the slopes, those that outputs need in addition to both, and all.
     pub guards: Vec<(Operation, Register)>,
     pub outputs: Vec<(Operation, Register)>,
+    /// The operations that guards and outputs need and whose results change although all inputs are held.
+    pub readings: Vec<(Operation, Register)>,
     pub all: Vec<(Operation, Register)>,
 }
 
@@ -31,6 +33,7 @@ impl Selected {
             moving: list(),
             guards: list(),
             outputs: list(),
+            readings: list(),
             all: list(),
         }
     }
@@ -82,6 +85,7 @@ impl Tape {
             moving,
             guards,
             outputs,
+            readings,
             all,
         } = into;
         of.clear();
@@ -92,6 +96,8 @@ impl Tape {
         guards.retain(|guard| !slopes.contains(guard));
         self.needed(&self.outputs, (taken, plain), outputs);
         outputs.retain(|output| !slopes.contains(output) && !guards.contains(output));
+        self.needed(&self.read_by_samples, (taken, plain), readings);
+        readings.retain(|(_, to)| !self.of_inputs[*to]);
         moving.clear();
         moving.extend(slopes.iter().filter(|(_, to)| !self.of_inputs[*to]));
     }

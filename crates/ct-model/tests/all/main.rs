@@ -14,6 +14,7 @@ mod round_trip;
 mod shared;
 mod simulated;
 mod sliding;
+mod spans;
 mod support;
 mod threads;
 mod tolerance;

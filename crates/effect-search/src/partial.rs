@@ -14,7 +14,8 @@
 //! [`Thresholds::partial_share`]: crate::Thresholds::partial_share
 //! [`Thresholds::partial_share_of_time`]: crate::Thresholds::partial_share_of_time
 //!
-//! A larger set is taken where each further effect leaves at most a half of what a smaller set leaves.
+//! A larger set is taken where each further effect leaves at most a half of what a smaller set leaves, or two thirds of the squared error
+//! in the cross-validation.
 
 use ct_model::effects::EffectParameter;
 use ct_signals::{ArModel, Record};
@@ -25,15 +26,26 @@ use crate::Error;
 use crate::node::{Context, FINE, Node, ROUGH};
 use crate::search::{best_first, same_set};
 
+/// A set as a partial explanation.
+#[derive(Clone)]
+struct Part {
+    set: Node,
+    /// The share of the error above the noise that it explains.
+    share: f64,
+    /// The squared error of each output in the cross-validation; `None` if the set is no partial explanation.
+    left_out: Option<Vec<f64>>,
+}
+
 impl Context<'_> {
     /// The set that explains the largest part of the error, fitted with white noise, and that part; `None` if no set is a partial
     /// explanation. `sets`: fitted with any noise model; `base`: fitted with white noise.
     pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<(Node, f64)>, Error> {
         let white = Noise::white(self.problem.records[0].outputs.len());
         let own_base = self.in_limited_noise(base)?;
+        let base_left_out = self.left_out_squares(base)?;
         let most = sets.iter().map(|set| self.size(set)).max().unwrap_or(0);
-        let mut best: Option<(Node, f64)> = None;
-        let mut smaller: Vec<(Node, f64)> = Vec::new();
+        let mut best: Option<Part> = None;
+        let mut smaller: Vec<Part> = Vec::new();
         for size in self.size(base) + 1..=most {
             if self.limit.passed() {
                 break;
@@ -49,39 +61,44 @@ impl Context<'_> {
                 .filter_map(|set| self.refitted(&set, &white, ROUGH).ok());
             let mut fits = best_first(fits.collect());
             fits.truncate(self.thresholds.partial_tested);
-            let tested: Vec<(Node, f64, bool)> = fits
+            let tested: Vec<Part> = fits
                 .into_par_iter()
                 .filter_map(|set| self.refitted(&set, &white, FINE).ok())
                 .filter_map(|set| {
-                    let (share, accepted) = self.is_part(base, &own_base, &set).ok()?;
-                    Some((set, share, accepted))
+                    self.part((base, &own_base), base_left_out.as_deref(), set)
+                        .ok()
                 })
                 .collect();
-            let pays = |(set, share): (&Node, f64), (less, of_less): (&Node, f64)| {
-                let further = self.size(set) - self.size(less);
-                1.0 - share <= self.thresholds.partial_left.powi(further as i32) * (1.0 - of_less)
-            };
-            let says_more = |set: &Node, share: f64| {
-                smaller.iter().all(|(subset, of_subset)| {
-                    let within = subset.added.iter().all(|i| set.added.contains(i));
-                    !within || pays((set, share), (subset, *of_subset))
+            let says_more = |part: &&Part| {
+                smaller.iter().all(|less| {
+                    let within = less.set.added.iter().all(|i| part.set.added.contains(i));
+                    !within || self.pays(part, less)
                 })
             };
-            let more = tested
-                .iter()
-                .filter(|(set, share, _)| says_more(set, *share));
-            let accepted = more.filter(|(.., accepted)| *accepted);
-            let largest = accepted.max_by(|a, b| a.1.total_cmp(&b.1)).cloned();
-            if let Some((set, share, _)) = largest
-                && best
-                    .as_ref()
-                    .is_none_or(|(less, of_less)| pays((&set, share), (less, *of_less)))
+            let accepted = tested.iter().filter(|part| part.left_out.is_some());
+            let more = accepted.filter(says_more);
+            let largest = more.max_by(|a, b| a.share.total_cmp(&b.share));
+            if let Some(part) = largest
+                && best.as_ref().is_none_or(|less| self.pays(part, less))
             {
-                best = Some((set, share));
+                best = Some(part.clone());
             }
-            smaller.extend(tested.into_iter().map(|(set, share, _)| (set, share)));
+            smaller.extend(tested);
         }
-        Ok(best)
+        Ok(best.map(|best| (best.set, best.share)))
+    }
+
+    /// Whether each effect of a part in addition to those of a smaller one is worth it.
+    fn pays(&self, part: &Part, less: &Part) -> bool {
+        let further = (self.size(&part.set) - self.size(&less.set)) as i32;
+        let left = |of: f64| of.powi(further);
+        if 1.0 - part.share <= left(self.thresholds.partial_left) * (1.0 - less.share) {
+            return true;
+        }
+        let (Some(after), Some(before)) = (&part.left_out, &less.left_out) else {
+            return false;
+        };
+        1.0 - fall(before, after) <= left(self.thresholds.partial_left_out)
     }
 
     /// Number of effects of a set; functions of time count twice, because they are more flexible.
@@ -90,9 +107,15 @@ impl Context<'_> {
         set.added.len() + set.added.iter().filter(in_time).count()
     }
 
-    /// The share of the error above the noise that a set explains, and whether the set is a partial explanation.
-    fn is_part(&self, base: &Node, own_base: &Fit, set: &Node) -> Result<(f64, bool), Error> {
-        let own = self.in_limited_noise(set)?;
+    /// A set with the share of the error above the noise that it explains, and, if it is a partial explanation, with its squared error in
+    /// the cross-validation. `base_left_out`: that of the base; `None` if one of its simulations is not finite.
+    fn part(
+        &self,
+        (base, own_base): (&Node, &Fit),
+        base_left_out: Option<&[f64]>,
+        set: Node,
+    ) -> Result<Part, Error> {
+        let own = self.in_limited_noise(&set)?;
         let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
         let share = explained(&base.fit, &set.fit, &floors);
         let new = &set.added[base.added.len()..];
@@ -104,15 +127,27 @@ impl Context<'_> {
                 self.thresholds.partial_share
             }
             && !(in_time && new.len() > 1)
-            && !self.at_a_bound(set, new)
+            && !self.at_a_bound(&set, new)
             && (new.len() == 1 || own_base.bic() - own.bic() > self.thresholds.bic_margin)
             && own
                 .noise
                 .iter()
                 .zip(own_base.noise.iter())
-                .all(|(own, base)| own.sigma() <= self.thresholds.innovation_ratio * base.sigma())
-            && self.carried_over(base, set)? >= self.thresholds.carried_over;
-        Ok((share, accepted))
+                .all(|(own, base)| own.sigma() <= self.thresholds.innovation_ratio * base.sigma());
+        let left_out = if accepted {
+            self.left_out_squares(&set)?
+        } else {
+            None
+        };
+        let carried_over = |after: &Vec<f64>| {
+            base_left_out.map_or(0.0, |before| fall(before, after)) >= self.thresholds.carried_over
+        };
+        let left_out = left_out.filter(carried_over);
+        Ok(Part {
+            set,
+            share,
+            left_out,
+        })
     }
 
     /// The fit of a set with a noise model of its own residual, with limited memory.
@@ -157,17 +192,6 @@ impl Context<'_> {
         all.any(|(parameter, (value, error))| {
             let mut own = fitted.iter().filter(|p| p.name == parameter.about.name);
             error.is_none() && own.any(|p| !p.starts.contains(value))
-        })
-    }
-
-    /// The part of the mean squared error that a set explains on parts of the records that it was not fitted to: a quarter of each record
-    /// is left out in turn (cross-validation). Negative if the error rises.
-    fn carried_over(&self, base: &Node, set: &Node) -> Result<f64, Error> {
-        let before = self.left_out_squares(base)?;
-        let after = self.left_out_squares(set)?;
-        Ok(match (before, after) {
-            (Some(before), Some(after)) => fall(&before, &after),
-            _ => 0.0,
         })
     }
 

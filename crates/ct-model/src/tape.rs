@@ -244,12 +244,12 @@ impl Tape {
         );
     }
 
-    /// Whether the difference of a guard has left the side of its answer, or has no value.
-    pub fn is_any_crossed<T: Scalar>(&self, registers: &Registers<T>) -> bool {
+    /// Whether the answer of a guard is no longer that of its difference, or the difference has no value.
+    pub fn is_any_changed<T: Scalar>(&self, registers: &Registers<T>) -> bool {
         let mut guards = self.guards.iter().zip(&registers.answers);
         guards.any(|(guard, &answer)| {
             let difference = registers.values[guard.difference].value();
-            difference.is_nan() || guard.is_crossed(answer, difference)
+            difference.is_nan() || guard.holds(difference) != answer
         })
     }
 

@@ -42,7 +42,7 @@ impl Context<'_> {
     pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<(Node, f64)>, Error> {
         let white = Noise::white(self.problem.records[0].outputs.len());
         let own_base = self.in_limited_noise(base)?;
-        let base_left_out = self.left_out_squares(base)?;
+        let base_left_out = self.left_out_squares(base).ok().flatten();
         let most = sets.iter().map(|set| self.size(set)).max().unwrap_or(0);
         let mut best: Option<Part> = None;
         let mut smaller: Vec<Part> = Vec::new();
@@ -77,10 +77,8 @@ impl Context<'_> {
             };
             let accepted = tested.iter().filter(|part| part.left_out.is_some());
             let more = accepted.filter(says_more);
-            let largest = more.max_by(|a, b| a.share.total_cmp(&b.share));
-            if let Some(part) = largest
-                && best.as_ref().is_none_or(|less| self.pays(part, less))
-            {
+            let more = more.filter(|part| best.as_ref().is_none_or(|less| self.pays(part, less)));
+            if let Some(part) = more.max_by(|a, b| a.share.total_cmp(&b.share)) {
                 best = Some(part.clone());
             }
             smaller.extend(tested);

@@ -132,7 +132,8 @@ pub struct Thresholds {
     /// A larger set is preferred if each further effect reduces the error above the noise level to at most this share of the smaller set's
     /// (0 to 1). Chosen.
     pub partial_left: f64,
-    /// The same for its squared error on parts of the records that it was not fitted to: one of the two is sufficient (0 to 1). Chosen.
+    /// Or if each further effect reduces the squared error in the cross-validation to at most this share of the smaller set's: either
+    /// criterion is sufficient (0 to 1). Chosen.
     pub partial_left_out: f64,
     /// Smallest share of the mean squared error that a set has to explain on parts of the records to which it was not fitted (0 to 1).
     /// Chosen.

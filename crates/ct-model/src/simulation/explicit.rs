@@ -127,8 +127,8 @@ pub(super) fn error<T: Scalar>(work: &Step<T>, h: f64, scale: &[f64]) -> f64 {
     largest((0..n).map(of))
 }
 
-/// The error of the derivatives in the step, relative to the tolerance: a share of the derivative of each state, before or after the step,
-/// or of its change.
+/// The error of the derivatives in the step, relative to the tolerance, which is a share of the largest of three: the derivative before the
+/// step, after it, and its slope times the step length.
 pub(super) fn error_of_derivatives<T: Scalar>(
     work: &Step<T>,
     x: &[T],
@@ -146,7 +146,7 @@ pub(super) fn error_of_derivatives<T: Scalar>(
         let lanes = sum.slopes().iter().zip(sizes);
         largest(lanes.map(|(error, ((before, after), slope))| {
             let size = before.abs().max(after.abs()).max((h * slope).abs());
-            // Without an error: a lane on which the state does not depend.
+            // A state that does not depend on a lane has an error and a size of zero.
             if *error == 0.0 {
                 0.0
             } else {

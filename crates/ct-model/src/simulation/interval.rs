@@ -31,7 +31,7 @@ const MOST_OF_ORDER_FIVE: u32 = 64;
 const STABILITY: f64 = 1.5;
 
 /// Ratio of the next attempt to a step whose error is too large; a NaN error asks for a much shorter step.
-pub(super) fn shorter(error: f64) -> f64 {
+pub(super) fn reduction(error: f64) -> f64 {
     if error.is_finite() {
         (0.9 * error.powf(-0.2)).clamp(0.1, 0.9)
     } else {
@@ -40,7 +40,7 @@ pub(super) fn shorter(error: f64) -> f64 {
 }
 
 /// Ratio of the next step to one whose error is acceptable.
-pub(super) fn longer(error: f64) -> f64 {
+pub(super) fn growth(error: f64) -> f64 {
     (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, LONGER)
 }
 
@@ -224,7 +224,7 @@ impl<T: Scalar> SimulationState<T> {
                 }
             }
             if (error > 1.0 || error.is_nan()) && h.value() > shortest {
-                self.length = (h.value() * shorter(error)).max(shortest);
+                self.length = (h.value() * reduction(error)).max(shortest);
                 continue;
             }
             if !error.is_finite() {
@@ -234,7 +234,7 @@ impl<T: Scalar> SimulationState<T> {
             let event = beyond.or_else(|| self.first_event(tape, interval, h, delays));
             let is_short = !whole || error > 0.5 || self.length < h.value() * LONGER;
             if event.is_none() && is_short && !self.order_four {
-                let grown = h.value() * longer(error);
+                let grown = h.value() * growth(error);
                 if !whole || error > 0.5 || grown > self.length {
                     self.length = grown.max(shortest);
                 }

@@ -5,6 +5,7 @@
 //! - All other models are integrated by an explicit method of order five with step-size control, or of order four where the tolerance is
 //!   large and the sampling interval short. If its steps become far shorter than the error requires, the model is stiff, and an implicit
 //!   method of order four continues ([`Method`]).
+//! - While the inputs are held, a step may have several sampling intervals, and the states at the samples are interpolated.
 //! - Steps end where an input jumps, where a jump leaves a delay, and where a branch changes (`if`, `min`, `max`, `abs`, `sign`). Such a
 //!   time depends on the parameters, and the step length carries its derivative, so that the later states have the derivatives of the exact
 //!   solution.
@@ -17,13 +18,13 @@ mod exact;
 mod explicit;
 mod implicit;
 mod interval;
+mod long_step;
 mod memory;
 mod model;
 mod numbers;
 mod order_four;
 mod owners;
 mod sliding;
-mod span;
 mod step;
 
 pub use self::interval::TOLERANCE;
@@ -35,7 +36,7 @@ use self::delays::{Delay, Delays};
 use self::exact::Exact;
 use self::implicit::Jacobian;
 use self::interval::MOST_STEPS;
-use self::span::Span;
+use self::long_step::LongStep;
 use self::step::{Drive, Interval, Step};
 use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
@@ -88,7 +89,7 @@ pub struct SimulationState<T> {
     order_four: bool,
     /// Number of steps of order five before order four is attempted again, now and after the next failure.
     order_five: (u32, u32),
-    span: Span<T>,
+    long_step: LongStep<T>,
     rise: Vec<f64>,
     /// The inputs at the end of the last interval.
     last: Vec<f64>,
@@ -148,7 +149,7 @@ impl<T: Scalar> SimulationState<T> {
             length: f64::INFINITY,
             order_four: false,
             order_five: (0, 1),
-            span: Span::new(tape.states),
+            long_step: LongStep::new(tape.states),
             rise: vec![0.0; tape.inputs],
             last: vec![0.0; tape.inputs],
             last_length: 0.0,
@@ -170,11 +171,13 @@ impl<T: Scalar> SimulationState<T> {
         };
         let drive = Drive::held(inputs, &self.held, &delays);
         let tape = &model.tape;
-        if self.ended_within && inputs == self.last {
+        if self.long_step.is_active() && inputs == self.last {
+            // The outputs were computed together with the guards.
+        } else if self.ended_within && inputs == self.last {
             // The reading is that at the end of the last step.
             tape.evaluate_outputs(&mut self.work.registers);
         } else {
-            self.span.end();
+            self.long_step.end();
             self.work.registers.held = false;
             drive.load(tape, &mut self.work, self.time, &self.state);
             if self.begun {
@@ -186,8 +189,10 @@ impl<T: Scalar> SimulationState<T> {
         }
         self.ended_within = false;
         self.read.copy_from_slice(inputs);
-        // At the beginning of an interval, a jump may leave a delay and a play operator may move. Within a span, slopes are not computed.
-        self.computed = tape.delays.is_empty() && tape.plays.is_empty() && !self.span.is_active();
+        // At the beginning of an interval, a jump may leave a delay and a play operator may move. Within a long step, slopes are not
+        // computed.
+        self.computed =
+            tape.delays.is_empty() && tape.plays.is_empty() && !self.long_step.is_active();
         for (output, &register) in outputs.iter_mut().zip(&tape.outputs) {
             *output = self.work.registers.values[register];
         }
@@ -268,7 +273,7 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
-    /// Steps over one interval, or the part in it of a span over several.
+    /// Steps over one interval, or the part in it of a step over several.
     fn step_over(
         &mut self,
         tape: &Tape,
@@ -278,20 +283,18 @@ impl<T: Scalar> SimulationState<T> {
     ) -> Result<(), NoSolution> {
         let held = interval.rise.iter().all(|rise| *rise == 0.0);
         let is_still = self.begun && held && interval.from == self.last;
-        if !is_still {
-            self.span.end();
+        let goes_on = is_still && self.long_step.reaches(until);
+        if goes_on && self.go_on_in_long_step(tape, interval, until, delays) {
+            return Ok(());
         }
-        let is_within = self.span.is_active() && self.go_on_in_span(tape, interval, until, delays);
-        if !is_within {
-            self.begin_interval(tape, interval, until, delays);
-            let begins = is_still && self.begin_span(tape, interval, delays);
-            if !(begins && self.go_on_in_span(tape, interval, until, delays)) {
-                return self.steps(tape, interval, until, delays);
-            }
+        self.long_step.end();
+        self.begin_interval(tape, interval, until, delays);
+        // Where a guard has changed its sign, a new long step would meet the same change.
+        let begins = is_still && !goes_on && self.begin_long_step(tape, interval, delays);
+        if begins && self.go_on_in_long_step(tape, interval, until, delays) {
+            return Ok(());
         }
-        // The registers hold what outputs and guards need.
-        self.ended_within = true;
-        Ok(())
+        self.steps(tape, interval, until, delays)
     }
 
     /// Changes from exact steps to explicit ones: the inputs are no longer held, and the model is nonlinear in them.

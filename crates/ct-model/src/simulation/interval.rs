@@ -53,12 +53,10 @@ impl<T: Scalar> SimulationState<T> {
         until: f64,
         delays: &mut Delays<T>,
     ) {
-        let Interval {
-            begin, from, rise, ..
-        } = interval;
+        let Interval { begin, from, .. } = interval;
         let first = !self.begun;
         let jumps = first || from != self.last;
-        let bends = rise.iter().any(|rise| *rise != 0.0);
+        let bends = !interval.is_held();
         if !delays.all.is_empty() {
             if first {
                 let drive = Drive::new(interval, delays);
@@ -118,7 +116,7 @@ impl<T: Scalar> SimulationState<T> {
         });
         // What is made of held inputs is constant.
         let is_held = ahead
-            && interval.rise.iter().all(|rise| *rise == 0.0)
+            && interval.is_held()
             && delays
                 .all
                 .iter()

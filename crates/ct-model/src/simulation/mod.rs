@@ -281,8 +281,7 @@ impl<T: Scalar> SimulationState<T> {
         until: f64,
         delays: &mut Delays<T>,
     ) -> Result<(), NoSolution> {
-        let held = interval.rise.iter().all(|rise| *rise == 0.0);
-        let is_still = self.begun && held && interval.from == self.last;
+        let is_still = self.begun && interval.is_held() && interval.from == self.last;
         let goes_on = is_still && self.long_step.reaches(until);
         if goes_on && self.go_on_in_long_step(tape, interval, until, delays) {
             return Ok(());

@@ -88,6 +88,13 @@ pub(super) struct Interval<'a> {
     pub rise: &'a [f64],
 }
 
+impl Interval<'_> {
+    /// Whether all inputs are constant over the interval.
+    pub fn is_held(&self) -> bool {
+        self.rise.iter().all(|rise| *rise == 0.0)
+    }
+}
+
 /// The inputs and delayed expressions over an interval.
 #[derive(Clone, Copy)]
 pub(super) struct Drive<'a, T> {

@@ -43,8 +43,8 @@ pub struct ModelSetup<'a> {
 
 /// ... and an initial state within this factor.
 const STATE_REACH: f64 = 300.0;
-/// Number of iterations of the output weights.
-const WEIGHTINGS: usize = 3;
+/// Largest number of iterations of the output weights.
+const WEIGHTINGS: usize = 12;
 /// Tolerance of simulations in fits from many starts, whose best result is fitted again with the tolerance of the setup, ...
 const START_TOLERANCE: f64 = 1e-6;
 /// ... and the least relative fall of their cost.

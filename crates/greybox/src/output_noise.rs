@@ -17,6 +17,10 @@ const PAST: usize = 24;
 const PAST_OF_OTHERS: usize = 12;
 /// Least number of samples per coefficient; with fewer samples the prediction uses a shorter past.
 const SAMPLES: usize = 5;
+/// Penalty of the prediction's coefficients (ridge regression), as a share of the variance of each signal. The model's output is almost a
+/// combination of its past and of the inputs: what is left is below a hundredth of a per cent of it, and mostly error of the simulation.
+/// Without the penalty a coefficient may be as large as that error is small, and the noise depends on the last digits of the parameters.
+const PENALTY: f64 = 1e-8;
 
 /// The standard deviation of each output's noise \[its unit\]; `None` where there are too few samples to tell.
 ///
@@ -27,9 +31,9 @@ pub(crate) fn output_noise(records: &[Record], model: &[Vec<f64>]) -> Vec<Option
     let of = |output: usize| {
         let mut past = PAST;
         while past > 0 {
-            let (sum, samples, columns) = prediction(records, model, output, (past, ahead));
-            if samples >= SAMPLES * columns {
-                let variance = sum / (samples - columns) as f64;
+            let (triangle, samples) = prediction(records, model, output, (past, ahead));
+            if samples >= SAMPLES * (triangle.columns() - 1) {
+                let variance = prediction_variance(&triangle, samples)?;
                 return (variance.is_finite() && variance > 0.0).then(|| variance.sqrt());
             }
             past /= 2;
@@ -59,14 +63,42 @@ fn slowest(records: &[Record]) -> usize {
     slowest.unwrap_or(1)
 }
 
-/// Sum of squares of the prediction error of one output, for the given number of rows ahead and of past readings; with the number of
-/// samples, and of coefficients.
+/// Variance of the prediction error. The penalty reduces the number of coefficients by `sum_j d_j (R'R)^-1_jj` (T. Hastie, R. Tibshirani,
+/// J. Friedman, The Elements of Statistical Learning, 2nd ed., 2009, equation 3.50), `d_j` the penalty of each.
+fn prediction_variance(triangle: &Triangle, samples: usize) -> Option<f64> {
+    let columns = triangle.columns() - 1;
+    // The first column is the level: its entry in a row of R is the part of a column that is constant.
+    let mut scale: Vec<f64> = (0..columns)
+        .map(|j| {
+            let (all, constant) = (triangle.column_norm(j), triangle.at(0, j));
+            let varying = (all.powi(2) - constant.powi(2)).max(0.0).sqrt();
+            if varying > 1e-7 * all {
+                varying
+            } else if all > 0.0 {
+                all
+            } else {
+                1.0
+            }
+        })
+        .collect();
+    scale[0] = 0.0;
+    let penalised = triangle.damped(&scale, PENALTY);
+    let free: Vec<usize> = (0..columns).collect();
+    let covariance = penalised.covariance(&free)?;
+    let penalty = scale.iter().map(|scale| PENALTY * scale.powi(2));
+    let suppressed: f64 = penalty.enumerate().map(|(j, d)| d * covariance[j][j]).sum();
+    let coefficients = columns as f64 - suppressed;
+    Some(penalised.at(columns, columns).powi(2) / (samples as f64 - coefficients))
+}
+
+/// The prediction of one output from the given number of past readings, the given number of rows ahead: a row for each sample, whose last
+/// column is the reading; with the number of samples.
 fn prediction(
     records: &[Record],
     model: &[Vec<f64>],
     output: usize,
     (past, ahead): (usize, usize),
-) -> (f64, usize, usize) {
+) -> (Triangle, usize) {
     let others = past.min(PAST_OF_OTHERS);
     let (inputs, outputs) = records
         .first()
@@ -112,7 +144,7 @@ fn prediction(
         }
     }
     triangle.finish();
-    (triangle.at(columns, columns).powi(2), samples, columns)
+    (triangle, samples)
 }
 
 #[cfg(test)]

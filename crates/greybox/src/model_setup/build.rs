@@ -12,8 +12,9 @@ use crate::clock::Clock;
 /// If the text sets no bound, a parameter stays within this factor of its value in the text, ...
 const REACH: f64 = 30.0;
 
-/// The scales of the noise have converged if none changes by more than this share.
-pub(super) const SETTLED: f64 = 0.02;
+/// The scales of the noise have converged if none changes by more than this share. Where a model lacks an effect, the errors of two outputs
+/// change by a few times the share by which their weights do.
+pub(super) const SETTLED: f64 = 2e-4;
 
 /// Bounds of the text; without them plus and minus `factor` times the value, so that a fit cannot diverge. For a value of zero there are no
 /// such bounds.

@@ -19,3 +19,4 @@ mod support;
 mod threads;
 mod three_tank;
 mod tolerance;
+mod weights;

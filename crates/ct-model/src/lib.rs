@@ -41,7 +41,7 @@
 //! - Everything else is refused ([`TextError`]). An unknown name is an error, never zero.
 //!
 //! [`ModelSpec`] prints as text that reads back as the same model ([`ModelSpec::parse`]). [`unit_warnings`] says where units do not fit
-//! together, [`unknown_units`] which are none.
+//! together, [`check_units`] at which place of a text, and which units are unknown.
 //!
 //! **Reference**: Modelica Association, Modelica - A Unified Object-Oriented Language for Systems Modeling, Language Specification 3.6,
 //! 2023: appendix A for the grammar of expressions.
@@ -65,7 +65,7 @@ pub use simulation::{
     Method, Model, NoSolution, SharedSimulation, Simulation, SimulationNumber, TOLERANCE,
 };
 pub use spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
-pub use text::{Position, TextError, unknown_units};
+pub use text::{Position, TextError, check_units};
 pub use units::{UnitWarning, unit_warnings};
 
 #[cfg(doctest)]

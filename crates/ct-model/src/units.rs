@@ -11,8 +11,10 @@ use crate::spec::ModelSpec;
 /// Two sides whose dimensions differ.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnitWarning {
-    /// The variable whose equation it is.
+    /// The variable whose equation or start value it is.
     pub of: String,
+    /// Whether it is the start value.
+    pub in_start: bool,
     /// Both sides with their dimensions, in words.
     pub what: String,
 }
@@ -36,6 +38,7 @@ pub fn unit_warnings(model: &ModelSpec) -> Vec<UnitWarning> {
     let mut walk = Walk {
         model,
         of: String::new(),
+        in_start: false,
         found: Vec::new(),
     };
     for flow in &model.flows {
@@ -58,11 +61,13 @@ pub fn unit_warnings(model: &ModelSpec) -> Vec<UnitWarning> {
         }
         let right = walk.dimension(&state.right);
         walk.compare((&words, left), (&model.write(&state.right), right));
+        walk.in_start = true;
         let start = walk.dimension(&state.start);
         walk.compare(
             (&state.about.name, declared),
             (&model.write(&state.start), start),
         );
+        walk.in_start = false;
     }
     walk.found
 }
@@ -70,6 +75,7 @@ pub fn unit_warnings(model: &ModelSpec) -> Vec<UnitWarning> {
 struct Walk<'a> {
     model: &'a ModelSpec,
     of: String,
+    in_start: bool,
     found: Vec<UnitWarning>,
 }
 
@@ -113,6 +119,7 @@ impl Walk<'_> {
                     |part: &str, dimension: Dimension| format!("`{part}` is {}", said(dimension));
                 self.found.push(UnitWarning {
                     of: self.of.clone(),
+                    in_start: self.in_start,
                     what: format!("{}, but {}", words(a, own), words(b, other)),
                 });
                 Known::Open
@@ -136,6 +143,7 @@ impl Walk<'_> {
         {
             self.found.push(UnitWarning {
                 of: self.of.clone(),
+                in_start: self.in_start,
                 what: format!(
                     "`{}` is {}, and {} takes a pure number",
                     self.model.write(argument),

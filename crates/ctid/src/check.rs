@@ -1,14 +1,16 @@
 //! `ctid check`: summary of a model's text.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use ct_model::{About, Given, Linearity, ModelSpec, Variable, unit_warnings, unknown_units};
+use ct_model::{About, Given, Linearity, Method, Model, ModelSpec, Variable};
 use ct_signals::{escaped, shown};
 
 use crate::Error;
 use crate::look::{Look, Side, table};
 use crate::model_file;
-use crate::own_model::{self, AnyModelFile};
+use crate::numbers;
+use crate::own_model::{self, AnyModelFile, units};
 
 /// Reads a model and prints a summary; for a model file, the model that it names with its effects included.
 ///
@@ -16,10 +18,17 @@ use crate::own_model::{self, AnyModelFile};
 /// One line that names the file, line and column, what is wrong and the correction.
 pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     if path.extension().is_none_or(|kind| kind != "toml") {
-        return Ok(said(&own_model::read_model(path)?, look) + &unknown(path, look));
+        let model = own_model::read_model(path)?;
+        // A file that cannot be read twice, such as a pipe, was read as a model.
+        let text = model_file::read_text(path).unwrap_or_default();
+        let warnings = units::warnings(Some(path), &text, &model, look);
+        return Ok(said(&model, look) + &ideal(&model, &BTreeMap::new(), look) + &warnings);
     }
     match AnyModelFile::read(path)?.with_effects()? {
-        AnyModelFile::Own(file) => Ok(said(file.model.spec(), look) + &unknown(&file.text, look)),
+        AnyModelFile::Own(file) => {
+            let model = file.model.spec();
+            Ok(said(model, look) + &ideal(model, &file.known, look) + &file.unit_warnings(look))
+        }
         AnyModelFile::Plant(_) => Err(Error::file(
             path,
             "it names one of the plants, which has no text to check: `ctid effects --model` lists what may be added to it",
@@ -27,19 +36,58 @@ pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     }
 }
 
-/// Warnings about unknown units, each with its place in the text.
-fn unknown(path: &Path, look: Look) -> String {
-    // A file that cannot be read twice, such as a pipe, was read as a model.
-    let Ok(text) = model_file::read_text(path) else {
-        return String::new();
+/// How the model is simulated, and which parameters no record of it determines.
+pub(crate) fn ideal(spec: &ModelSpec, known: &BTreeMap<String, f64>, look: Look) -> String {
+    let mut text = format!(
+        "\n{}\n",
+        look.heading("With records without noise, all inputs stepped")
+    );
+    let Some(found) = greybox::ideal_records(&Model::new(spec.clone()), known) else {
+        let why =
+            "not simulated: the model delays something, or has no finite slope at its start values";
+        return text + &look.paragraph("  ", why);
     };
-    let file = path.display();
-    let all = unknown_units(&text).unwrap_or_default();
-    let lines = all.iter().map(|unit| {
-        let words = format!("warning: {file}:{unit}");
-        look.warning(&words) + "\n"
-    });
-    lines.collect()
+    let way = match found.method {
+        _ if spec.states.is_empty() => "no states to simulate",
+        Method::Exact => "simulated exactly",
+        Method::Explicit => "simulated by explicit Runge-Kutta steps",
+        Method::Implicit => "stiff, simulated by implicit Runge-Kutta steps",
+    };
+    let constants: Vec<String> = found
+        .time_constants
+        .iter()
+        .map(|value| numbers::significant(*value, 3))
+        .collect();
+    let constants = match constants.as_slice() {
+        [] => String::new(),
+        [only] => {
+            format!("; time constant at the start values {only}, in the equations' unit of time")
+        }
+        all => format!(
+            "; time constants at the start values {}, in the equations' unit of time",
+            all.join(", ")
+        ),
+    };
+    text += &look.paragraph("  ", &format!("{way}{constants}"));
+    if found.not_determined.is_empty() {
+        text += &look.paragraph(
+            "  ",
+            "such records determine all parameters that are fitted",
+        );
+    }
+    for together in &found.not_determined {
+        let what = match together.as_slice() {
+            [one] => format!(
+                "{one} has no effect on the outputs, or none apart from the initial states: fix it under [known]"
+            ),
+            all => format!(
+                "no record of these outputs determines {}, only a combination of them: fix one of them under [known], or give a [prior]",
+                all.join(", ")
+            ),
+        };
+        text += &look.paragraph("  ", &what);
+    }
+    text
 }
 
 /// Summary of a model in words.
@@ -97,17 +145,6 @@ pub(crate) fn said(model: &ModelSpec, look: Look) -> String {
     });
     part("Named flows", flows.collect());
     text += &own_model::ports::summary(model, look);
-    let warnings = unit_warnings(model);
-    if !warnings.is_empty() {
-        text.push('\n');
-    }
-    for warning in warnings {
-        let words = format!(
-            "warning: units in the equation of {}: {}",
-            warning.of, warning.what
-        );
-        text += &(look.warning(look.paragraph("", &words).trim_end()) + "\n");
-    }
     text
 }
 

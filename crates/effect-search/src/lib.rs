@@ -39,7 +39,7 @@ pub use diagnose::{Progress, diagnose};
 pub use error::Error;
 pub use failures::{Bin, Failure, FailureKind, Failures};
 pub use found_model::with_effects;
-pub use held_out::{HeldOut, held_out};
+pub use held_out::{HeldOut, LATER_ROWS, MOST_OF_RECORD, held_out};
 pub use output_step::{HeldOutError, OutputStep, ResidualTests, output_steps};
 pub use problem::{Kept, Options, Problem};
 pub use problem_builder::ProblemBuilder;

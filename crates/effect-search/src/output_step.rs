@@ -42,6 +42,10 @@ pub struct OutputStep {
     pub rmse: f64,
     /// Simulation error on the held-out records.
     pub rmse_test: Option<f64>,
+    /// `rmse_test` with the initial states of each record from its first 50 samples, which are not scored (the rule of the newer
+    /// benchmarks); `None` if a record has fewer than 200.
+    #[serde(default)]
+    pub rmse_test_50: Option<f64>,
     /// The parts of `rmse_test`; `None` without held-out records.
     pub held_out_error: Option<HeldOutError>,
     /// Residual tests.
@@ -130,6 +134,7 @@ pub fn output_steps(
             name: spec.about(spec.outputs[o].variable).name.clone(),
             rmse: fit.rmse[o],
             rmse_test: test.map(|test| test.rmse[o]),
+            rmse_test_50: test.and_then(|test| Some(test.rmse_50.as_ref()?[o])),
             held_out_error: test.map(|test| test.errors[o]),
             tests: ResidualTests::of(&records[0], &residuals[o]),
             failures: locate(&series, &signals, &noise[o]),

@@ -4,6 +4,7 @@ mod clock;
 mod error;
 mod feedback;
 mod fit;
+mod ideal;
 mod many_starts;
 mod model_observer;
 mod model_setup;
@@ -26,6 +27,7 @@ pub use fit::{
     FitOptions, coloured, fit, fit_from, fit_initial_levels, fit_onward, noise_of, prewhitened,
     robust,
 };
+pub use ideal::{IdealRecords, ideal_records};
 pub use many_starts::{keep_best_simulated, with_other_speeds};
 pub use model_setup::ModelSetup;
 pub use not_determined::not_determined;

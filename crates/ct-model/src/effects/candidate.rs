@@ -335,6 +335,7 @@ fn ports_of(
         }
         Place::BalanceAndSurrounding
         | Place::Motion
+        | Place::MotionAndPosition
         | Place::Level
         | Place::LevelReading
         | Place::TankAndTankBelow

@@ -4,13 +4,15 @@ use ct_signals::{Dimension, Unit};
 
 use super::effect::{Effect, Place};
 use super::port::Port;
+use super::scale::balance_unit;
 use crate::expression::{Expression, Variable};
 use crate::spec::ModelSpec;
 
 pub(super) fn ports(spec: &ModelSpec, effect: &Effect) -> Vec<Port> {
     match effect.place {
         Place::BalanceAndSurrounding => thermal(spec),
-        Place::Motion => mechanical(spec),
+        Place::Motion => speeds(spec).into_iter().map(Port::Balance).collect(),
+        Place::MotionAndPosition => positions(spec),
         Place::Level => levels(spec).map(Port::Balance).collect(),
         Place::LevelReading => level_readings(spec),
         Place::TankAndTankBelow => tanks(spec),
@@ -19,8 +21,11 @@ pub(super) fn ports(spec: &ModelSpec, effect: &Effect) -> Vec<Port> {
     }
 }
 
+fn dimension(unit: &str) -> Option<Dimension> {
+    Unit::parse(unit).map(|unit| unit.dimension())
+}
+
 fn is(spec: &ModelSpec, variable: Variable, unit: &str) -> bool {
-    let dimension = |unit: &str| Unit::parse(unit).map(|unit| unit.dimension());
     let own = dimension(&spec.about(variable).unit);
     own.is_some_and(|own| own != Dimension::NONE) && own == dimension(unit)
 }
@@ -41,17 +46,34 @@ fn thermal(spec: &ModelSpec) -> Vec<Port> {
         .collect()
 }
 
-/// Speeds: states of such a unit, or of which another state is the position.
-fn mechanical(spec: &ModelSpec) -> Vec<Port> {
+/// Words for speeds of rotation that no other quantity has.
+const TURNS: [&str; 6] = ["rad/s", "rpm", "rev/min", "rev/s", "1/min", "deg/s"];
+
+/// Speeds: states of such a unit, those of which another state is the position, and rates in whose equation torques are added.
+fn speeds(spec: &ModelSpec) -> Vec<usize> {
     let states = 0..spec.states.len();
     let positions: Vec<Option<usize>> = states.clone().map(|i| spec.speed_of(i)).collect();
     let is_speed = |&x: &usize| {
         let unit = &spec.states[x].about.unit;
-        let turns = ["rad/s", "rpm", "1/min", "deg/s"].contains(&unit.as_str());
-        turns || is(spec, Variable::State(x), "m/s") || positions.contains(&Some(x))
+        let torque = dimension(&balance_unit(spec, x, "s")) == dimension("N.m");
+        TURNS.contains(&unit.as_str())
+            || is(spec, Variable::State(x), "m/s")
+            || (is(spec, Variable::State(x), "1/s") && torque)
+            || positions.contains(&Some(x))
     };
     let balances = states.filter(|&x| spec.speed_of(x).is_none());
-    balances.filter(is_speed).map(Port::Balance).collect()
+    balances.filter(is_speed).collect()
+}
+
+/// Speeds, each with its position.
+fn positions(spec: &ModelSpec) -> Vec<Port> {
+    let speeds = speeds(spec);
+    let states = 0..spec.states.len();
+    let pairs = states.filter_map(|x| Some((spec.speed_of(x)?, x)));
+    pairs
+        .filter(|(v, _)| speeds.contains(v))
+        .map(|(v, x)| Port::BalanceAnd(v, Variable::State(x)))
+        .collect()
 }
 
 /// States of this quantity are levels of tanks, whatever the unit of their sensor.

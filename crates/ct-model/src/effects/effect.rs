@@ -28,6 +28,8 @@ pub enum Place {
     BalanceAndSignal,
     /// The equation of a speed `x`.
     Motion,
+    /// The equation of a speed `a`, and its position `x`.
+    MotionAndPosition,
     /// The equation of a level `x`.
     Level,
     /// Between a level and its reading: the effect of `y` supplies the reading.

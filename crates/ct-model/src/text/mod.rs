@@ -12,7 +12,7 @@ mod unit_words;
 mod writer;
 
 pub use error::{Position, TextError};
-pub use unit_words::unknown_units;
+pub use unit_words::check_units;
 
 pub(crate) use names::is_reserved;
 pub(crate) use resolve::Scope;

@@ -3,8 +3,11 @@
 use ct_signals::Unit;
 
 use super::error::{TextError, shown};
+use super::names::differentiated;
 use super::parser;
-use super::syntax::Attribute;
+use super::resolve;
+use super::syntax::{Attribute, Kind, Syntax};
+use crate::units::{UnitWarning, unit_warnings};
 
 /// Units that are known as words, in addition to those that can be converted. SI prefixes are allowed.
 const OTHER: [&str; 33] = [
@@ -16,13 +19,59 @@ const PREFIXES: [&str; 14] = [
     "da", "n", "u", "\u{b5}", "\u{3bc}", "m", "c", "d", "h", "k", "M", "G", "T", "p",
 ];
 
-/// The unknown words in units of a model's text, with their places: usually typing errors. Such a unit is compatible with everything, so it
-/// is not checked or converted.
+/// What is wrong with the units of a model's text, each with its place: first the unknown words, usually typing errors, then what
+/// [`unit_warnings`] finds. An unknown unit is compatible with everything, so it is not checked or converted.
 ///
 /// # Errors
 /// As [`crate::ModelSpec::parse`].
-pub fn unknown_units(text: &str) -> Result<Vec<TextError>, TextError> {
+pub fn check_units(text: &str) -> Result<Vec<TextError>, TextError> {
     let syntax = parser::parse(text)?;
+    let mut found = unknown_units(text, &syntax);
+    let places = |warning: &UnitWarning| {
+        let (of, from) = if warning.in_start {
+            ("start value", start_place(&syntax, &warning.of))
+        } else {
+            ("equation", equation_place(&syntax, &warning.of))
+        };
+        let what = format!(
+            "units in the {of} of {}: {}: correct one of the units, or the {of}",
+            warning.of, warning.what
+        );
+        TextError::at(text, from.unwrap_or(0), what)
+    };
+    let model = resolve::resolve(text, syntax.clone())?;
+    found.extend(unit_warnings(&model).iter().map(places));
+    Ok(found)
+}
+
+/// Begin of the equation of a variable \[bytes\]: its value, if it is declared with one.
+fn equation_place(syntax: &Syntax, name: &str) -> Option<usize> {
+    let own = syntax.equations.iter().find(|equation| {
+        let left = &equation.left;
+        let state = differentiated(left).is_some_and(|(state, _)| state == name);
+        state || matches!(&left.kind, Kind::Name(flow) if flow == name)
+    });
+    let declared = syntax.declarations.iter().find(|d| d.name == name);
+    let declared = declared.map(|d| d.binding.as_ref().map_or(d.from, |value| value.from));
+    own.map(|equation| equation.left.from).or(declared)
+}
+
+/// Place of the start value of a state \[bytes\].
+fn start_place(syntax: &Syntax, name: &str) -> Option<usize> {
+    let initial = syntax
+        .initial
+        .iter()
+        .find(|equation| matches!(&equation.left.kind, Kind::Name(state) if state == name));
+    let declared = syntax.declarations.iter().find(|d| d.name == name);
+    let declared = declared.map(|d| {
+        let start = d.attributes.iter().find(|(name, ..)| name == "start");
+        start.map_or(d.from, |(_, from, _)| *from)
+    });
+    initial.map(|equation| equation.left.from).or(declared)
+}
+
+/// The unknown words in units.
+fn unknown_units(text: &str, syntax: &Syntax) -> Vec<TextError> {
     let attributes = syntax.declarations.iter().flat_map(|d| &d.attributes);
     let unknown = attributes.filter_map(|(name, from, attribute)| match attribute {
         Attribute::Text(unit) if name == "unit" => {
@@ -41,7 +90,7 @@ pub fn unknown_units(text: &str) -> Result<Vec<TextError>, TextError> {
         }
         _ => None,
     });
-    Ok(unknown.collect())
+    unknown.collect()
 }
 
 /// The first unknown word of a unit.

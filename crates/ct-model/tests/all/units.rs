@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ct_model::{ModelSpec, unit_warnings};
+use ct_model::{ModelSpec, check_units, unit_warnings};
 
 /// Warnings for a heated block after a replacement in its text.
 fn said(from: &str, to: &str) -> Vec<String> {
@@ -66,6 +66,43 @@ fn both_sides_are_named() {
     assert_eq!(
         said("sqrt(2*g*h)", "2*g*h"),
         ["v: `v` is velocity (m s^-1), but `2*g*h` is m^2 s^-2"]
+    );
+}
+
+#[test]
+fn the_place_is_that_of_the_equation_or_of_the_start() {
+    let text = "model Tank
+  parameter Real A(unit=\"cm2\") = 50;
+  parameter Real tau(unit=\"bananas\") = 50;
+  input Real q(unit=\"cm3/s\");
+  output Real h(unit=\"cm\", start=A);
+  Real out(unit=\"cm3/s\") =
+    h/tau*A*A;
+  Real back(unit=\"cm\");
+equation
+  back = h + A;
+  A*der(h) = q - out +
+    h;
+end Tank;";
+    let found = check_units(text).unwrap();
+    let found: Vec<_> = found
+        .iter()
+        .map(|error| {
+            (
+                error.position.line,
+                error.position.column,
+                &error.what[..26],
+            )
+        })
+        .collect();
+    assert_eq!(
+        found,
+        [
+            (3, 22, "unit `bananas` is no unit "),
+            (10, 3, "units in the equation of b"),
+            (11, 3, "units in the equation of h"),
+            (5, 28, "units in the start value o"),
+        ]
     );
 }
 

@@ -192,7 +192,8 @@ impl Compare {
         bar.phase("fitting the model");
         let comparison = own_model::compare(model, &records, &options);
         bar.clear();
-        let notes = input::notes(&records.summaries, look)
+        let notes = model.unit_warnings(look)
+            + &input::notes(&records.summaries, look)
             + &unused(&model.unused, look)
             + &model.loop_said(look);
         let comparison = comparison?;
@@ -256,7 +257,8 @@ impl Diagnose {
         });
         bar.clear();
         let diagnosis = diagnosis?;
-        let text = input::notes(&records.summaries, look)
+        let text = model.unit_warnings(look)
+            + &input::notes(&records.summaries, look)
             + &model.loop_said(look)
             + &not_kept(model, &diagnosis.record_numbers, look)
             + &own_model::diagnosis_said(model, &records, &diagnosis, look);

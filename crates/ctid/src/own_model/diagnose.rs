@@ -12,6 +12,7 @@ use crate::Error;
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::sentences::remarks::rounding;
+use crate::terminal::without_50;
 
 /// Single effects that are listed.
 const LISTED: usize = 8;
@@ -43,26 +44,22 @@ pub(crate) fn said(
         let clock = Clock::of(&records.records);
         let mut fitted: Vec<&str> = records.records.iter().map(|r| r.name.as_str()).collect();
         fitted.dedup();
-        let units = file
-            .base
-            .outputs
-            .iter()
-            .map(|output| file.base.about(output.variable));
-        let unit_of = |output: &str| {
-            let mut units = units.clone();
-            let own = units.find(|about| about.name == *output);
-            own.map_or("", |about| about.unit.as_str())
-        };
-        failures(name, step, (&clock, &fitted), unit_of, look)
+        failures(name, step, (&clock, &fitted), |y| unit_of(file, y), look)
     };
+    let mut not_determined: &[Vec<String>] = &[];
     if let Some(first) = diagnosis.steps.first() {
+        // What the records cannot determine comes before anything that is concluded from them.
+        not_determined = &first.not_determined;
+        text += &undetermined(not_determined, look);
         text += &fails(&diagnosis.model, first);
     }
     text += &singles(diagnosis, look);
-    text += &errors(diagnosis, look);
+    text += &errors(file, diagnosis, look);
     if let Some(last) = diagnosis.steps.last() {
         text += &estimates(last, look);
-        text += &undetermined(&last.not_determined, look);
+        if last.not_determined != not_determined {
+            text += &undetermined(&last.not_determined, look);
+        }
         if diagnosis.verdict == Verdict::Partial && last.added.is_some() {
             text.push('\n');
             text += fails("the model with these effects", last).trim_end();
@@ -268,8 +265,16 @@ fn singles(diagnosis: &Diagnosis, look: Look) -> String {
     text
 }
 
+/// Unit of an output.
+fn unit_of<'a>(file: &'a OwnModelFile, output: &str) -> &'a str {
+    let outputs = file.base.outputs.iter();
+    let mut outputs = outputs.map(|output| file.base.about(output.variable));
+    let own = outputs.find(|about| about.name == output);
+    own.map_or("", |about| about.unit.as_str())
+}
+
 /// The error of each step at each output.
-fn errors(diagnosis: &Diagnosis, look: Look) -> String {
+fn errors(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
     let mut text = format!("{}\n", look.heading("Simulation error, root mean square"));
     let Some(first) = diagnosis.steps.first() else {
         return text;
@@ -318,7 +323,8 @@ fn errors(diagnosis: &Diagnosis, look: Look) -> String {
     for line in table(&sides, &rows) {
         text += &format!("  {}\n", line.trim_end());
     }
-    text + &state_rows(first)
+    let outputs = diagnosis.steps.iter().map(|step| step.outputs.as_slice());
+    text + &state_rows(first) + &without_50(outputs, |name| unit_of(file, name), look)
 }
 
 /// Number of rows for the fit of the held-out records' initial states.

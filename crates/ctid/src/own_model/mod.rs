@@ -27,6 +27,7 @@ mod problem;
 pub(crate) mod report;
 mod simulate;
 mod text;
+pub(crate) mod units;
 mod unknown;
 pub(crate) mod words;
 

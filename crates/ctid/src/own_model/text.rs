@@ -10,13 +10,15 @@ use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
 use crate::sentences::FailureWords;
-use crate::terminal::{FAILURES, residual_tests};
+use crate::terminal::{FAILURES, residual_tests, without_50};
 
 /// The complete comparison, with a plot of the first record.
 pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     let [step] = &comparison.steps;
     let name = [std::slice::from_ref(&comparison.model), &comparison.effects].concat();
     let mut text = format!("{}\n\n", look.heading(&name.join(" + ")));
+    // What the records cannot determine comes before anything that is concluded from them.
+    text += &undetermined(&step.not_determined, look);
     let first = comparison.curves.first().map(|curves| &curves.record);
     for curves in comparison
         .curves
@@ -54,6 +56,8 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
         text += &format!("  {}\n", line.trim_end());
     }
     text += &state_rows(step);
+    let outputs = std::iter::once(step.outputs.as_slice());
+    text += &without_50(outputs, |name| comparison.unit_of(name), look);
     if step.rmse_per_output.len() > 1 {
         text += &format!(
             "  together {} times the noise, the error of a linear prediction from the past\n",
@@ -87,7 +91,6 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
         step.starts_agree, step.starts
     );
     text += &format!("  {}\n", look.faint(agree));
-    text += &undetermined(&step.not_determined, look);
     text
 }
 

@@ -172,6 +172,7 @@ fn step(
             name: outputs[output].clone(),
             rmse: rms(residuals[0].iter().copied()),
             rmse_test: Some(rms(residuals[1].iter().copied())),
+            rmse_test_50: None,
             held_out_error: None,
             tests: tests(&records[0].inputs[0].values, &residuals[0]),
             failures: failures(&records[0], &runs[0][output], &residuals[0]),

@@ -23,7 +23,7 @@ use super::session::Session;
 use super::upload::Upload;
 use crate::look::Look;
 use crate::model_file::read_text;
-use crate::own_model::{OwnModelFile, report};
+use crate::own_model::{OwnModelFile, report, units};
 use crate::{Error, check, edit};
 
 /// Points of a curve that are drawn.
@@ -222,7 +222,11 @@ impl Own {
             "file": self.file,
             "text_error": spec.as_ref().err().map(ToString::to_string),
             "file_error": file_error,
-            "check": spec.as_ref().ok().map(|spec| check::said(spec, Look::plain())),
+            "check": spec.as_ref().ok().map(|spec| {
+                let look = Look::plain();
+                check::said(spec, look)
+                    + &units::warnings(None, &self.text, spec, look)
+            }),
             "time": columns.and_then(|columns| columns.time.clone()),
             "signals": signals,
             "unused": unused,

@@ -1,5 +1,8 @@
 //! Fall of the error from step to step.
 
+use std::collections::BTreeMap;
+
+use effect_search::OutputStep;
 use missing_effect::Diagnosis;
 
 use super::{BAR, compared, model_name, step_name, with_unit};
@@ -55,8 +58,31 @@ pub(crate) fn trail(diagnosis: &Diagnosis, look: Look) -> String {
         text += &errors.table(diagnosis, look);
     }
     text += &held_out_errors(diagnosis, look);
+    let outputs = diagnosis.steps.iter().map(|step| step.outputs.as_slice());
+    text += &without_50(outputs, |_| &diagnosis.output_unit, look);
     text.push('\n');
     text
+}
+
+/// Errors on held-out records by the rule of newer benchmarks ([`OutputStep::rmse_test_50`]), from step to step, a line for each output.
+pub(crate) fn without_50<'a>(
+    steps: impl Iterator<Item = &'a [OutputStep]>,
+    unit_of: impl Fn(&str) -> &'a str,
+    look: Look,
+) -> String {
+    let mut of_outputs: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for output in steps.flatten() {
+        if let Some(error) = output.rmse_test_50 {
+            let errors = of_outputs.entry(&output.name).or_default();
+            errors.push(numbers::significant(error, 3));
+        }
+    }
+    let lines = of_outputs.into_iter().map(|(name, errors)| {
+        let errors = with_unit(&errors.join(", "), unit_of(name));
+        let rule = "if the initial states are fitted to the first 50 rows and these are not scored";
+        look.paragraph("  ", &format!("{name}, held out, {rule}: {errors}"))
+    });
+    lines.collect()
 }
 
 /// The error of each step on the fitted and on the held-out records.

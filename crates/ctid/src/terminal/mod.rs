@@ -8,7 +8,7 @@ use effect_search::{OutputStep, ResidualTests};
 use missing_effect::{Diagnosis, Shown, Step, Verdict};
 
 pub(crate) use self::curves::{overlay, residuals};
-pub(crate) use self::errors::trail;
+pub(crate) use self::errors::{trail, without_50};
 pub(crate) use self::ranking::ranking;
 use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table};

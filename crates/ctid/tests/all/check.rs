@@ -33,6 +33,19 @@ fn it_says_what_a_model_holds() {
         assert!(lines.iter().any(|own| own == line), "{line}\n{text}");
     }
     assert!(!text.contains("warning"), "{text}");
+    let said = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in [
+        "simulated exactly; time constant at the start values 500, in the equations' unit of time",
+        "no record of these outputs determines C, k, g, only a combination of them",
+    ] {
+        assert!(said.contains(part), "{part}\n{text}");
+    }
+    place.write("m.toml", "model = \"block.mo\"\n[known]\nC = 52.0\n");
+    let known = place.succeeds("check m.toml");
+    assert!(
+        known.contains("such records determine all parameters"),
+        "{known}"
+    );
     place.write(
         "block.mo",
         documented().replace("g*u - loss", "g*u - loss*T"),
@@ -41,7 +54,7 @@ fn it_says_what_a_model_holds() {
     let said = text.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(said.contains("not linear in the equation of T"), "{text}");
     assert!(
-        said.contains("warning: units in the equation of T: `g*u` is power"),
+        said.contains("warning: block.mo:11:3: units in the equation of T: `g*u` is power"),
         "{text}"
     );
 }

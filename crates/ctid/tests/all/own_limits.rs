@@ -177,3 +177,26 @@ fn a_unit_that_is_none_is_said_with_its_place() {
         assert!(!said.contains("no unit"), "{unit}: {said}");
     }
 }
+
+/// A model of a cell in which only the sum of two resistances is determined, and whose voltage has the unit of a current.
+#[test]
+fn what_the_records_cannot_determine_comes_first() {
+    let place = place("");
+    let text = CELL
+        .replace("parameter Real R0(min=0)", "parameter Real R1(unit=\"Ohm\", min=0) = 0.01;\n  parameter Real R0(unit=\"Ohm\", min=0)")
+        .replace("input Real i", "input Real i(unit=\"A\")")
+        .replace("E0(min=0)", "E0(unit=\"V\", min=0)")
+        .replace("output Real v = E0 - R0*i", "output Real v(unit=\"A\") = E0 - (R0 + R1)*i");
+    place.write("cell.mo", text);
+    place.write("d.csv", pulses(&[FAST], 3));
+    let mismatch = "warning: cell.mo:6:29: units in the equation of v: ";
+    let together = "warning: these records determine only a combination of R1 and R0";
+    for command in ["compare", "diagnose"] {
+        let said = place.succeeds(&format!("{command} d.csv --model m.toml"));
+        assert!(said.starts_with(mismatch), "{said}");
+        let conclusions = said.find("Simulation error").unwrap();
+        let warned = said.find(together).unwrap();
+        assert!(warned < conclusions, "{said}");
+        assert_eq!(said.matches(together).count(), 1, "{said}");
+    }
+}

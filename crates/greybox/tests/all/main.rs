@@ -5,6 +5,7 @@ mod closed_loop;
 mod coverage;
 mod disturbance;
 mod effects;
+mod ideal;
 mod lag_states;
 mod linearise;
 mod minima;

@@ -8,7 +8,7 @@ use effect_search::HeldOutError;
 use crate::{Error, PerOutput, Step, fit::node::Node};
 
 /// Samples of a held-out record for the fit of its initial levels, which are not scored.
-const HEAD: usize = 5;
+pub(crate) const HEAD: usize = 5;
 
 /// Simulation of held-out records by a model.
 pub(crate) struct HeldOut {
@@ -19,34 +19,42 @@ pub(crate) struct HeldOut {
 }
 
 /// Rows until this number of samples of an output is present: the initial levels follow from them.
-fn head(output: &Channel) -> usize {
+fn head(output: &Channel, samples: usize) -> usize {
     let present = output.values.iter().enumerate();
     present
         .filter(|(_, value)| !value.is_nan())
-        .nth(HEAD - 1)
+        .nth(samples - 1)
         .map_or(output.values.len(), |(last, _)| last + 1)
 }
 
 /// A record up to the row where each of its outputs has this number of samples, without further samples.
-fn beginning(record: &Record) -> Record {
-    let rows = record.outputs.iter().map(head).max().unwrap_or(0);
+fn beginning(record: &Record, samples: usize) -> Record {
+    let rows = record.outputs.iter().map(|y| head(y, samples)).max();
+    let rows = rows.unwrap_or(0);
     let mut begun = Record {
         references: Vec::new(),
         ..record.rows(0..rows)
     };
     for (output, whole) in begun.outputs.iter_mut().zip(&record.outputs) {
-        output.values[head(whole)..].fill(f64::NAN);
+        output.values[head(whole, samples)..].fill(f64::NAN);
     }
     begun
 }
 
-/// Initial levels from the first [`HEAD`] samples with all other parameters fixed; scored on the rest.
-pub(crate) fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, Error> {
+/// Initial levels from the first samples with all other parameters fixed; scored on the rest.
+pub(crate) fn hold_out(
+    node: &Node,
+    test: &[Record],
+    samples: usize,
+) -> Result<Option<HeldOut>, Error> {
     if test.is_empty() {
         return Ok(None);
     }
     let parameters = &node.fit.x[..node.setup.parameter_count()];
-    let heads: Vec<Record> = test.iter().map(beginning).collect();
+    let heads: Vec<Record> = test
+        .iter()
+        .map(|record| beginning(record, samples))
+        .collect();
     let mut begun = node.setup.with_records(&heads)?;
     // A fit to a few samples takes no time, and an error from wrong levels would not be an error of the model.
     (begun.time_limit, begun.interrupt) = (None, None);
@@ -65,7 +73,7 @@ pub(crate) fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, 
         let scored = scored.map(|(record, models)| {
             let measured = record.outputs[o].values.iter().copied();
             let pairs = measured.zip(models[o].iter().copied());
-            let pairs = pairs.skip(head(&record.outputs[o]));
+            let pairs = pairs.skip(head(&record.outputs[o], samples));
             pairs.filter(|(measured, _)| !measured.is_nan()).collect()
         });
         let scored: Vec<Vec<(f64, f64)>> = scored.collect();
@@ -80,7 +88,7 @@ pub(crate) fn hold_out(node: &Node, test: &[Record]) -> Result<Option<HeldOut>, 
 
 /// The error on held-out records at each output \[output unit\].
 pub(crate) fn held_out_rmse(node: &Node, test: &[Record]) -> Result<Vec<f64>, Error> {
-    let held_out = hold_out(node, test)?.map_or_else(Vec::new, |held_out| held_out.outputs);
+    let held_out = hold_out(node, test, HEAD)?.map_or_else(Vec::new, |held_out| held_out.outputs);
     Ok(held_out.into_iter().map(|(_, rmse, _)| rmse).collect())
 }
 

@@ -4,12 +4,15 @@ use ct_signals::{ArModel, Record, residual_tests};
 use greybox::{Fit, Noise, Setup, robust, weighted_rms};
 
 use effect_search::failures::{FailureKind, Series, Signal, locate};
-use effect_search::{HeldOutError, OutputStep, ResidualTests};
+use effect_search::{HeldOutError, LATER_ROWS, MOST_OF_RECORD, OutputStep, ResidualTests};
 
 use crate::{
     Error, Parameter, PerOutput, Step,
     base::closed_loop::widened,
-    diagnostics::{held_out::hold_out, residual_tests::input_p},
+    diagnostics::{
+        held_out::{HEAD, hold_out},
+        residual_tests::input_p,
+    },
     fit::{node::Node, noise_model::NOISE_ORDER},
 };
 
@@ -108,7 +111,13 @@ pub(crate) fn report(
     let last = added.last();
     let simulated = setup.simulate(&fit.x)?.output;
     let residuals = setup.residuals(&fit.x)?;
-    let held_out = hold_out(node, test)?;
+    let held_out = hold_out(node, test, HEAD)?;
+    let are_long = |record: &Record| record.len() >= MOST_OF_RECORD * LATER_ROWS;
+    let later = if test.iter().all(are_long) {
+        hold_out(node, test, LATER_ROWS)?
+    } else {
+        None
+    };
     let count = setup.outputs();
     let first = &setup.records[0];
     let inputs: Vec<Signal> = first
@@ -139,6 +148,7 @@ pub(crate) fn report(
             name: first.outputs[output].name.clone(),
             rmse: fit.rmse[output],
             rmse_test: held_out.map(|(_, rmse, _)| rmse),
+            rmse_test_50: later.as_ref().map(|later| later.outputs[output].1),
             held_out_error: held_out.map(|(.., error)| error),
             tests: tests(node, &residuals, output)?,
             failures,

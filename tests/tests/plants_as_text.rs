@@ -1,13 +1,19 @@
-//! Blind records of tanks, where these lie beside the checkout: most with the plant as text, as any model of a user.
+//! Plants as text, as any model of a user, beside the built-in plants: fits of the same record; and blind records of tanks, where these lie
+//! beside the checkout.
 
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::PathBuf;
 
-use ct_model::ModelSpec;
+use ct_model::{Model, ModelSpec};
 use ct_signals::{Channel, ReadOptions};
 use ctid::input::Files;
+use ctid_tests::{Drive, draw};
 use effect_search::{Diagnosis, Options, Problem, Verdict, diagnose};
+use greybox::{FitOptions, ModelSetup};
 use plants::Plant;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
 /// A blind record with its model file.
 fn files(case: &str) -> Files {
@@ -44,6 +50,50 @@ fn diagnosed(case: &str, text: &str, known: &[(&str, f64)]) -> Result<Diagnosis,
         builder = builder.known(*name, *value);
     }
     Ok(diagnose(&builder.build()?, &Options::default(), &|_| {})?)
+}
+
+/// A fit of the text gives the same errors and estimates as a fit of the built-in plant.
+#[test]
+fn fits_are_those_of_the_built_in_plant() {
+    for plant in [
+        Plant::SingleTank,
+        Plant::SingleTankLinear,
+        Plant::CascadedTanks,
+        Plant::CascadedTanksLinear,
+        Plant::FirstOrder,
+    ] {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let rig = draw::rig(plant, Drive::Open, 0.0, 400, &mut rng);
+        let kernel = rig.problem(rig.run(&mut rng));
+        let fitted = missing_effect::compare(&kernel, &Default::default()).unwrap();
+        let step = &fitted.steps[0];
+        let mut record = kernel.records[0].clone();
+        let model = Model::new(plant.spec_of(&kernel.known, &mut record).unwrap());
+        record.references.clear();
+        let records = [record];
+        let setup = ModelSetup::new(&model, &records, &BTreeMap::new(), 1.0).unwrap();
+        let fit = setup.fit(&FitOptions::default()).unwrap();
+        let (own, other) = (fit.rmse[0], step.outputs[0].rmse);
+        assert!(
+            (own / other - 1.0).abs() < 1e-6,
+            "{plant:?}: {own}, {other}"
+        );
+        let mut compared = 0;
+        for parameter in &step.parameters {
+            let Some(at) = setup.names().iter().position(|n| *n == parameter.name) else {
+                continue;
+            };
+            let error = parameter.std_error.unwrap();
+            let difference = fit.x[at] - parameter.value;
+            assert!(
+                difference.abs() < 0.01 * error,
+                "{plant:?}: {} {difference} {error}",
+                parameter.name
+            );
+            compared += 1;
+        }
+        assert!(compared >= 2, "{plant:?}: {:?}", setup.names());
+    }
 }
 
 /// The fits of two tanks follow a long valley of the cost to the drift of the sensor.

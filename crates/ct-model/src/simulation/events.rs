@@ -10,6 +10,8 @@ use crate::tape::{Register, Registers, Tape};
 const SLIDE: f64 = 1e-2;
 /// Tolerance of an event time, as a share of the step.
 const EVENT: f64 = 1e-13;
+/// A guard that is further from zero at its event than it moves in this share of an interval has jumped.
+const JUMP: f64 = 1e-6;
 /// Perturbation for the finite difference that gives the rate of a guard, as a share of the step.
 const SPEED: f64 = 1e-4;
 
@@ -221,8 +223,11 @@ impl<T: Scalar> SimulationState<T> {
         let speed = (at(self, watched, share + SPEED).value()
             - at(self, watched, share - SPEED).value())
             / (2.0 * SPEED * h.value());
-        if speed != 0.0 && speed.is_finite() {
-            let here = at(self, watched, share);
+        let here = at(self, watched, share);
+        // A quantity that the last event has made jump, such as the difference of a maximum of branches, did not cross zero: it changes its
+        // branch at that event, whatever its own slopes are.
+        let away = here.value().abs() > JUMP * interval.length * speed.abs();
+        if speed != 0.0 && speed.is_finite() && !away {
             after = T::with_slopes(after.value(), [(here, -1.0 / speed)]);
         }
         Some(Event {

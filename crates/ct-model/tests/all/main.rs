@@ -10,6 +10,7 @@ mod long_steps;
 mod memory;
 mod mutated;
 mod own_candidates;
+mod random_derivatives;
 mod refused;
 mod round_trip;
 mod shared;

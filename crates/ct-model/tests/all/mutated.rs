@@ -147,15 +147,22 @@ proptest! {
     #[test]
     fn a_mutated_text_gives_a_model_or_a_message(changes in prop::collection::vec(change(), 1..6)) {
         let text = changes.into_iter().fold(TEXT.to_string(), |text, change| changed(&text, change));
+        let model = ready(&text);
         match ModelSpec::parse(&text) {
             Ok(spec) => {
                 prop_assert_eq!(ModelSpec::parse(&spec.to_string()), Ok(spec));
-                ready(&text).iter().for_each(simulate);
+                model.iter().for_each(simulate);
             }
             Err(error) => {
                 let said = error.to_string();
                 prop_assert_eq!(said.lines().count(), 1);
-                prop_assert!(error.position.line <= text.matches('\n').count() + 1);
+                let place = error.position;
+                prop_assert!(place.line >= 1 && place.column >= 1);
+                let begins = format!("{}:{}: ", place.line, place.column);
+                prop_assert!(said.starts_with(&begins));
+                // The end of a text is after its last character.
+                let line = text.split('\n').nth(place.line - 1);
+                prop_assert!(line.is_some_and(|line| place.column <= line.chars().count() + 1));
                 prop_assert!(error.excerpt().lines().count() <= 2);
             }
         }

@@ -3,6 +3,7 @@
 //! | what | where |
 //! |---|---|
 //! | exceptions | `error.rs` |
+//! | arguments that are arrays of numbers | `arrays.rs` |
 //! | long work: the interpreter's lock is released, Ctrl-C is heard | `work.rs` |
 //! | frames as the program reads its records | `frame.rs` |
 //! | a user's own model, its fit, its diagnosis | `model.rs`, `fit.rs`, `diagnosis.rs` |
@@ -16,6 +17,7 @@
 //!
 //! What users see is in `python/ctid`: it makes frames of these arrays and says what types there are.
 
+mod arrays;
 mod bytes;
 mod diagnosis;
 mod error;

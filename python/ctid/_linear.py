@@ -76,7 +76,7 @@ class Identification:
 
     @property
     def params(self) -> pd.Series[float]:
-        """`a_1..a_n, b_0..b_m`, and an offset where the method estimates one."""
+        """`a1..an, b0..bm`, and an offset where the method estimates one."""
         all = self._found["parameters"]
         result: pd.Series[float] = series([p["name"] for p in all], [p["value"] for p in all], "value")
         return result
@@ -114,16 +114,20 @@ class Identification:
         return result
 
     def to_control(self) -> Any:
-        """`B(s)/A(s)` as `control.TransferFunction`, of one input, where the package `control` is installed."""
+        """`B(s)/A(s)` as `control.TransferFunction`, a column for each input, where the package `control` is installed. A delay is not in it."""
         try:
             import control  # type: ignore[import-not-found, import-untyped, unused-ignore]
         except ImportError:
             raise ImportError("control.TransferFunction needs python-control: pip install control") from None
-        values = {p["name"]: p["value"] for p in self._found["parameters"]}
+        values = self.params
         n, m = self.order
-        a = [1.0, *(values[f"a_{i}"] for i in range(1, n + 1))]
-        b = [values[f"b_{i}"] for i in range(m + 1)]
-        return control.TransferFunction(b[::-1], a[::-1])
+        refined = self._found.get("refined") or {"integrator": False, "inputs": [None]}
+        # With an integrator A is s + a2 s^2 + .., else 1 + a1 s + ..
+        begin = [0.0, 1.0] if refined["integrator"] else [1.0]
+        a = [*begin, *(values[f"a{i}"] for i in range(len(begin), n + 1))][::-1]
+        inputs = ["" if k == 0 else f"_{k + 1}" for k in range(len(refined["inputs"]))]
+        b = [[values[f"b{i}{one}"] for i in range(m, -1, -1)] for one in inputs]
+        return control.TransferFunction([b], [[a] * len(b)])
 
     def plot(self, ax: Any = None) -> Any:
         """Measured and simulated output, and the residual; returns matplotlib axes."""
@@ -233,7 +237,7 @@ class Fcloe:
     ) -> dict[str, Any]:
         """Fits it to signals that are sampled every `dt`: the output y (NaN: missing), the reference r of a loop, the input u.
 
-        Returns `theta` (`a_1..a_n, b_0..b_m`), `std_errors`, `half_widths` of the intervals that hold with probability `level`, `cov`,
+        Returns `theta` (`a1..an, b0..bm`), `std_errors`, `half_widths` of the intervals that hold with probability `level`, `cov`,
         `residual_rms`, and why it ended: `stop`, `successful`. Without `theta0` it starts from regressions, which need u.
         """
         n, m = self.order

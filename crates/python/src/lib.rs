@@ -46,7 +46,7 @@ mod _ctid {
     #[pymodule_export]
     use crate::error::{DataError, Error, ModelError};
     #[pymodule_export]
-    use crate::fit::Fit;
+    use crate::fit::{Fit, time_limit};
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
@@ -60,7 +60,7 @@ mod _ctid {
     #[pymodule_export]
     use crate::rls::ContinuousRls;
     #[pymodule_export]
-    use crate::tables::udink_tables;
+    use crate::tables::{baysse_tables, udink_tables};
     #[pymodule_export]
     use crate::tank::TankFit;
     #[pymodule_export]

@@ -3,6 +3,7 @@
 use numpy::ndarray::Dimension;
 use numpy::{PyArray, PyArrayMethods, PyReadonlyArray};
 use pyo3::prelude::*;
+use pyo3::types::PyList;
 
 use crate::error;
 
@@ -44,8 +45,12 @@ pub fn numbers<'py, D: Dimension>(
     borrowed(array)
 }
 
-/// The numbers of an argument with one axis.
+/// The numbers of an argument with one axis. For the few of a list numpy would take ten times as long.
 pub fn list(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let of_list = value.cast::<PyList>().ok();
+    if let Some(found) = of_list.and_then(|list| list.extract().ok()) {
+        return Ok(found);
+    }
     let found = numbers::<numpy::Ix1>(name, value)?;
     Ok(found.as_array().to_vec())
 }

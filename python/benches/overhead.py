@@ -1,16 +1,18 @@
 """Overhead of the package, as ratios in one run.
 
 `python overhead.py CTID RLS`: the program, and the example `many_samples` of the crate ct-rls
-(`cargo build --release -p ctid` and `cargo build --release -p ct-rls --example many_samples`).
+(`cargo build --release -p ctid` and `cargo build --release -p ct-rls --example many_samples`). `python overhead.py`: four fits at once alone.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,7 @@ import pandas as pd
 import ctid
 
 ROOT = Path(__file__).resolve().parents[2]
+MODELS = ROOT / "examples" / "models"
 SAMPLES, PARAMETERS, REPEATS = 1_000_000, 3, 7
 
 
@@ -44,6 +47,32 @@ def best(work: object) -> float:
         work()  # type: ignore[operator]
         times.append(time.perf_counter() - began)
     return min(times)
+
+
+def four_fits() -> None:
+    """Four fits from four threads of Python, and one after the other."""
+    frame = pd.read_csv(MODELS / "coupled-heaters.csv")
+    frame = frame.set_index(frame.columns[0])
+    model = ctid.Model.from_file(MODELS / "coupled-heaters.toml")
+
+    def fit(seed: int) -> ctid.Fit:
+        return model.fit(frame, starts=48, seed=seed)
+
+    at_once, after = [], []
+    with ThreadPoolExecutor(4) as pool:
+        for _ in range(REPEATS):
+            began = time.perf_counter()
+            parallel = list(pool.map(fit, range(4)))
+            at_once.append(time.perf_counter() - began)
+            began = time.perf_counter()
+            alone = [fit(seed) for seed in range(4)]
+            after.append(time.perf_counter() - began)
+    assert all(a.params.equals(b.params) for a, b in zip(parallel, alone, strict=True)), "both have to find the same"
+    threads = os.environ.get("RAYON_NUM_THREADS", "all")
+    print(
+        f"four fits from four threads, {os.cpu_count()} cores, {threads} threads for each fit's starts: "
+        f"{min(at_once) / min(after):.3f} times the {min(after):.3f} s of one after the other"
+    )
 
 
 def main(program: str, example: str) -> None:
@@ -76,11 +105,10 @@ def main(program: str, example: str) -> None:
     beyond = (best(single) - best(nothing) - crate["innovations"]) / SAMPLES
     print(f"ContinuousRls.update: {1e9 * beyond:.0f} ns a call beyond the crate's")
 
-    models = ROOT / "examples" / "models"
     for name in ("heated-block", "coupled-heaters"):
-        frame = pd.read_csv(models / f"{name}.csv")
+        frame = pd.read_csv(MODELS / f"{name}.csv")
         frame = frame.set_index(frame.columns[0])
-        fit = ctid.Model.from_file(models / f"{name}.toml").fit(frame)
+        fit = ctid.Model.from_file(MODELS / f"{name}.toml").fit(frame)
         package, by_program = [], []
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "d.json"
@@ -88,7 +116,7 @@ def main(program: str, example: str) -> None:
                 began = time.perf_counter()
                 fit.diagnose(progress=False)
                 package.append(time.perf_counter() - began)
-                command = [program, "diagnose", str(models / f"{name}.csv"), "--model", str(models / f"{name}.toml"), "--json", str(out)]
+                command = [program, "diagnose", str(MODELS / f"{name}.csv"), "--model", str(MODELS / f"{name}.toml"), "--json", str(out)]
                 subprocess.run(command, check=True, capture_output=True)
                 by_program.append(json.loads(out.read_text())["seconds"])
                 out.unlink()
@@ -96,4 +124,7 @@ def main(program: str, example: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    if len(sys.argv) == 3:
+        main(*sys.argv[1:])
+    else:
+        four_fits()

@@ -223,20 +223,22 @@ class ContinuousRls:
 
     def __new__(
         cls,
-        theta0: npt.NDArray[np.float64],
-        P0: npt.NDArray[np.float64],
+        theta0: npt.ArrayLike,
+        P0: npt.ArrayLike,
         forgetting: float,
         *,
         c: float = 1.0,
         gamma: float = 1.0,
     ) -> ContinuousRls: ...
-    def update(self, phi: npt.NDArray[np.float64] | Sequence[float], y: float, dt: float) -> float: ...
+    def update(self, phi: npt.ArrayLike, y: float, dt: float) -> float: ...
     @overload
     def run(
-        self, phi: _Array, y: _Array, dt: float | _Array, *, trajectory: Literal[True] = True
+        self, phi: npt.ArrayLike, y: npt.ArrayLike, dt: npt.ArrayLike, *, trajectory: Literal[True] = True
     ) -> tuple[_Array, _Array]: ...
     @overload
-    def run(self, phi: _Array, y: _Array, dt: float | _Array, *, trajectory: Literal[False]) -> _Array: ...
+    def run(
+        self, phi: npt.ArrayLike, y: npt.ArrayLike, dt: npt.ArrayLike, *, trajectory: Literal[False]
+    ) -> _Array: ...
     @property
     def theta(self) -> _Array: ...
     @property
@@ -260,18 +262,18 @@ class StabilizedOe:
     def __new__(
         cls,
         order: tuple[int, int],
-        theta0: Sequence[float],
+        theta0: npt.ArrayLike,
         forgetting: float,
         bandwidth: float,
         *,
         P0: float = 1e3,
         P0_filter: float = 1.0,
-        filter0: Sequence[float] | None = None,
+        filter0: npt.ArrayLike | None = None,
         hold: str = "zero",
         offset: bool = False,
     ) -> StabilizedOe: ...
     def update(self, u: float, y: float, dt: float) -> float: ...
-    def run(self, u: _Array, y: _Array, dt: float) -> _Array: ...
+    def run(self, u: npt.ArrayLike, y: npt.ArrayLike, dt: float) -> _Array: ...
     @property
     def theta(self) -> _Array: ...
     @property
@@ -315,3 +317,5 @@ def fcloe_fit(
     level: float,
 ) -> dict[str, Any]: ...
 def udink_tables(runs: int, seed: int) -> str: ...
+def baysse_tables(runs: int, seed: int) -> str: ...
+def time_limit(effort: str, seconds: float | None) -> float: ...

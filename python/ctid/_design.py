@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+#: What pairs hold, for messages.
+BETWEEN, RANGE = "of effects, between=(\"lag(u)\", \"delay(u)\")", "the smallest and the largest value"
+
+
 class Design:
     """An experiment that was proposed; immutable."""
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _ctid
-from ._design import Design
+from ._arguments import LARGEST_SEED, numbers, pair, pairs, whole
+from ._design import BETWEEN, RANGE, Design
 from ._frames import Array, table
 from ._model import Model
 from ._options import SEED, Effort, Progress, phases
@@ -89,7 +90,7 @@ class Diagnosis:
             "unit": [p["unit"] for p in all],
             "effect": [p.get("effect") for p in all],
         }
-        result: pd.DataFrame = table(columns, [p["name"] for p in all])
+        result: pd.DataFrame = table(columns, [p["name"] for p in all], "parameter")
         return result
 
     @property
@@ -152,16 +153,17 @@ class Diagnosis:
 
         Raises `ModelError` where the effects or the limits do not allow one.
         """
-        first, second = between
-        applied = list(inputs) if inputs is not None else list(ranges or {})
-        with phases(progress) as on_phase:
+        first, second = pair("between", between, BETWEEN)
+        within = pairs("ranges", ranges, RANGE)
+        applied = list(inputs) if inputs is not None else list(within)
+        with phases(progress, _ctid.time_limit(effort, time_limit)) as on_phase:
             found, time_unit = self._native.design(
                 (str(first), str(second)),
-                ranges={name: (float(low), float(high)) for name, (low, high) in (ranges or {}).items()},
-                slews={name: float(value) for name, value in (slews or {}).items()},
+                ranges=within,
+                slews=numbers("slews", slews),
                 inputs=applied,
                 duration=duration,
-                seed=seed,
+                seed=whole("seed", seed, 0, LARGEST_SEED),
                 effort=effort,
                 time_limit=time_limit,
                 progress=on_phase,

@@ -10,18 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _ctid
-from ._ctid import DataError, ModelError
+from ._arguments import LARGEST_SEED, number, whole
+from ._ctid import DataError
 from ._diagnosis import Diagnosis
 from ._frames import (
     Array,
     Data,
     Records,
     band_table,
-    need_pandas,
+    columns_in,
     series,
+    stacked,
     table,
-    to_frame,
     to_frames,
+    to_one_frame,
 )
 from ._model import Model
 from ._options import SEED, Effort, Progress, phases
@@ -71,7 +73,7 @@ class Fit:
         all = self._native.estimates
         lower = [e[1] - half for e, half in zip(all, halves, strict=True)]
         upper = [e[1] + half for e, half in zip(all, halves, strict=True)]
-        result: pd.DataFrame = table({"lower": lower, "upper": upper}, [e[0] for e in all])
+        result: pd.DataFrame = table({"lower": lower, "upper": upper}, [e[0] for e in all], "parameter")
         return result
 
     @property
@@ -84,23 +86,24 @@ class Fit:
                 f"the records do not determine all that is fitted ({which or 'see summary()'}): make some of it known, or give priors"
             )
         names, matrix = found
-        result: pd.DataFrame = need_pandas().DataFrame(matrix, index=names, columns=names)
+        result: pd.DataFrame = table({name: matrix[:, k] for k, name in enumerate(names)}, names, "parameter")
         return result
 
     def _tables(self, of: Callable[[Array, Array], Array]) -> pd.DataFrame:
-        pandas = need_pandas()
         parts = []
         for k, (record, times, outputs) in enumerate(self._series):
             columns = {name: of(measured, model) for name, measured, model in outputs}
             index = self._indexes[k] if len(self._indexes) == len(self._series) else None
-            if index is None or len(index) != len(times):
-                index = pandas.Index(times, name="t [s]")
-            parts.append((record, pandas.DataFrame(columns, index=index)))
+            if index is None or len(index[1]) != len(times):
+                index = ("t [s]", times)
+            parts.append((record, index, columns))
         if len(parts) == 1:
-            result: pd.DataFrame = parts[0][1]
+            _, (name, index), columns = parts[0]
+            result: pd.DataFrame = table(columns, index, name)
             return result
-        names = [f"{name} ({k + 1})" if sum(n == name for n, _ in parts) > 1 else name for k, (name, _) in enumerate(parts)]
-        result = pandas.concat([part for _, part in parts], keys=names, names=["record"])
+        records = [record for record, _, _ in parts]
+        names = [f"{name} ({k + 1})" if records.count(name) > 1 else name for k, name in enumerate(records)]
+        result = stacked([(name, index, columns) for name, (_, index, columns) in zip(names, parts, strict=True)])
         return result
 
     @property
@@ -131,7 +134,7 @@ class Fit:
         """
         found = self._scores if test is None else self._score_of(test)
         result: pd.DataFrame = table(
-            {"rmse": [s[1] for s in found], "fit_percent": [s[2] for s in found]}, [s[0] for s in found]
+            {"rmse": [s[1] for s in found], "fit_percent": [s[2] for s in found]}, [s[0] for s in found], "output"
         )
         return result
 
@@ -185,12 +188,11 @@ class Fit:
         """
         model = self._native.model
         signals = [column for _, column in model.inputs]
-        names = list(data)
-        present = [c for _, c in model.outputs if any(str(n) == c or str(n).split(" [")[0] == c for n in names)]
-        frame = to_frame(data, "test", signals + present)
-        found = self._native.simulate(frame, first, 0.95 if interval is None else interval)
+        wanted = signals + columns_in(data, [column for _, column in model.outputs])
+        frame = to_one_frame(data, "test", wanted)
+        found = self._native.simulate(frame, whole("first", first, 1), 0.95 if interval is None else number("interval", interval))
         outputs = [name for name, _ in model.outputs]
-        return band_table(zip(outputs, found["outputs"].values(), strict=True), data, interval)
+        return band_table(zip(outputs, found["outputs"].values(), strict=True), data, interval, wanted)
 
     def failures(self) -> pd.DataFrame:
         """Where the model fails on its records: windows of time, ranges of the output, the inputs and the states, directions of change and frequencies whose error is above the noise.
@@ -267,15 +269,13 @@ class Fit:
         Raises `DataError` and `ModelError`.
         """
         frames = to_frames(test, "test", self._wanted) if test is not None else []
-        if max_effects is not None and max_effects < 1:
-            raise ModelError("max_effects is a whole number above zero")
-        with phases(progress) as on_phase:
+        with phases(progress, _ctid.time_limit(effort, time_limit)) as on_phase:
             found = self._native.diagnose(
                 frames,
                 effort=effort,
                 time_limit=time_limit,
-                max_effects=max_effects,
-                seed=seed,
+                max_effects=None if max_effects is None else whole("max_effects", max_effects, 1),
+                seed=whole("seed", seed, 0, LARGEST_SEED),
                 progress=on_phase,
             )
         return Diagnosis(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
@@ -19,6 +20,9 @@ Data: TypeAlias = "pd.DataFrame | Mapping[str, npt.ArrayLike]"
 #: One record or several experiments.
 Records: TypeAlias = "Data | Sequence[Data]"
 
+#: Instants, and their name.
+Index: TypeAlias = tuple[Any, Any]
+
 #: Keys of a mapping under which the time is looked for, in this order.
 TIMES = ("t", "time", "Time", "T")
 
@@ -30,14 +34,6 @@ def pandas() -> Any:
     except ImportError:
         return None
     return pandas
-
-
-def need_pandas() -> Any:
-    """The module pandas; where it is not installed, an error that says so."""
-    module = pandas()
-    if module is None:
-        raise ImportError("this result is a table: install pandas (pip install pandas)")
-    return module
 
 
 def is_frame(data: object) -> bool:
@@ -126,6 +122,13 @@ def _sorted(name: str, header: str, time: Array | list[str]) -> None:
         )
 
 
+def _time_key(columns: Iterable[str], wanted: Sequence[str]) -> str | None:
+    """The column of a mapping that holds the time; None where there is none. `wanted`: the columns that the model reads."""
+    names = [c for c in columns if c not in wanted]
+    found = [c for c in TIMES if c in names] + [c for c in names if c.split(" [")[0] in TIMES]
+    return found[0] if found else None
+
+
 def to_frame(data: Data, name: str, wanted: Sequence[str]) -> Frame:
     """A record for the native part. Row 1 in messages is the header, as in a file. `wanted`: the columns that the model reads."""
     columns: dict[str, Any]
@@ -139,21 +142,24 @@ def to_frame(data: Data, name: str, wanted: Sequence[str]) -> Frame:
         columns = {str(c): table[c] for c in table.columns}
         header = "t" if table.index.name is None else str(table.index.name)
         times: Any = table.index
-        if isinstance(times, need_pandas().RangeIndex) and table.index.name is None:
+        if isinstance(times, pandas().RangeIndex) and table.index.name is None:
             named = [c for c in columns if c.split(" ")[0].split("[")[0] in TIMES]
             if named and not any(c in wanted for c in named):
                 raise DataError(
                     f'{name}: the index counts rows, and there is a column "{named[0]}": make it the index, df.set_index("{named[0]}")'
                 )
+            warnings.warn(
+                f'{name}: the index counts rows, and is read as seconds: make the time the index, or name it, df.index.name = "t [s]"',
+                stacklevel=4,
+            )
     else:
         if not isinstance(data, Mapping):
             as_list(cast("Records", data), name)
         columns = {str(c): v for c, v in cast("Mapping[str, npt.ArrayLike]", data).items()}
-        found = [c for c in TIMES if c in columns and c not in wanted]
-        found += [c for c in columns if c.split(" [")[0] in TIMES and c not in wanted and c not in found]
-        if not found:
+        found = _time_key(columns, wanted)
+        if found is None:
             raise DataError(f'{name}: there is no time: give its instants under "t"')
-        header = found[0]
+        header = found
         times = columns.pop(header)
     time = _time(name, header, times)
     _sorted(name, header, time)
@@ -176,32 +182,59 @@ def to_frame(data: Data, name: str, wanted: Sequence[str]) -> Frame:
 def to_frames(data: Records | None, name: str, wanted: Sequence[str]) -> list[Frame]:
     """Records for the native part."""
     records = as_list(data, name)
-    named = [name] if len(records) == 1 else [f"{name} {k + 1}" for k in range(len(records))]
-    return [to_frame(record, one, wanted) for record, one in zip(records, named, strict=True)]
+    frames = []
+    # No comprehension: of some versions of Python it is a further frame on the stack, from which warnings name the caller.
+    for k, record in enumerate(records):
+        frames.append(to_frame(record, name if len(records) == 1 else f"{name} {k + 1}", wanted))
+    return frames
 
 
-def index_of(data: Data, rows: int) -> Any:
-    """The index of a record, where it has so many rows; else None."""
+def columns_in(data: Data, wanted: Sequence[str]) -> list[str]:
+    """Those of the columns that a record has, with their unit or without."""
+    names = [str(name) for name in data] if isinstance(data, Mapping) or is_frame(data) else []
+    return [c for c in wanted if any(c in (name, name.split(" [")[0]) for name in names)]
+
+
+def to_one_frame(data: Data, name: str, wanted: Sequence[str]) -> Frame:
+    """The only record of a call for the native part."""
+    records = as_list(data, name)
+    if len(records) != 1 or records[0] is not data:
+        raise DataError(f"{name}: one record is needed, and a {type(data).__name__} is given: call it once for each")
+    return to_frame(data, name, wanted)
+
+
+def index_of(data: Data, rows: int, wanted: Sequence[str]) -> Index | None:
+    """The instants of a record and their name, where it has so many rows. `wanted`: the columns that the model reads."""
     if is_frame(data):
         index = cast("pd.DataFrame", data).index
-        return index if len(index) == rows else None
-    columns = cast("Mapping[str, npt.ArrayLike]", data)
-    for key in columns:
-        if str(key).split(" [")[0] in TIMES:
-            times = np.asarray(columns[key])
-            return times if times.size == rows else None
-    return None
+        return (index.name, index) if len(index) == rows else None
+    columns = {str(c): v for c, v in cast("Mapping[str, npt.ArrayLike]", data).items()}
+    key = _time_key(columns, wanted)
+    if key is None:
+        return None
+    times = np.asarray(columns[key])
+    return (key, times) if times.size == rows else None
 
 
 def table(columns: Mapping[Any, Any], index: Any = None, name: str | None = None) -> Any:
-    """A frame where pandas is installed; else a dict of arrays."""
+    """A frame where pandas is installed; else a dict of arrays, of which the first is the index. `name`: that of the index."""
     module = pandas()
-    if module is None:
-        return dict(columns)
-    frame = module.DataFrame(dict(columns), index=index)
-    if name is not None:
-        frame.index.name = name
-    return frame
+    if module is not None:
+        return module.DataFrame(dict(columns), index=None if index is None else module.Index(index, name=name))
+    arrays = {key: np.asarray(values) for key, values in columns.items()}
+    return arrays if index is None else {name: np.asarray(index), **arrays}
+
+
+def stacked(parts: Sequence[tuple[str, Index, Mapping[str, Array]]]) -> Any:
+    """Tables of several records, each with its name, index and columns, below each other."""
+    module = pandas()
+    if module is not None:
+        frames = [table(columns, index, name) for _, (name, index), columns in parts]
+        return module.concat(frames, keys=[record for record, _, _ in parts], names=["record"])
+    records = np.repeat([record for record, _, _ in parts], [len(index) for _, (_, index), _ in parts])
+    name = parts[0][1][0]
+    whole = {"record": records, name: np.concatenate([index for _, (_, index), _ in parts])}
+    return whole | {output: np.concatenate([columns[output] for _, _, columns in parts]) for output in parts[0][2]}
 
 
 def series(names: Sequence[str], values: Sequence[float | None], name: str) -> Any:
@@ -220,7 +253,7 @@ def row_count(data: Data) -> int:
     return len(data)
 
 
-def band_table(outputs: Iterable[tuple[str, Mapping[str, Array]]], data: Data, interval: float | None) -> pd.DataFrame:
+def band_table(outputs: Iterable[tuple[str, Mapping[str, Array]]], data: Data, interval: float | None, wanted: Sequence[str]) -> pd.DataFrame:
     """Simulated outputs as a table with the index of the data. Columns of each output: `mean`, and with an interval its bounds `lower`, `upper`."""
     columns: dict[Any, Array] = {}
     for output, band in outputs:
@@ -228,5 +261,6 @@ def band_table(outputs: Iterable[tuple[str, Mapping[str, Array]]], data: Data, i
             if interval is not None or name == "mean":
                 columns[output, name] = values
     rows = next(iter(columns.values())).size
-    result: pd.DataFrame = table(columns, index_of(data, rows))
+    header, index = index_of(data, rows, wanted) or (None, None)
+    result: pd.DataFrame = table(columns, index, header)
     return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _ctid
+from ._arguments import number, pair
 from ._ctid import DataError, ModelError
 from ._frames import Array, Data, Records, as_list, series, to_frames
 
@@ -76,7 +78,7 @@ class Identification:
 
     @property
     def params(self) -> pd.Series[float]:
-        """`a_1..a_n, b_0..b_m`, and an offset where the method estimates one."""
+        """`a1..an, b0..bm`, and an offset where the method estimates one."""
         all = self._found["parameters"]
         result: pd.Series[float] = series([p["name"] for p in all], [p["value"] for p in all], "value")
         return result
@@ -114,16 +116,20 @@ class Identification:
         return result
 
     def to_control(self) -> Any:
-        """`B(s)/A(s)` as `control.TransferFunction`, of one input, where the package `control` is installed."""
+        """`B(s)/A(s)` as `control.TransferFunction`, a column for each input, where the package `control` is installed. A delay is not in it."""
         try:
             import control  # type: ignore[import-not-found, import-untyped, unused-ignore]
         except ImportError:
             raise ImportError("control.TransferFunction needs python-control: pip install control") from None
-        values = {p["name"]: p["value"] for p in self._found["parameters"]}
+        values = self.params
         n, m = self.order
-        a = [1.0, *(values[f"a_{i}"] for i in range(1, n + 1))]
-        b = [values[f"b_{i}"] for i in range(m + 1)]
-        return control.TransferFunction(b[::-1], a[::-1])
+        refined = self._found.get("refined") or {"integrator": False, "inputs": [None]}
+        # With an integrator A is s + a2 s^2 + .., else 1 + a1 s + ..
+        begin = [0.0, 1.0] if refined["integrator"] else [1.0]
+        a = [*begin, *(values[f"a{i}"] for i in range(len(begin), n + 1))][::-1]
+        inputs = ["" if k == 0 else f"_{k + 1}" for k in range(len(refined["inputs"]))]
+        b = [[values[f"b{i}{one}"] for i in range(m, -1, -1)] for one in inputs]
+        return control.TransferFunction([b], [[a] * len(b)])
 
     def plot(self, ax: Any = None) -> Any:
         """Measured and simulated output, and the residual; returns matplotlib axes."""
@@ -179,9 +185,7 @@ def identify(
         raise DataError("no record: give a frame, or a list of them")
     named_inputs = _guess(records[0], inputs, "u", "input")
     named_output = _guess(records[0], output, "y", "output")[0]
-    n, m = order
-    if n < 0 or m < 0:
-        raise ModelError(f"an order is (n, m) with n from 1 to 4 and m from 0 to n; it is ({n}, {m})")
+    low, high = pair("limits", limits, "the smallest and the largest command")
     wanted = [*named_inputs, named_output, *([reference] if reference is not None else [])]
     frames = to_frames(records, "data", wanted)
     found, curves = _ctid.identify(
@@ -190,14 +194,14 @@ def identify(
         named_output,
         reference=reference,
         method=method,
-        order=(n, m),
+        order=_order(order),
         delay=None if delay is None else str(delay),
         integrator=integrator,
         memory=memory,
         bandwidth=bandwidth,
         levels=levels,
-        controller=None if controller is None else ([float(r) for r in controller[0]], [float(s) for s in controller[1]]),
-        limits=limits,
+        controller=_polynomials(controller),
+        limits=(number("limits", low), number("limits", high)),
         hold=hold,
     )
     return Identification(json.loads(found), curves)
@@ -217,7 +221,7 @@ class Fcloe:
         controller: Controller | None = None,
         levels: Literal["estimated", "deviations", "mean"] = "estimated",
     ) -> None:
-        self.order = order
+        self.order = _order(order)
         self.controller = controller
         self.levels = levels
 
@@ -233,25 +237,40 @@ class Fcloe:
     ) -> dict[str, Any]:
         """Fits it to signals that are sampled every `dt`: the output y (NaN: missing), the reference r of a loop, the input u.
 
-        Returns `theta` (`a_1..a_n, b_0..b_m`), `std_errors`, `half_widths` of the intervals that hold with probability `level`, `cov`,
+        Returns `theta` (`a1..an, b0..bm`), `std_errors`, `half_widths` of the intervals that hold with probability `level`, `cov`,
         `residual_rms`, and why it ended: `stop`, `successful`. Without `theta0` it starts from regressions, which need u.
         """
-        n, m = self.order
-        controller = self.controller
         return _ctid.fcloe_fit(
             float(dt),
             None if r is None else _signal("r", r),
             None if u is None else _signal("u", u),
             _signal("y", y),
-            order=(n, m),
-            controller=None if controller is None else (list(controller[0]), list(controller[1])),
+            order=self.order,
+            controller=_polynomials(self.controller),
             levels=self.levels,
-            theta0=None if theta0 is None else [float(v) for v in theta0],
+            theta0=None if theta0 is None else _signal("theta0", theta0),
             level=level,
         )
 
     def __repr__(self) -> str:
         return f"<ctid.Fcloe of order {self.order}>"
+
+
+def _order(order: tuple[int, int]) -> tuple[int, int]:
+    try:
+        n, m = (operator.index(one) for one in order)
+    except (TypeError, ValueError):
+        n, m = 0, 0
+    if n < 1 or not 0 <= m <= n:
+        raise ModelError(f"order is {order!r}: give a pair (n, m) of the orders of A, 1 or more, and B, 0 to n")
+    return n, m
+
+
+def _polynomials(controller: Controller | None) -> tuple[list[float], list[float]] | None:
+    if controller is None:
+        return None
+    r, s = pair("controller", controller, "the polynomials R and S by rising powers of s")
+    return _signal("controller", r), _signal("controller", s)
 
 
 def _signal(name: str, values: npt.ArrayLike) -> list[float]:

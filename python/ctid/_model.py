@@ -7,12 +7,16 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _ctid
+from ._arguments import LARGEST_SEED, number, numbers, pairs, whole
 from ._ctid import ModelError
 from ._frames import Records, as_list, index_of, row_count, series, to_frames
 from ._linear import StateSpace, state_space
 from ._monitor import Monitor
 from ._options import (
+    LARGEST_NOISE_ORDER,
+    MOST_STARTS,
     NOISE_ORDER,
+    PRIOR,
     SEED,
     STARTS,
     Hold,
@@ -137,13 +141,15 @@ class Model:
         """Fits the model to records by simulation error.
 
         `data`: a frame whose index is the time, in s where its name says no unit (`t [min]`), or dates; NaN is a missing reading. A list of
-        frames are several experiments, each with initial states of its own.
+        frames are several experiments, each with initial states of its own. An index that counts rows is read as seconds, with a warning where it has
+        no name.
         `inputs`, `outputs`: the columns of the signals: names of the model, or columns in the order of the model, or `{signal: column}`; without
         them the columns have the model's names. A column in another unit (`u [mV]`) is converted.
         `known`: parameters that are not fitted, in the units of the text.
         `priors`: what is known of parameters beside the records, `{name: (value, standard error)}`.
         `hold`: what the inputs do between rows, `"zero"` or `"first"`; without it as the model file says, else `"zero"`.
-        `starts`, `seed`: of the random starts. `noise_order`: the largest order of the noise model that standard errors allow for.
+        `starts`, from 1, and `seed`: of the random starts. `noise_order`: the largest order of the noise model that standard errors allow for, 0 (white
+        noise) to 20.
 
         Raises `DataError` and `ModelError`.
         """
@@ -151,18 +157,24 @@ class Model:
         native = native.with_settings(
             inputs=_columns(native, inputs, "inputs"),
             outputs=_columns(native, outputs, "outputs"),
-            known={str(name): float(value) for name, value in (known or {}).items()},
-            priors={str(name): (float(v), float(e)) for name, (v, e) in (priors or {}).items()},
+            known=numbers("known", known),
+            priors=pairs("priors", priors, PRIOR),
             hold=hold,
         )
         wanted = [column for _, column in native.inputs + native.outputs]
         records = as_list(data)
         frames = to_frames(records, "data", wanted)
         with phases(progress) as on_phase:
-            fitted = native.fit(frames, starts=starts, seed=seed, noise_order=noise_order, progress=on_phase)
+            fitted = native.fit(
+                frames,
+                starts=whole("starts", starts, 1, MOST_STARTS),
+                seed=whole("seed", seed, 0, LARGEST_SEED),
+                noise_order=whole("noise_order", noise_order, 0, LARGEST_NOISE_ORDER),
+                progress=on_phase,
+            )
         from ._fit import Fit
 
-        return Fit(fitted, [index_of(record, row_count(record)) for record in records])
+        return Fit(fitted, [index_of(record, row_count(record), wanted) for record in records])
 
     @staticmethod
     def tank(
@@ -190,8 +202,7 @@ class Model:
         Slopes are exact. Time is in the model's unit; `at["time"]` is the time of a model that hangs on it. Raises `ModelError` where the model
         delays a signal, or a slope is not finite there.
         """
-        found = self._native.linearize({str(name): float(value) for name, value in (at or {}).items()})
-        return state_space(found)
+        return state_space(self._native.linearize(numbers("at", at)))
 
     def monitor(self, *, false_alarm_every: float = 1e6, learn: int = 1000, time_unit: float = 1.0) -> Monitor:
         """The model beside a running plant.
@@ -199,7 +210,8 @@ class Model:
         `false_alarm_every`: mean number of rows between false alarms, 1000 or more; `learn`: fewest rows to learn from, 100 to 1024; `time_unit`:
         seconds in one unit of the model's time. Raises `ModelError`.
         """
-        return Monitor(self._native.monitor(float(time_unit), float(false_alarm_every), int(learn)))
+        every = number("false_alarm_every", false_alarm_every)
+        return Monitor(self._native.monitor(number("time_unit", time_unit), every, whole("learn", learn, 1)))
 
     def to_modelica(self) -> str:
         """The model as text, its effects in it; its values are the fitted ones where it comes from a fit or a diagnosis."""

@@ -49,7 +49,7 @@ class Monitor:
         """Takes in a row: the time in s, every input, and those outputs that have a reading. Raises `DataError`."""
         u = _values("inputs", inputs, self._inputs, True)
         y = _values("outputs", outputs, self._outputs, False)
-        innovations, alarm, scatter, notices, lost = self._native.update(float(t), u, y)
+        innovations, alarm, scatter, notices, lost = self._native.update(_value("time", t), u, y)
         names = self._outputs
         pairs = [(name, pair or (np.nan, np.nan)) for name, pair in zip(names, innovations, strict=False)]
         return RowResult(
@@ -71,7 +71,7 @@ class Monitor:
             "half_width": [np.nan if e[4] is None else e[4] for e in all],
             "unit": [e[1] for e in all],
         }
-        result: pd.DataFrame = table(columns, [e[0] for e in all])
+        result: pd.DataFrame = table(columns, [e[0] for e in all], "parameter")
         return result
 
     @property
@@ -98,13 +98,22 @@ class Monitor:
 
 
 def _values(role: str, given: Mapping[str, float], names: list[str], all_needed: bool) -> list[float]:
+    if not isinstance(given, Mapping):
+        raise DataError(f"{role} are {given!r}: give values by name, {{{', '.join(f'{name!r}: ...' for name in names)}}}")
     for name in given:
         if name not in names:
             raise DataError(f'"{name}" is none of the {role} of the model: it has {", ".join(names) or "none"}')
     lacking = [name for name in names if name not in given]
     if lacking and all_needed:
         raise DataError(f"{role}: there is no value of {', '.join(lacking)}: every input is needed")
-    return [float(given.get(name, np.nan)) for name in names]
+    return [_value(f'"{name}"', given.get(name, np.nan)) for name in names]
+
+
+def _value(name: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise DataError(f"{name} is {value!r}: give a number, float('nan') where there is no reading") from None
 
 
 def _monitor_of(content: bytes) -> Monitor:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _ctid
-from ._ctid import ModelError
+from ._arguments import LARGEST_SEED, number, whole
 from ._design import Design
 from ._diagnosis import Diagnosis
 from ._fit import Fit
@@ -18,9 +18,10 @@ from ._frames import (
     Data,
     Records,
     band_table,
+    columns_in,
     table,
-    to_frame,
     to_frames,
+    to_one_frame,
 )
 from ._model import Model
 from ._options import SEED, Effort, Progress, phases
@@ -89,11 +90,10 @@ class TankFit(Fit):
     def simulate(self, data: Data, interval: float | None = 0.95, *, first: int = 5) -> pd.DataFrame:
         """The fitted plant on the inputs of another record; see `Fit.simulate`."""
         model = TankModel(self._parts)
-        names = [str(name) for name in data]
-        present = [c for c in model.outputs if any(n == c or n.split(" [")[0] == c for n in names)]
-        frame = to_frame(data, "test", model.inputs + present)
-        found = self._native.simulate(frame, first, 0.95 if interval is None else interval)
-        return band_table(found["outputs"].items(), data, interval)
+        wanted = model.inputs + columns_in(data, model.outputs)
+        frame = to_one_frame(data, "test", wanted)
+        found = self._native.simulate(frame, whole("first", first, 1), 0.95 if interval is None else number("interval", interval))
+        return band_table(found["outputs"].items(), data, interval, wanted)
 
     def diagnose(
         self,
@@ -107,11 +107,14 @@ class TankFit(Fit):
     ) -> Diagnosis:
         """Searches the catalogue for what the plant is missing, as `ctid diagnose` does; see `Fit.diagnose`."""
         frames = to_frames(test, "test", self._wanted) if test is not None else []
-        if max_effects is not None and max_effects < 1:
-            raise ModelError("max_effects is a whole number above zero")
-        with phases(progress) as on_phase:
+        with phases(progress, _ctid.time_limit(effort, time_limit)) as on_phase:
             found = self._tank.diagnose(
-                frames, effort=effort, time_limit=time_limit, max_effects=max_effects, seed=seed, progress=on_phase
+                frames,
+                effort=effort,
+                time_limit=time_limit,
+                max_effects=None if max_effects is None else whole("max_effects", max_effects, 1),
+                seed=whole("seed", seed, 0, LARGEST_SEED),
+                progress=on_phase,
             )
         kept = (self._tank.to_bytes(), self._tank.units)
         return TankDiagnosis(found.json(), found.sentences, found.html(), (found.series, found.output_units), self._parts, kept)
@@ -220,8 +223,8 @@ class TankDiagnosis(Diagnosis):
             self._title,
             TankModel(self._parts).inputs[0],
             between,
-            ranges or {},
-            slews or {},
+            ranges,
+            slews,
             inputs or [],
             duration=duration,
             effort=effort,

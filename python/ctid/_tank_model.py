@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from . import _ctid
+from ._arguments import by_name, numbers, pairs
 from ._ctid import DataError, ModelError
 from ._fit import Fit
 from ._frames import Records, as_list, index_of, row_count, series, to_frames
 from ._linear import StateSpace, _guess
 from ._model import Model
 from ._monitor import Monitor
-from ._options import NOISE_ORDER, SEED, STARTS, Hold, Progress, phases
+from ._options import NOISE_ORDER, PRIOR, SEED, STARTS, Hold, Progress, phases
 from ._tank_plant import linearized, monitored
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ Plant = Literal["single-tank", "single-tank-linear", "cascaded-tanks", "cascaded
 Known = float | str | Sequence[str]
 
 
-def _toml(value: object) -> str:
-    """A value as a model file writes it."""
+def _toml(value: object, name: str = "") -> str:
+    """A value as a model file writes it; `name` in messages."""
     if isinstance(value, str):
         return json.dumps(value)
     if isinstance(value, (list, tuple)):
@@ -39,7 +40,7 @@ def _toml(value: object) -> str:
         return str(int(value))
     if isinstance(value, (float, np.floating)):
         return repr(float(value))
-    raise ModelError(f"{value!r} is neither a number nor a name")
+    raise ModelError(f"{name} is {value!r}: give a number or a name, or leave it out")
 
 
 class TankModel(Model):
@@ -66,7 +67,7 @@ class TankModel(Model):
         for name in ("columns", "known", "start", "prior"):
             if parts[name]:
                 lines.append(f"[{name}]")
-                lines += [f"{_toml(str(key))} = {_toml(value)}" for key, value in parts[name].items()]
+                lines += [f"{_toml(str(key))} = {_toml(value, key)}" for key, value in parts[name].items()]
         for effect, place in parts["places"].items():
             lines += [f"[effect.{effect}]", f"where = {_toml(place)}"]
         return "\n".join(lines) + "\n"
@@ -141,8 +142,8 @@ class TankModel(Model):
         parts = {
             **self._parts,
             "columns": {"input": u if len(u) > 1 else u[0], "output": y if len(y) > 1 else y[0]},
-            "known": {**self._parts["known"], **(known or {})},
-            "prior": {**self._parts["prior"], **{n: [float(v), float(e)] for n, (v, e) in (priors or {}).items()}},
+            "known": {**self._parts["known"], **by_name("known", known)},
+            "prior": {**self._parts["prior"], **_priors(priors)},
             "hold": self._parts["hold"] if hold is None else hold,
         }
         from ._tank import TankFit
@@ -151,7 +152,7 @@ class TankModel(Model):
         frames = to_frames(records, "data", [*u, *y])
         with phases(progress) as on_phase:
             fitted = model._native.fit(frames, progress=on_phase)
-        return TankFit(fitted, [index_of(record, row_count(record)) for record in records], parts)
+        return TankFit(fitted, [index_of(record, row_count(record), [*u, *y]) for record in records], parts)
 
     def to_modelica(self) -> str:
         """The plant as the text of a model in Modelica, with the fitted values where it comes from a fit, otherwise those of `start`.
@@ -191,6 +192,10 @@ class TankModel(Model):
         return TankModel, (self._parts, self._values, self._units)
 
 
+def _priors(given: Mapping[str, tuple[float, float]] | None) -> dict[str, list[float]]:
+    return {name: list(prior) for name, prior in pairs("priors", given, PRIOR).items()}
+
+
 def tank(
     plant: str,
     known: Mapping[str, Known] | None = None,
@@ -202,7 +207,8 @@ def tank(
     hold: Hold | None = None,
 ) -> TankModel:
     """See `Model.tank`."""
-    measured = (known or {}).get("measured")
+    side = by_name("known", known)
+    measured = side.get("measured")
     # Of several levels the columns have the levels' names, until a fit names others.
     columns: dict[str, Any] = {}
     if isinstance(measured, (list, tuple)) and len(measured) > 1:
@@ -210,11 +216,11 @@ def tank(
     parts: dict[str, Any] = {
         "plant": plant,
         "effects": list(effects),
-        "places": dict(where or {}),
+        "places": by_name("where", where),
         "columns": columns,
-        "known": {k: list(v) if isinstance(v, tuple) else v for k, v in (known or {}).items()},
-        "start": {k: float(v) for k, v in (start or {}).items()},
-        "prior": {n: [float(v), float(e)] for n, (v, e) in (priors or {}).items()},
+        "known": {k: list(v) if isinstance(v, tuple) else v for k, v in side.items()},
+        "start": numbers("start", start),
+        "prior": _priors(priors),
         "hold": hold,
     }
     return TankModel(parts)

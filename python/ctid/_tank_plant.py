@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import _ctid
+from ._arguments import LARGEST_SEED, number, numbers, pair, pairs, whole
 from ._ctid import ModelError
-from ._design import Design
+from ._design import BETWEEN, RANGE, Design
 from ._frames import table
 from ._linear import StateSpace, state_space
 from ._monitor import Monitor
@@ -20,8 +21,7 @@ if TYPE_CHECKING:
 
 def linearized(tank: _ctid.Tank, values: Mapping[str, float], at: Mapping[str, float] | None) -> StateSpace:
     """The matrices of a plant with these values of its parameters."""
-    point = {str(name): float(value) for name, value in (at or {}).items()}
-    return state_space(tank.linearize(dict(values), point))
+    return state_space(tank.linearize(dict(values), numbers("at", at)))
 
 
 def monitored(
@@ -30,7 +30,7 @@ def monitored(
     """A monitor that runs the model beside the running plant; `units`: of the command and of the readings."""
     if time_unit != 1.0:
         raise ModelError(f"{tank.name}: the time of a plant is in s, leave time_unit out")
-    return Monitor(tank.monitor(units, float(false_alarm_every), int(learn)))
+    return Monitor(tank.monitor(units, number("false_alarm_every", false_alarm_every), whole("learn", learn, 1)))
 
 
 def _of_the_only(what: str, given: Mapping[str, Any], name: str, plant: str) -> Any:
@@ -46,8 +46,8 @@ def designed(
     plant: str,
     applied: str,
     between: tuple[str, str],
-    ranges: Mapping[str, tuple[float, float]],
-    slews: Mapping[str, float],
+    ranges: Mapping[str, tuple[float, float]] | None,
+    slews: Mapping[str, float] | None,
     inputs: Sequence[str],
     *,
     duration: float | None,
@@ -57,19 +57,19 @@ def designed(
     progress: Progress,
 ) -> TankDesign:
     """The experiment that distinguishes two effects; `content`: plant and records, in the form in which a fit is pickled."""
-    first, second = between
+    first, second = pair("between", between, BETWEEN)
     for name in inputs:
         _of_the_only("inputs", {name: None}, applied, plant)
-    found = _of_the_only("ranges", ranges, applied, plant)
-    slew = _of_the_only("slews", slews, applied, plant)
-    with phases(progress) as on_phase:
+    found = _of_the_only("ranges", pairs("ranges", ranges, RANGE), applied, plant)
+    slew = _of_the_only("slews", numbers("slews", slews), applied, plant)
+    with phases(progress, _ctid.time_limit(effort, time_limit)) as on_phase:
         text = _ctid.tank_design(
             content,
             (str(first), str(second)),
-            range=None if found is None else (float(found[0]), float(found[1])),
-            slew=None if slew is None else float(slew),
+            range=found,
+            slew=slew,
             duration=duration,
-            seed=seed,
+            seed=whole("seed", seed, 0, LARGEST_SEED),
             effort=effort,
             time_limit=time_limit,
             progress=on_phase,

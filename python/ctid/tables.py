@@ -6,8 +6,18 @@ import json
 from typing import Any
 
 from . import _ctid
+from ._arguments import LARGEST_SEED, whole
 
-__all__ = ["udink"]
+__all__ = ["baysse", "udink"]
+
+
+def baysse(runs: int = 100, seed: int = 1) -> dict[str, Any]:
+    """The tables of Baysse's, Carrillo's and Habbadi's output error in closed loop, as `ctid tables baysse --json` writes them.
+
+    `runs`: noises, 10 or more; `seed`: what they are drawn from. Raises `ctid.ModelError`.
+    """
+    result: dict[str, Any] = json.loads(_ctid.baysse_tables(whole("runs", runs, 1), whole("seed", seed, 0, LARGEST_SEED)))
+    return result
 
 
 def udink(runs: int = 200, seed: int = 1) -> dict[str, Any]:
@@ -15,5 +25,5 @@ def udink(runs: int = 200, seed: int = 1) -> dict[str, Any]:
 
     `runs`: noises, 20 or more; `seed`: what they are drawn from. Raises `ctid.ModelError`.
     """
-    result: dict[str, Any] = json.loads(_ctid.udink_tables(runs, seed))
+    result: dict[str, Any] = json.loads(_ctid.udink_tables(whole("runs", runs, 1), whole("seed", seed, 0, LARGEST_SEED)))
     return result

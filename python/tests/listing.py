@@ -42,7 +42,7 @@ def listing(models: Path, folder: Path) -> dict[str, object]:
     oe = ctid.StabilizedOe((1, 0), [10.0, 1.0], forgetting=0.002, bandwidth=0.1)
     oe.update(1.0, 0.5, 1.0)
     fcloe = ctid.Fcloe(order=(1, 0)).fit(df["y"].to_numpy(), 5.0, u=df["u"].to_numpy())
-    published = ctid.tables.udink(runs=20)
+    published = (ctid.tables.udink(runs=20), ctid.tables.baysse(runs=10))
     return {
         "numbers": numbers, "band": band, "score": score, "failures": failures, "tables": tables, "better": better, "found": found, "text": text,
         "linear": linear, "plan": plan, "step": step, "innovation": innovation, "trajectory": trajectory, "innovations": innovations,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -135,12 +138,143 @@ def test_models():
         ctid.Model.from_text("")
     with pytest.raises(FileNotFoundError):
         ctid.Model.from_file("there is no such file.mo")
-    with pytest.raises(ctid.Error):
+    with pytest.raises(ctid.ModelError, match="there is no such file.toml"):
         ctid.Model.from_file("there is no such file.toml")
     with pytest.raises(ctid.ModelError):
         ctid.Model.tank("no-tank")
     with pytest.raises(ctid.ModelError):
         ctid.Model.tank("single-tank", known={"area": "wide"})
+
+
+def test_a_model_file_without_its_text(tmp_path):
+    (tmp_path / "block.toml").write_text('model = "gone.mo"\n', encoding="utf-8")
+    with pytest.raises(ctid.ModelError, match="gone.mo"):
+        ctid.Model.from_file(tmp_path / "block.toml")
+
+
+def says(error: type[Exception], call: Callable[[], object], *words: str) -> None:
+    with pytest.raises(error) as caught:
+        call()
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message
+
+
+def test_arguments_are_named(model, block):
+    def fit(**options: object) -> Callable[[], object]:
+        return lambda: model.fit(block, **options)
+
+    for options, words in [
+        ({"priors": {"k": 0.1}}, ['priors["k"]', "0.1", "standard error"]),
+        ({"priors": {"k": (0.1, None)}}, ['priors["k"]', "None", "number"]),
+        ({"priors": 3}, ["priors", "by name"]),
+        ({"known": {"C": None}}, ['known["C"]', "None", "number"]),
+        ({"known": {"C": "52 J"}}, ['known["C"]', "'52 J'"]),
+        ({"known": ["C"]}, ["known", "by name"]),
+        ({"starts": -1}, ["starts is -1", "from 1 to"]),
+        ({"starts": 0}, ["starts is 0", "from 1 to"]),
+        ({"starts": 2.5}, ["starts is 2.5", "whole number"]),
+        ({"seed": -1}, ["seed is -1", "from 0 to"]),
+        ({"noise_order": -1}, ["noise_order is -1", "from 0 to 20"]),
+        ({"noise_order": 99}, ["noise_order is 99", "from 0 to 20"]),
+    ]:
+        says(ctid.ModelError, fit(**options), *words)
+    # The limits themselves are allowed, and what is said by other types of numbers.
+    plain = model.fit(block, known={"C": 52.0}, starts=1, noise_order=0)
+    again = model.fit(block, known=pd.Series({"C": 52}), starts=np.int64(1), noise_order=np.uint8(0))
+    assert again.params.equals(plain.params)
+    model.fit(block, known={"C": 52.0}, starts=1, noise_order=20, seed=2**64 - 1)
+
+
+def test_one_record_is_simulated(model, block, tour):
+    tank = ctid.Model.tank("single-tank", known={"area": 154.0}).fit(tour, inputs=["u"], outputs=["y"])
+    for fit, record in [(model.fit(block, known={"C": 52.0}), block), (tank, tour)]:
+        says(ctid.DataError, lambda: fit.simulate([record]), "test", "one record", "list")
+        says(ctid.DataError, lambda: fit.simulate(None), "test", "one record")
+        says(ctid.DataError, lambda: fit.simulate(3), "test", "int is no record")
+        says(ctid.ModelError, lambda: fit.simulate(record, interval="wide"), "interval", "'wide'")
+        says(ctid.ModelError, lambda: fit.simulate(record, first=-1), "first is -1")
+
+
+def test_arguments_of_a_search(model, block, tour):
+    tank = ctid.Model.tank("single-tank", known={"area": 154.0}).fit(tour, inputs=["u"], outputs=["y"])
+    for fit in (model.fit(block, known={"C": 52.0}), tank):
+        for option, value in [("max_effects", 0), ("max_effects", -1), ("max_effects", 1.5), ("seed", -1)]:
+            says(ctid.ModelError, lambda: fit.diagnose(progress=False, **{option: value}), f"{option} is {value}")
+        d = fit.diagnose(effort="quick", max_effects=1, progress=False)
+        for between in ("lag(u)", "ab", ("lag(u)",), ("a", "b", "c"), None):
+            says(ctid.ModelError, lambda: d.design(between, progress=False), "between", "pair", repr(between))
+        for options, words in [
+            ({"ranges": {"u": 3.0}}, ['ranges["u"]', "smallest"]),
+            ({"ranges": {"u": (0.0, None)}}, ['ranges["u"]', "None"]),
+            ({"ranges": 3.0}, ["ranges", "by name"]),
+            ({"slews": {"u": "slow"}}, ['slews["u"]', "'slow'"]),
+            ({"seed": -1}, ["seed is -1"]),
+        ]:
+            says(ctid.ModelError, lambda: d.design(("const_leak", "overflow"), progress=False, **options), *words)
+
+
+def test_arguments_of_a_plant():
+    for options, words in [
+        ({"known": {"area": None}}, ["area", "None"]),
+        ({"known": 154.0}, ["known", "by name"]),
+        ({"priors": {"alpha": 12.0}}, ['priors["alpha"]', "standard error"]),
+        ({"start": {"alpha": None}}, ['start["alpha"]', "None"]),
+    ]:
+        says(ctid.ModelError, lambda: ctid.Model.tank("single-tank", **options), *words)
+
+
+def test_rows_of_a_monitor(model):
+    mon = model.monitor()
+    u, y = {"u": 1.0, "Ta": 20.0}, {"y": 20.0}
+    for time, inputs, outputs, words in [
+        (0.0, {**u, "Ta": float("nan")}, y, ['"Ta"', "NaN", "not used"]),
+        (0.0, {**u, "u": float("inf")}, y, ['"u"', "inf"]),
+        (0.0, {**u, "u": 1e200}, y, ['"u"', "too large"]),
+        (float("nan"), u, y, ["time", "NaN"]),
+        (None, u, y, ["time", "None"]),
+        (0.0, {**u, "u": None}, y, ['"u"', "None"]),
+        (0.0, 1.0, y, ["inputs", "by name", "'Ta'"]),
+        (0.0, {"u": 1.0}, y, ["Ta", "every input"]),
+    ]:
+        says(ctid.DataError, lambda: mon.update(time, inputs, outputs), *words)
+    assert mon.rows == 0
+    for options, words in [({"learn": -1}, ["learn is -1"]), ({"learn": 200.5}, ["learn is 200.5"]), ({"false_alarm_every": None}, ["false_alarm_every"])]:
+        says(ctid.ModelError, lambda: model.monitor(**options), *words)
+
+
+def test_arguments_of_a_linear_model(tour):
+    for order in (3, (1,), (1, 2, 3), (0, 0), (1, 2), (-1, 0), (1.5, 0), "21", None):
+        says(ctid.ModelError, lambda: ctid.Fcloe(order=order), "order is", repr(order))
+        says(ctid.ModelError, lambda: ctid.identify(tour, "srivc", order), "order is", repr(order))
+    says(ctid.ModelError, lambda: ctid.identify(tour, "fcloe", controller=3.0), "controller", "R and S")
+    says(ctid.ModelError, lambda: ctid.identify(tour, "fcloe", limits=3.0), "limits", "pair")
+    fcloe, y = ctid.Fcloe(controller=([1.0], ["s"])), np.ones(50)  # type: ignore[list-item]
+    says(ctid.DataError, lambda: fcloe.fit(y, 1.0, r=y), "controller")
+    says(ctid.DataError, lambda: ctid.Fcloe().fit(y, 1.0, u=y, theta0=["a", 1.0]), "theta0")
+
+
+def test_runs_of_a_table():
+    for study in (ctid.tables.udink, ctid.tables.baysse):
+        for runs in (-1, 3, 20.5):
+            says(ctid.ModelError, lambda: study(runs=runs), "runs")
+        says(ctid.ModelError, lambda: study(seed=-1), "seed is -1")
+
+
+def test_an_index_that_counts_rows_is_told(model, block):
+    counted = block.reset_index(drop=True)
+    with pytest.warns(UserWarning, match="counts rows, and is read as seconds") as told:
+        fit = model.fit(counted, known={"C": 52.0})
+    assert len(told) == 1 and told[0].filename == __file__
+    with pytest.warns(UserWarning, match="test: the index counts rows") as told:
+        fit.simulate(counted)
+    assert told[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        named = model.fit(counted.rename_axis(index="t [s]"), known={"C": 52.0})
+        model.fit(block, known={"C": 52.0})
+    assert named.params.equals(fit.params)
 
 
 def test_parameters(model, block):

@@ -92,7 +92,8 @@ def test_what_else_is_there(found):
     assert found["trajectory"].shape == (10, 2) and found["innovations"].shape == (10,)
     assert found["identified"].fit_percent > 50.0
     assert found["fcloe"]["successful"]
-    assert found["published"]["exact"]["of"] == 72
+    udink, baysse = found["published"]
+    assert udink["exact"]["of"] == 72 and baysse["of"] == 32
     assert found["step"].alarm is None
 
 

@@ -5,11 +5,18 @@ from __future__ import annotations
 import json
 import subprocess
 from pathlib import Path
+from typing import get_args
 
+import numpy as np
 import pandas as pd
+import pytest
 from conftest import MODELS, RECORDS, read_csv
 
 import ctid
+from ctid._linear import Method
+
+#: All methods of `identify`.
+METHODS = get_args(Method)
 
 #: What depends on the clock, and the mark of a file.
 OTHER = ("seconds", "written_by", "effort")
@@ -87,11 +94,47 @@ def test_a_tank(program, tmp_path, tour, tour_test):
     assert found == results(program, tmp_path, "diagnose", *data, "--test", RECORDS / "tour-test.csv")
 
 
-def test_a_linear_model(program, tmp_path, tour):
-    for method in ("srivc", "fcloe", "stabilized-oe"):
-        found = own(ctid.identify(tour, method, (1, 0)).to_dict())
-        record = found.pop("record")
-        by_program = results(program, tmp_path, "identify", RECORDS / "tour.csv", "--method", method, "--order", "1,0")
-        assert record == "data" and by_program.pop("record") == "tour.csv"
-        # The record's name is all that differs.
-        assert json.loads(json.dumps(found).replace('"data"', '"tour.csv"')) == by_program
+def test_an_experiment(program, tmp_path):
+    toml, csv = MODELS / "heated-block.toml", MODELS / "heated-block.csv"
+    d = ctid.Model.from_file(toml).fit(read(csv, "t [s]")).diagnose(effort="quick", progress=False)
+    between = ("lag(u)", "delay(u)")
+    plan = d.design(between, {"u": (0.0, 100.0)}, slews={"u": 20.0}, duration=600.0, progress=False)
+    options = ["--between", *between, "--input", "u=0..100", "--slew", "20", "--duration", "600"]
+    by_program = results(program, tmp_path, "design", csv, "--model", toml, *options)
+    assert own(plan.to_dict()) == by_program
+    best = by_program["experiment"]
+    assert plan.experiment.index.tolist() == best["time"] and len(best["time"]) > 100
+    assert plan.experiment["u"].tolist() == best["inputs"][0]["values"]
+
+
+def test_a_monitor(program, tmp_path):
+    toml = MODELS / "heated-block.toml"
+    rng, temperature, rows = np.random.default_rng(1), 20.0, []
+    for k in range(2600):
+        u = 80.0 if k // 60 % 2 else 20.0
+        rows.append((5.0 * k, u, 20.0, float(temperature + 0.1 * rng.standard_normal())))
+        loss = 0.17 if k < 2000 else 0.3
+        temperature += 5.0 / 52.0 * (0.12 * u - loss * (temperature - 20.0))
+    mon = ctid.Model.from_file(toml).monitor(learn=200)
+    steps = [mon.update(t, {"u": u, "Ta": room}, {"y": y}) for t, u, room, y in rows]
+    alarms = [step.alarm for step in steps if step.alarm is not None]
+    text = "t [s],heater [%],room [degC],block [degC]\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows)
+    command = [program, "monitor", "--model", str(toml), "--learn", "200"]
+    ended = subprocess.run(command, input=text, text=True, check=True, capture_output=True, cwd=tmp_path)
+    lines = [json.loads(line) for line in ended.stdout.splitlines()]
+    by_program = [line for line in lines if "verdict" in line]
+    assert alarms and [{k: v for k, v in line.items() if k in alarms[0]} for line in by_program] == alarms
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_linear_model(program, tmp_path, tour, method):
+    found = own(ctid.identify(tour, method, (1, 0)).to_dict())
+    record = found.pop("record")
+    by_program = results(program, tmp_path, "identify", RECORDS / "tour.csv", "--method", method, "--order", "1,0")
+    assert record == "data" and by_program.pop("record") == "tour.csv"
+    # The record's name is all that differs.
+    assert json.loads(json.dumps(found).replace('"data"', '"tour.csv"')) == by_program
+
+
+def test_a_table(program, tmp_path):
+    assert own(ctid.tables.baysse(runs=10, seed=2)) == results(program, tmp_path, "tables", "baysse", "--runs", "10", "--seed", "2")

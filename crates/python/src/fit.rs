@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
-pub use self::simulation::{check_simulation, limit, simulation, units_of};
+pub use self::simulation::{check_simulation, limit, simulation, time_limit, units_of};
 use crate::diagnosis::Diagnosis;
 use crate::frame::{Content, Frame};
 use crate::model::{Inner, Kept, Model, contents, records};

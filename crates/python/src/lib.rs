@@ -3,6 +3,7 @@
 //! | what | where |
 //! |---|---|
 //! | exceptions | `error.rs` |
+//! | arguments that are arrays of numbers | `arrays.rs` |
 //! | long work: the interpreter's lock is released, Ctrl-C is heard | `work.rs` |
 //! | frames as the program reads its records | `frame.rs` |
 //! | a user's own model, its fit, its diagnosis | `model.rs`, `fit.rs`, `diagnosis.rs` |
@@ -16,6 +17,7 @@
 //!
 //! What users see is in `python/ctid`: it makes frames of these arrays and says what types there are.
 
+mod arrays;
 mod bytes;
 mod diagnosis;
 mod error;
@@ -44,7 +46,7 @@ mod _ctid {
     #[pymodule_export]
     use crate::error::{DataError, Error, ModelError};
     #[pymodule_export]
-    use crate::fit::Fit;
+    use crate::fit::{Fit, time_limit};
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
@@ -58,7 +60,7 @@ mod _ctid {
     #[pymodule_export]
     use crate::rls::ContinuousRls;
     #[pymodule_export]
-    use crate::tables::udink_tables;
+    use crate::tables::{baysse_tables, udink_tables};
     #[pymodule_export]
     use crate::tank::TankFit;
     #[pymodule_export]

@@ -121,7 +121,8 @@ impl Model {
     /// Reads a model file of `ctid`, which names the text.
     #[staticmethod]
     fn from_model_file(path: &str) -> PyResult<Self> {
-        let file = AnyModelFile::read(Path::new(path)).map_err(|error| error::of(&error))?;
+        // Whatever is wrong, a text that is not there say, is wrong with the model.
+        let file = AnyModelFile::read(Path::new(path)).map_err(error::of_model)?;
         let AnyModelFile::Own(file) = file else {
             return Err(error::of_model(format!(
                 "{path}: it names a plant: use Model.tank"

@@ -7,7 +7,7 @@ use ct_model::{Model as Compiled, ModelSpec};
 use ctid::model_file::ModelFile;
 use ctid::own_model::OwnSettings;
 use ctid::sentences::Told;
-use monitor::{CandidateModel, Notice, OwnModel, Row, Settings, State, Units};
+use monitor::{CandidateModel, NotUsed, Notice, OwnModel, Row, Settings, State, Units};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
@@ -183,6 +183,23 @@ impl Monitor {
         Self::of(of, rows_between_false_alarms, learning_rows)
     }
 
+    /// The error of a row that is not used, which names the signal.
+    fn refused(&self, refused: &NotUsed) -> PyErr {
+        let (inputs, outputs) = match self.watched.signals() {
+            Ok(signals) => signals,
+            Err(error) => return error,
+        };
+        let name = match refused.column() {
+            "input" => inputs.get(refused.at()),
+            "output" => outputs.get(refused.at()),
+            _ => None,
+        };
+        let name = name.map_or_else(|| "time".to_string(), |name| format!("\"{name}\""));
+        error::of_data(format!(
+            "{name}: {refused}; the row is not used: correct it, or leave it out"
+        ))
+    }
+
     fn monitor(&self) -> MutexGuard<'_, monitor::Monitor> {
         self.monitor.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -274,7 +291,7 @@ impl Monitor {
             let step = monitor.update(&row);
             (step, monitor.domain(), monitor.axis().clone())
         });
-        let step = step.map_err(error::of_data)?;
+        let step = step.map_err(|refused| self.refused(&refused))?;
         let innovations = step.innovations.iter();
         let innovations = innovations.map(|i| i.map(|i| (i.residual, i.standardised)));
         let alarm = step

@@ -4,13 +4,13 @@ use ct_lti::Hold;
 use ct_rls::{ContinuousRls, RecursiveEstimator, Weights};
 use fcloe::{Controller, LoopRecord, Offsets, Orders, Problem, Settings, start};
 use nalgebra::{SMatrix, SVector};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 use stabilized_oe::{BlockDiagonal, IoSample, StabilizedOe as Estimator, StateVariableFilters};
 
-use crate::{bytes, error};
+use crate::{arrays, bytes, error};
 
 /// An estimator of the crate with orders that are known at compile time.
 trait Oe: Send + Sync {
@@ -133,7 +133,7 @@ macro_rules! of_kind {
 
 /// Recursive output error in continuous time, `A(s) y = B(s) u`, with a filter of its error that is adapted beside it.
 ///
-/// `order`: `(n, m)`, n from 1 to 3 and m below n. `theta0`: `a_1..a_n, b_0..b_m`, and an offset where there is one; A has to be stable.
+/// `order`: `(n, m)`, n from 1 to 3 and m below n. `theta0`: `a1..an, b0..bm`, and an offset where there is one; A has to be stable.
 /// `forgetting`: rate in 1/s. `bandwidth`: of the filters that make the derivatives, in 1/s, 2 to 10 times that of the plant. `P0`,
 /// `P0_filter`: how little is known, on the diagonals. `filter0`: start of the filter's coefficients, without it those of A.
 ///
@@ -153,32 +153,36 @@ impl StabilizedOe {
     #[allow(clippy::too_many_arguments, reason = "Python passes them by name")]
     #[allow(non_snake_case, reason = "it is the name of the matrix")]
     fn new(
-        order: (usize, usize),
-        theta0: Vec<f64>,
+        order: &Bound<'_, PyAny>,
+        theta0: &Bound<'_, PyAny>,
         forgetting: f64,
         bandwidth: f64,
         P0: f64,
         P0_filter: f64,
-        filter0: Option<Vec<f64>>,
+        filter0: Option<&Bound<'_, PyAny>>,
         hold: &str,
         offset: bool,
     ) -> PyResult<Self> {
-        let (n, m) = order;
-        let own = n + m + 1;
-        let count = own + usize::from(offset);
-        if !(1..=3).contains(&n) || m >= n {
-            return Err(error::of_model(format!(
-                "an order is (n, m) with n from 1 to 3 and m below n; it is ({n}, {m})"
-            )));
-        }
+        let of = |order: &Bound<'_, PyAny>| order.extract::<(usize, usize)>().ok();
+        let fits = |(n, m): &(usize, usize)| (1..=3).contains(n) && m < n;
+        let (n, m) = of(order).filter(fits).ok_or_else(|| {
+            error::of_model(format!(
+                "an order is (n, m) with n from 1 to 3 and m below n; it is {order}"
+            ))
+        })?;
+        let theta0 = arrays::list("theta0", theta0)?;
+        let count = n + m + 1 + usize::from(offset);
         if theta0.len() != count {
             return Err(error::of_model(format!(
-                "theta0 has {} numbers, and the order ({n}, {m}) has {count} parameters: a_1..a_n, b_0..b_m{}",
+                "theta0 has {} numbers, and the order ({n}, {m}) has {count} parameters: a1..an, b0..bm{}",
                 theta0.len(),
                 if offset { ", offset" } else { "" }
             )));
         }
-        let filter = filter0.unwrap_or_else(|| theta0[..n].to_vec());
+        let filter = match filter0 {
+            Some(filter) => arrays::list("filter0", filter)?,
+            None => theta0[..n].to_vec(),
+        };
         if filter.len() != n {
             return Err(error::of_model(format!(
                 "filter0 has {} numbers: it needs {n}",
@@ -215,11 +219,11 @@ impl StabilizedOe {
     fn run<'py>(
         &mut self,
         py: Python<'py>,
-        u: PyReadonlyArray1<'py, f64>,
-        y: PyReadonlyArray1<'py, f64>,
+        u: &Bound<'py, PyAny>,
+        y: &Bound<'py, PyAny>,
         dt: f64,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let (u, y) = (u.as_array().to_vec(), y.as_array().to_vec());
+        let (u, y) = (arrays::list("u", u)?, arrays::list("y", y)?);
         if u.len() != y.len() {
             return Err(error::of_data(format!(
                 "u has {} values and y {}: give one of each for every sample",
@@ -241,7 +245,7 @@ impl StabilizedOe {
         PyArray1::from_vec(py, all).reshape([rows, columns])
     }
 
-    /// `a_1..a_n, b_0..b_m`, and the offset.
+    /// `a1..an, b0..bm`, and the offset.
     #[getter]
     fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.oe.theta())

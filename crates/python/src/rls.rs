@@ -4,14 +4,13 @@ mod online;
 
 use ct_rls::{Outcome, Weights};
 use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray,
-    PyUntypedArrayMethods,
+    Ix1, Ix2, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 
 use self::online::{Online, Others, online, restored};
-use crate::error;
+use crate::{arrays, error};
 
 /// Recursive least squares in continuous time with forgetting, whose matrix stays positive definite.
 ///
@@ -64,46 +63,35 @@ impl ContinuousRls {
     #[pyo3(signature = (theta0, P0, forgetting, *, c=1.0, gamma=1.0))]
     #[allow(non_snake_case, reason = "it is the name of the matrix")]
     fn new(
-        theta0: PyReadonlyArray1<'_, f64>,
-        P0: PyReadonlyArray2<'_, f64>,
+        theta0: &Bound<'_, PyAny>,
+        P0: &Bound<'_, PyAny>,
         forgetting: f64,
         c: f64,
         gamma: f64,
     ) -> PyResult<Self> {
         let weights = Weights::new(c, gamma, forgetting).map_err(error::of_model)?;
-        Self::made(&theta0.as_array().to_vec(), &rows_of(&P0), weights)
+        let theta = arrays::list("theta0", theta0)?;
+        Self::made(
+            &theta,
+            &rows_of(&arrays::numbers::<Ix2>("P0", P0)?),
+            weights,
+        )
     }
 
     /// Takes in a sample: the regressor, the output, and the time in s over which they are held. Returns the innovation `y - theta' phi` before
     /// it. A sample that cannot be used, a NaN say, changes nothing; `outcome` says why.
     fn update(&mut self, phi: &Bound<'_, PyAny>, y: f64, dt: f64) -> PyResult<f64> {
-        let innovation = if let Ok(phi) = phi.cast::<PyArray1<f64>>() {
-            // A few numbers are copied faster than it is noted that they are read.
-            let Ok(phi) = phi.to_vec() else {
-                return Err(error::of_data(
-                    "phi is a part of an array with steps: give phi.copy()",
-                ));
-            };
-            if phi.len() != self.size {
-                return Err(self.wrong_size(phi.len()));
-            }
-            self.rls.update(&phi, y, dt)
-        } else {
-            let other =
-                || error::of_data("phi is a list of numbers, or an array of floats with one axis");
-            // Numpy makes a number of an array that holds one.
-            if phi
-                .cast::<PyUntypedArray>()
-                .is_ok_and(|phi| phi.ndim() != 1)
-            {
-                return Err(other());
-            }
-            let phi: Vec<f64> = phi.extract().map_err(|_| other())?;
-            if phi.len() != self.size {
-                return Err(self.wrong_size(phi.len()));
-            }
-            self.rls.update(&phi, y, dt)
+        // A few numbers are copied faster than it is noted that they are read.
+        let copied = phi.cast::<PyArray1<f64>>().ok();
+        let copied = copied.and_then(|phi| phi.to_vec().ok());
+        let phi = match copied {
+            Some(phi) => phi,
+            None => arrays::list("phi", phi)?,
         };
+        if phi.len() != self.size {
+            return Err(self.wrong_size(phi.len()));
+        }
+        let innovation = self.rls.update(&phi, y, dt);
         self.outcome = innovation.outcome;
         Ok(innovation.epsilon)
     }
@@ -114,23 +102,20 @@ impl ContinuousRls {
     fn run<'py>(
         &mut self,
         py: Python<'py>,
-        phi: PyReadonlyArray2<'py, f64>,
-        y: PyReadonlyArray1<'py, f64>,
+        phi: &Bound<'py, PyAny>,
+        y: &Bound<'py, PyAny>,
         dt: &Bound<'py, PyAny>,
         trajectory: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let phi = arrays::numbers::<Ix2>("phi", phi)?;
+        let y = arrays::numbers::<Ix1>("y", y)?;
         let rows = phi.as_array().nrows();
         if phi.as_array().ncols() != self.size {
             return Err(self.wrong_size(phi.as_array().ncols()));
         }
         let steps: Vec<f64> = match dt.extract::<f64>() {
             Ok(dt) => vec![dt],
-            Err(_) => {
-                let steps: PyReadonlyArray1<'_, f64> = dt.extract().map_err(|_| {
-                    error::of_data("dt is a number of seconds, or an array of them with one axis")
-                })?;
-                steps.as_array().to_vec()
-            }
+            Err(_) => arrays::list("dt", dt)?,
         };
         if y.as_array().len() != rows || (steps.len() != 1 && steps.len() != rows) {
             return Err(error::of_data(format!(

@@ -1,6 +1,6 @@
 //! Published tables, computed again.
 
-use paper_tables::udink;
+use paper_tables::{baysse, udink};
 use pyo3::prelude::*;
 
 use crate::work;
@@ -12,5 +12,12 @@ pub fn udink_tables(py: Python<'_>, runs: usize, seed: u64) -> PyResult<String> 
     let found = work::run(py, None, |_, _| {
         Ok(udink::study(&settings, runs, seed, &|_| {})?)
     })?;
+    crate::diagnosis::json(&found)
+}
+
+/// Output of `ctid tables baysse --json`, without the entry `written_by`.
+#[pyfunction]
+pub fn baysse_tables(py: Python<'_>, runs: usize, seed: u64) -> PyResult<String> {
+    let found = work::run(py, None, |_, _| Ok(baysse::study(runs, seed, &|_| {})?))?;
     crate::diagnosis::json(&found)
 }

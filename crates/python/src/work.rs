@@ -6,6 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use pyo3::prelude::*;
+use rayon::ThreadPoolBuilder;
 
 use crate::error;
 
@@ -30,6 +31,19 @@ impl<T> Phases<T> {
     }
 }
 
+/// Runs work in a pool of its own if the process has one thread for all parallel loops (`RAYON_NUM_THREADS=1`): calls from several Python threads
+/// would take turns in it.
+fn in_own_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    if rayon::current_num_threads() > 1 {
+        return work();
+    }
+    let pool = ThreadPoolBuilder::new().num_threads(1).stack_size(STACK);
+    match pool.build() {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }
+}
+
 /// Runs work that may take long. Ctrl-C sets a flag that the work receives: the work ends soon then, and a `KeyboardInterrupt` replaces its
 /// result. `progress`: called with every new phase.
 pub fn run<T: Send>(
@@ -45,7 +59,7 @@ pub fn run<T: Send>(
             let worker = thread::Builder::new().stack_size(STACK);
             let worker = worker.spawn_scoped(scope, move || {
                 let phases = Phases(sender);
-                let found = work(stop, &phases);
+                let found = in_own_pool(|| work(stop, &phases));
                 let _ = phases.0.send(Said::Done(found));
             });
             let worker = worker.map_err(|error| {

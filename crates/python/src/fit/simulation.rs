@@ -30,6 +30,12 @@ pub fn limit(effort: &str, seconds: Option<f64>) -> PyResult<Duration> {
     }
 }
 
+/// Time limit of a search in s.
+#[pyfunction]
+pub fn time_limit(effort: &str, seconds: Option<f64>) -> PyResult<f64> {
+    Ok(limit(effort, seconds)?.as_secs_f64())
+}
+
 /// Checks the options of a simulation: the probability of its band, and the number of first readings that the initial states are fitted to.
 pub fn check_simulation(level: f64, first: usize) -> PyResult<()> {
     if level > 0.0 && level < 1.0 && first > 0 {

@@ -81,17 +81,18 @@ const STOP_WORDS: [&str; 26] = [
     "of", "on", "or", "that", "the", "this", "to", "too", "very", "was", "with",
 ];
 
-/// Weight of a typed word, of a word of its family, and of two typed words side by side.
+/// Weight of a typed word, of a word of its family, and of a phrase.
 const TYPED: u32 = 4;
 const RELATED: u32 = 1;
 const PHRASE: u32 = 4;
 
-/// What a user typed: for each word the beginnings of words that match it, with their weights; and the pairs of neighbouring words.
+/// What a user typed: for each word the beginnings of words that match it, with their weights; and the phrases, which are pairs of
+/// neighbouring words, and all words together.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sought {
     said: String,
     words: Vec<Vec<(String, u32)>>,
-    pairs: Vec<String>,
+    phrases: Vec<String>,
 }
 
 impl Sought {
@@ -102,10 +103,11 @@ impl Sought {
         let is_stop = |word: &&str| STOP_WORDS.contains(word);
         let words = all.iter().filter(|word| !is_stop(word));
         let pairs = all.windows(2).filter(|pair| !pair.iter().all(is_stop));
+        let whole = (all.len() > 2 && !all.iter().all(is_stop)).then(|| all.join(" "));
         Self {
             said: said.to_string(),
             words: words.map(|word| stems(word)).collect(),
-            pairs: pairs.map(|pair| pair.join(" ")).collect(),
+            phrases: pairs.map(|pair| pair.join(" ")).chain(whole).collect(),
         }
     }
 
@@ -122,8 +124,8 @@ impl Sought {
                 let found = stems.iter().filter(|(stem, _)| begins(stem));
                 score += weight * found.map(|(_, counts)| counts).max().unwrap_or(&0);
             }
-            let pairs = self.pairs.iter().filter(|pair| begins(pair)).count();
-            score += weight * PHRASE * u32::try_from(pairs).unwrap_or(0);
+            let phrases = self.phrases.iter().filter(|phrase| begins(phrase)).count();
+            score += weight * PHRASE * u32::try_from(phrases).unwrap_or(0);
         }
         score
     }

@@ -1,22 +1,31 @@
 //! `ctid effects`: the catalogue of effects, and the description of one effect.
 
+use ct_signals::quoted;
 use plants::{CATALOGUE, Domain, EffectInfo, Known, ParameterInfo, Place, Placed, Plant};
 
 use crate::look::{Look, Side, table};
 use crate::model_file::{self, ModelFile};
 use crate::symptoms::{Sought, best};
-use crate::{Error, names, numbers, signature};
+use crate::{Error, generic, names, numbers, signature};
 
-/// The whole catalogue, by place.
+/// The whole catalogue, by place: the effects of tanks, then those at the ports of models of the user's own.
 #[must_use]
 pub fn list(look: Look) -> String {
-    listed(Domain::Hydraulic, |_| true, look)
+    let tanks = listed(Domain::Hydraulic, |_| true, look);
+    format!("{tanks}{}{}", generic::list(look), says_more(look))
 }
 
 /// The effects that may be added to a model, by place, in the words of its domain.
 #[must_use]
 pub fn list_for(model: &ModelFile, look: Look) -> String {
-    listed(model.domain(), |effect| offered(model, effect), look)
+    listed(model.domain(), |effect| offered(model, effect), look) + &says_more(look)
+}
+
+fn says_more(look: Look) -> String {
+    look.paragraph(
+        "",
+        "`ctid effects EFFECT` says more of one: its equation, its parameters, how to confirm it.",
+    )
 }
 
 fn offered(model: &ModelFile, effect: &'static EffectInfo) -> bool {
@@ -25,7 +34,8 @@ fn offered(model: &ModelFile, effect: &'static EffectInfo) -> bool {
         && model.effects.iter().all(|on| on.effect.id != effect.id)
 }
 
-/// The effects that match a description of a symptom, best first; with a model, those that may be added to it.
+/// The effects that match a description of a symptom, best first: with a model, those that may be added to it; without one, those of tanks,
+/// then those at the ports of models of the user's own.
 ///
 /// # Errors
 /// Where none does.
@@ -38,14 +48,18 @@ pub(crate) fn like(
     let all = CATALOGUE.iter().copied();
     let all = all.filter(|effect| model.is_none_or(|model| offered(model, effect)));
     let found = best(all, |effect| sought.score_of_plant(effect));
-    if found.is_empty() {
+    let at_ports = match model {
+        None => generic::like(sought, look),
+        Some(_) => String::new(),
+    };
+    if found.is_empty() && at_ports.is_empty() {
         return Err(sought.nothing());
     }
     let widest = found.iter().map(|effect| effect.id.len()).max();
     let rows = found
         .iter()
         .map(|effect| row(effect, domain, widest.unwrap_or(0), look));
-    Ok(rows.collect())
+    Ok(rows.collect::<String>() + &at_ports)
 }
 
 /// Describes one effect of the catalogue.
@@ -79,18 +93,51 @@ fn listed(domain: Domain, offered: impl Fn(&'static EffectInfo) -> bool, look: L
         }
         text.push('\n');
     }
-    text + &look.paragraph(
-        "",
-        "`ctid effects EFFECT` says more of one: its equation, its parameters, how to confirm it.",
-    )
+    text
 }
 
-/// Everything the catalogue knows of one effect.
+/// Everything the catalogue knows of an effect: of tanks, at the ports of models of the user's own, or both.
 ///
 /// # Errors
 /// Where there is none of that name.
 pub fn describe(id: &str, look: Look) -> Result<String, Error> {
-    let effect = names::effect(id)?;
+    let tanks = EffectInfo::find(id).map(|effect| of_tanks(effect, look));
+    let at_ports = generic::matching(id).into_iter();
+    let at_ports = at_ports.map(|effect| generic::description(effect, look));
+    let all: Vec<String> = tanks.into_iter().chain(at_ports).collect();
+    if all.is_empty() {
+        return Err(Error::UnknownEffect(names::unknown_everywhere(id)));
+    }
+    Ok(all.join("\n"))
+}
+
+/// Everything the catalogue knows of an effect of a plant, and whether it can act in this model.
+///
+/// # Errors
+/// Where plants have no effect of that name.
+pub(crate) fn describe_for(id: &str, model: &ModelFile, look: Look) -> Result<String, Error> {
+    let effect = match EffectInfo::find(id) {
+        None if !generic::matching(id).is_empty() => {
+            return Err(Error::UnknownEffect(format!(
+                "\"{}\" is for models of your own (model = \"x.mo\"): `ctid effects` without --model describes it, --model lists those of {}",
+                quoted(id),
+                model.plant.id()
+            )));
+        }
+        _ => names::effect(id)?,
+    };
+    let here = if model.effects.iter().any(|on| on.effect.id == effect.id) {
+        "it is in this model"
+    } else if offered(model, effect) {
+        "it can act in this model"
+    } else {
+        "it cannot act in this model"
+    };
+    let entry = format!("  {}", look.faint(format!("{:<14}", "here")));
+    Ok(of_tanks(effect, look) + &look.paragraph(&entry, here))
+}
+
+fn of_tanks(effect: &'static EffectInfo, look: Look) -> String {
     let entry = |name: &str, what: &str| {
         look.paragraph(&format!("  {}", look.faint(format!("{name:<14}"))), what)
     };
@@ -128,7 +175,7 @@ pub fn describe(id: &str, look: Look) -> Result<String, Error> {
         "add it",
         &format!("ctid add {} --model MODEL.toml", effect.id),
     );
-    Ok(text)
+    text
 }
 
 /// The signatures of all effects as a page of Markdown, for `docs/gallery.md`.
@@ -244,5 +291,43 @@ mod tests {
     fn a_slip_is_answered_with_the_name() {
         let error = describe("overfow", Look::plain()).unwrap_err().to_string();
         assert!(error.contains("did you mean overflow?"), "{error}");
+        for (slip, meant) in [
+            ("radiaton", "radiation"),
+            ("qantisation(y)", "quantisation"),
+        ] {
+            let error = describe(slip, Look::plain()).unwrap_err().to_string();
+            assert!(error.contains(&format!("did you mean {meant}?")), "{error}");
+        }
+    }
+
+    #[test]
+    fn an_effect_of_tanks_and_of_ports_is_described_as_both() {
+        let text = describe("overflow", Look::plain()).unwrap();
+        assert!(text.contains("ctid add overflow --model"), "{text}");
+        assert!(text.contains("overflow(h1,h2)"), "{text}");
+    }
+
+    #[test]
+    fn a_symptom_finds_effects_of_tanks_and_of_ports() {
+        let like = |words: &str| like(&Sought::of(words), None, Look::plain()).unwrap();
+        assert!(
+            like("radiation")
+                .trim_start()
+                .starts_with("radiation(T,Ta)")
+        );
+        let clog = like("clog");
+        let tank = clog.find("valve_drift").unwrap();
+        assert!(tank < clog.find("drift(p)").unwrap(), "{clog}");
+    }
+
+    #[test]
+    fn a_plant_has_its_own_effects_only() {
+        let text = "plant = \"single-tank\"\neffects = [\"overflow\"]\n";
+        let model = model_file::parse("m.toml", text).unwrap();
+        let of = |id: &str| describe_for(id, &model, Look::plain());
+        assert!(of("overflow").unwrap().contains("it is in this model"));
+        assert!(of("pump_lag").unwrap().contains("it can act in this model"));
+        let error = of("radiation").unwrap_err().to_string();
+        assert!(error.contains("for models of your own"), "{error}");
     }
 }

@@ -30,6 +30,7 @@ pub mod edit;
 pub mod effort;
 mod error;
 mod findings;
+mod generic;
 pub mod identify;
 pub mod input;
 mod interrupt;

@@ -3,7 +3,7 @@
 use ct_signals::quoted;
 use plants::{CATALOGUE, EffectInfo};
 
-use crate::Error;
+use crate::{Error, generic};
 
 /// `; did you mean X?` if a name of the list is similar, else empty.
 pub(crate) fn suggestion<'a>(written: &str, names: impl IntoIterator<Item = &'a str>) -> String {
@@ -31,6 +31,17 @@ pub(crate) fn unknown_effect(id: &str) -> String {
         "unknown effect \"{}\": `ctid effects` lists the catalogue{}",
         quoted(id),
         suggestion(id, CATALOGUE.iter().map(|effect| effect.id))
+    )
+}
+
+/// Message for a name that no effect has, neither of tanks nor at the ports of models.
+pub(crate) fn unknown_everywhere(written: &str) -> String {
+    let name = written.split('(').next().unwrap_or_default();
+    let tanks = CATALOGUE.iter().map(|effect| effect.id);
+    format!(
+        "unknown effect \"{}\": `ctid effects` lists the catalogue{}",
+        quoted(written),
+        suggestion(name, tanks.chain(generic::names()))
     )
 }
 

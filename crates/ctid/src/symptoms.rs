@@ -1,6 +1,6 @@
 //! `ctid effects --like WORD`: effects by a description of symptoms.
 
-use ct_model::effects::Candidate;
+use ct_model::effects::{Candidate, Effect, all_effects};
 use ct_signals::quoted;
 use plants::EffectInfo;
 
@@ -75,74 +75,91 @@ const FAMILIES: [&[&str]; 12] = [
     &["hot", "heat", "temperature", "steam"],
 ];
 
-/// Search terms: beginnings of words, and their weights.
+/// Words that say nothing of a symptom.
+const STOP_WORDS: [&str; 26] = [
+    "a", "an", "and", "are", "as", "at", "be", "by", "for", "from", "in", "is", "it", "its", "my",
+    "of", "on", "or", "that", "the", "this", "to", "too", "very", "was", "with",
+];
+
+/// Weight of a typed word, of a word of its family, and of a phrase.
+const TYPED: u32 = 4;
+const RELATED: u32 = 1;
+const PHRASE: u32 = 4;
+
+/// What a user typed: for each word the beginnings of words that match it, with their weights; and the phrases, which are pairs of
+/// neighbouring words, and all words together.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sought {
     said: String,
-    stems: Vec<(String, u32)>,
+    words: Vec<Vec<(String, u32)>>,
+    phrases: Vec<String>,
 }
 
 impl Sought {
     /// Search terms from the typed text.
     pub fn of(said: &str) -> Self {
-        let mut stems: Vec<(String, u32)> = Vec::new();
-        for word in said.to_lowercase().split_whitespace() {
-            let means =
-                |stem: &&str| word.starts_with(stem) || word.len() > 3 && stem.starts_with(word);
-            let family = FAMILIES.iter().find(|family| family.iter().any(&means));
-            let of_family = family.into_iter().flat_map(|family| family.iter());
-            // The word itself has more weight than related words.
-            stems.extend(
-                of_family.map(|stem| ((*stem).to_string(), if means(stem) { 4 } else { 1 })),
-            );
-            if family.is_none() {
-                let short = ["ing", "ed", "es", "s"]
-                    .into_iter()
-                    .find_map(|end| word.strip_suffix(end));
-                stems.push((
-                    short
-                        .filter(|short| short.len() > 2)
-                        .unwrap_or(word)
-                        .to_string(),
-                    4,
-                ));
-            }
-        }
+        let typed = said.to_lowercase().replace(['_', ','], " ");
+        let all: Vec<&str> = typed.split_whitespace().collect();
+        let is_stop = |word: &&str| STOP_WORDS.contains(word);
+        let words = all.iter().filter(|word| !is_stop(word));
+        let pairs = all.windows(2).filter(|pair| !pair.iter().all(is_stop));
+        let whole = (all.len() > 2 && !all.iter().all(is_stop)).then(|| all.join(" "));
         Self {
             said: said.to_string(),
-            stems,
+            words: words.map(|word| stems(word)).collect(),
+            phrases: pairs.map(|pair| pair.join(" ")).chain(whole).collect(),
         }
     }
 
-    /// Score of texts, with the largest weight for the first text; zero without a match.
-    fn score(&self, texts: &[&str]) -> u32 {
+    /// Sum over the texts and the typed words, with the largest weight for the first text; zero without a match.
+    fn score(&self, texts: &[(&str, u32)]) -> u32 {
         let mut score = 0;
-        for (text, weight) in texts.iter().zip([4, 2, 1]) {
+        for (text, weight) in texts {
             let text = text.to_lowercase().replace('_', " ");
             let begins = |stem: &str| {
                 let mut places = text.match_indices(stem);
                 places.any(|(at, _)| !text[..at].ends_with(|c: char| c.is_alphanumeric()))
             };
-            let found = self.stems.iter().filter(|(stem, _)| begins(stem));
-            score += weight * found.map(|(_, counts)| counts).max().unwrap_or(&0);
+            for stems in &self.words {
+                let found = stems.iter().filter(|(stem, _)| begins(stem));
+                score += weight * found.map(|(_, counts)| counts).max().unwrap_or(&0);
+            }
+            let phrases = self.phrases.iter().filter(|phrase| begins(phrase)).count();
+            score += weight * PHRASE * u32::try_from(phrases).unwrap_or(0);
         }
         score
     }
 
     /// Score of an effect of a tank.
     pub fn score_of_plant(&self, effect: &EffectInfo) -> u32 {
+        let is_at_port = |other: &&ct_model::effects::Effect| {
+            let mut ports = effect.at_ports.iter();
+            ports.any(|port| port.split('(').next() == Some(other.id))
+        };
+        let symptoms: Vec<&str> = all_effects()
+            .filter(is_at_port)
+            .flat_map(|other| other.symptoms)
+            .copied()
+            .collect();
         self.score(&[
-            effect.id,
-            effect.physics,
-            effect.general.unwrap_or_default(),
+            (effect.id, 4),
+            (effect.physics, 2),
+            (effect.general.unwrap_or_default(), 1),
+            (&symptoms.join(", "), 2),
         ])
+    }
+
+    /// Score of an effect at the ports of models.
+    pub fn score_of_effect(&self, effect: &Effect) -> u32 {
+        let symptoms = effect.symptoms.join(", ");
+        self.score(&[(effect.id, 4), (&symptoms, 2), (effect.physics, 1)])
     }
 
     /// Score of an effect at a port, or of a candidate of the model file.
     pub fn score_of(&self, candidate: &Candidate) -> u32 {
         match candidate.effect {
-            Some(effect) => self.score(&[effect.id, &effect.symptoms.join(", "), effect.physics]),
-            None => self.score(&[&candidate.id]),
+            Some(effect) => self.score_of_effect(effect),
+            None => self.score(&[(&candidate.id, 4)]),
         }
     }
 
@@ -157,6 +174,23 @@ impl Sought {
     }
 }
 
+/// Beginnings of words that match a typed word, with their weights.
+fn stems(word: &str) -> Vec<(String, u32)> {
+    let means = |stem: &&str| word.starts_with(stem) || word.len() > 3 && stem.starts_with(word);
+    if let Some(family) = FAMILIES.iter().find(|family| family.iter().any(&means)) {
+        let weight = |stem: &&str| if means(stem) { TYPED } else { RELATED };
+        let stems = family
+            .iter()
+            .map(|stem| ((*stem).to_string(), weight(stem)));
+        return stems.collect();
+    }
+    let mut short = ["ing", "ed", "es", "s"]
+        .into_iter()
+        .filter_map(|end| word.strip_suffix(end));
+    let short = short.find(|short| short.len() > 2).unwrap_or(word);
+    vec![(short.to_string(), TYPED)]
+}
+
 /// Items with a score, best first; equal scores keep their order.
 pub(crate) fn best<T>(all: impl IntoIterator<Item = T>, score: impl Fn(&T) -> u32) -> Vec<T> {
     let scored = all.into_iter().map(|one| (score(&one), one));
@@ -167,7 +201,7 @@ pub(crate) fn best<T>(all: impl IntoIterator<Item = T>, score: impl Fn(&T) -> u3
 
 #[cfg(test)]
 mod tests {
-    use ct_model::effects::all_effects;
+    use ct_model::effects::{Visited, candidates};
     use plants::CATALOGUE;
 
     use super::*;
@@ -205,32 +239,70 @@ mod tests {
         assert!(of_tanks("xyzzy").is_empty());
     }
 
+    /// Effects at all ports, best first: `lag(y)`.
+    fn at_ports(said: &str) -> Vec<String> {
+        let sought = Sought::of(said);
+        let all = best(all_effects(), |effect| sought.score_of_effect(effect));
+        let id = |effect: &&Effect| format!("{}({})", effect.id, effect.port_names());
+        all.iter().map(id).collect()
+    }
+
     #[test]
     fn every_process_word_finds_general_effects() {
-        let first = |said: &str| -> Vec<&str> {
-            let sought = Sought::of(said);
-            let score = |effect: &&ct_model::effects::Effect| {
-                sought.score(&[effect.id, &effect.symptoms.join(", "), effect.physics])
-            };
-            best(all_effects(), score)
-                .iter()
-                .map(|effect| effect.id)
-                .collect()
-        };
         for (said, effect) in [
-            ("clog", "drift"),
-            ("drift", "drift"),
-            ("leak", "constant"),
-            ("stick", "coulomb"),
-            ("late", "delay"),
-            ("noisy", "quantisation"),
+            ("clog", "drift(p)"),
+            ("drift", "drift(y)"),
+            ("leak", "constant(x)"),
+            ("stick", "hysteresis(y)"),
+            ("stick", "backlash(u)"),
+            ("late", "delay(u)"),
+            ("noisy", "quantisation(y)"),
         ] {
-            let found = first(said);
+            let found = at_ports(said);
             assert!(
-                found[..found.len().min(5)].contains(&effect),
+                found[..found.len().min(5)].iter().any(|id| id == effect),
                 "{said}: {found:?}"
             );
             assert!(found.len() < 20, "{said}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_literal_symptom_is_first() {
+        for (said, effect) in [
+            ("reads too high", "offset(y)"),
+            ("the sensor reads too low", "offset(y)"),
+            ("end stop", "limit(x)"),
+            ("dead time", "delay(u)"),
+            ("right at one level only", "varies_with(p,x)"),
+        ] {
+            assert_eq!(at_ports(said)[0], effect, "{said}: {:?}", at_ports(said));
+        }
+        assert_eq!(of_tanks("reads too high")[0], "sensor_offset");
+        assert_eq!(of_tanks("end stop")[0], "overflow");
+        assert!(at_ports("it is too").is_empty());
+    }
+
+    #[test]
+    fn every_process_word_finds_an_effect_of_the_example_models() {
+        let block = include_str!("../models/heated-block.mo");
+        let spec = ct_model::ModelSpec::parse(block).unwrap();
+        let all = candidates(&spec, &Visited::nominal(&spec));
+        for (said, right) in [
+            ("clog", &["drift(k)", "drift(g)"][..]),
+            ("drift", &["drift(y)", "gain_drift(u)"]),
+            ("leak", &["constant(T)", "loss(T)"]),
+            ("stick", &["backlash(u)", "hysteresis(y)"]),
+            ("late", &["delay(u)", "lag(u)"]),
+            ("noisy", &["quantisation(y)"]),
+        ] {
+            let sought = Sought::of(said);
+            let found = best(all.iter(), |candidate| sought.score_of(candidate));
+            let first: Vec<&str> = found.iter().take(3).map(|c| c.id.as_str()).collect();
+            assert!(
+                first.iter().any(|id| right.contains(id)),
+                "{said}: {first:?}"
+            );
         }
     }
 }

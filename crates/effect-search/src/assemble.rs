@@ -147,6 +147,7 @@ pub(crate) fn assemble(
         singles,
         record_numbers,
         candidates: context.candidates.len(),
+        absorbed: context.absorbed.clone(),
         left_out,
         seconds: seconds + context.limit.seconds(),
     })

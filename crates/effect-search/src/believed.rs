@@ -83,6 +83,7 @@ pub(crate) fn begin<'a>(
         level_shifts: Vec::new(),
         scales: None,
         ties: Vec::new(),
+        absorbed: Vec::new(),
         tolerance: ct_model::TOLERANCE,
         limit,
         thresholds: options.thresholds,
@@ -115,7 +116,7 @@ pub(crate) fn begin<'a>(
         model,
         fit,
     };
-    context.ties = context.ties(&bare);
+    (context.ties, context.absorbed) = context.ties(&bare);
     let mut node = bare;
     for id in &problem.effects {
         node = context.with_listed(node, id)?;

@@ -45,6 +45,6 @@ pub use problem::{Kept, Options, Problem};
 pub use problem_builder::ProblemBuilder;
 pub use quantisation::Quantisation;
 pub use residual_tests::{Line, NotNoise, strongest_line};
-pub use result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
+pub use result::{Absorbed, Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
 pub use thresholds::Thresholds;
 pub use unknown::{PortScore, Unknown};

@@ -10,6 +10,7 @@ use greybox::{FitOptions, ModelSetup};
 
 use crate::Error;
 use crate::problem::{Limit, Problem};
+use crate::result::Absorbed;
 use crate::thresholds::Thresholds;
 
 /// Stopping criteria of a first fit, which only has to give a rank.
@@ -40,6 +41,8 @@ pub(crate) struct Context<'a> {
     pub level_shifts: Vec<Candidate>,
     /// For each candidate the first one with a collinear sensitivity ([`Context::ties`]); empty where they are not known.
     pub ties: Vec<usize>,
+    /// Candidates of the model file that the model's parameters absorb.
+    pub absorbed: Vec<Absorbed>,
     pub limit: Limit<'a>,
     pub thresholds: Thresholds,
 }

@@ -92,6 +92,16 @@ pub struct Single {
     pub rmse_per_output: BTreeMap<String, f64>,
 }
 
+/// A candidate of the model file that changes the outputs only as the model's own parameters do: its term is in the model already.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Absorbed {
+    /// The candidate.
+    pub effect: String,
+    /// The parameter that alone has the same influence; `None` if only several together have it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameter: Option<String>,
+}
+
 /// The noise of an output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoiseFloor {
@@ -140,6 +150,9 @@ pub struct Diagnosis {
     pub record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
     /// Number of scored candidates.
     pub candidates: usize,
+    /// Candidates of the model file that no search can find, because the model's own parameters absorb them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub absorbed: Vec<Absorbed>,
     /// Steps that the time limit left out of the search; empty if the search is complete.
     pub left_out: Vec<String>,
     /// Computing time \[s\].

@@ -3,6 +3,9 @@
 //! Each of two such candidates explains what the other one explains, to first order. Together they explain their second-order difference at
 //! most, such as a drift with a curvature, and no record shows which of them is which: a set has one of them, the group of this effect
 //! names both. The sensitivities are those of the model without effects, projected off those of its parameters.
+//!
+//! A candidate of the model file whose sensitivity is a combination of theirs changes nothing that they do not: a term that the model has
+//! already. No search can find it, so the result names it ([`Absorbed`]).
 
 use std::sync::Arc;
 
@@ -13,6 +16,16 @@ use rayon::prelude::*;
 
 use crate::node::{Context, Node};
 use crate::pairs::{basis_of, every_nth, project, whitened};
+use crate::result::Absorbed;
+
+/// Direction of a candidate's sensitivity.
+enum Direction {
+    /// The part that is orthogonal to the sensitivities of the believed parameters, of length one.
+    Own(DVector<f64>),
+    /// The believed parameters explain it: one of them alone, or several together.
+    Dependent(Option<String>),
+    Unknown,
+}
 
 /// Two columns are collinear if the sine of the angle between them is below this: derivatives are exact up to the tolerance of the simulation.
 const SAME_DIRECTION: f64 = 1e-4;
@@ -20,38 +33,79 @@ const SAME_DIRECTION: f64 = 1e-4;
 const DEPENDENT: f64 = 1e-3;
 
 impl Context<'_> {
-    /// For each candidate, the first one with a collinear sensitivity: itself if there is none. `bare`: the model without effects.
-    pub fn ties(&self, bare: &Node) -> Vec<usize> {
+    /// For each candidate, the first one with a collinear sensitivity: itself if there is none; and the candidates of the model file that
+    /// the model's own parameters absorb. `bare`: the model without effects.
+    pub fn ties(&self, bare: &Node) -> (Vec<usize>, Vec<Absorbed>) {
         let mut first: Vec<usize> = (0..self.candidates.len()).collect();
         let every = every_nth(self, self.candidates.len());
         let Some(believed) = self.sensitivities(bare, every) else {
-            return first;
+            return (first, Vec::new());
         };
         let basis = basis_of(&believed);
-        let directions: Vec<Option<DVector<f64>>> = first
+        let directions: Vec<Direction> = first
             .par_iter()
             .map(|&i| {
                 if self.limit.passed() {
-                    return None;
+                    return Direction::Unknown;
                 }
-                let column = self.direction(bare, i, every)?;
+                let Some(column) = self.direction(bare, i, every) else {
+                    return Direction::Unknown;
+                };
                 // No prior depends on an effect.
-                let mut column = column.resize_vertically(believed.nrows(), 0.0);
+                let whole = column.resize_vertically(believed.nrows(), 0.0);
+                let mut column = whole.clone();
                 let before = column.norm();
                 project(&basis, &mut column);
                 project(&basis, &mut column);
                 let after = column.norm();
-                (after > DEPENDENT * before).then(|| column / after)
+                if after > DEPENDENT * before {
+                    Direction::Own(column / after)
+                } else if before > 0.0 {
+                    Direction::Dependent(self.parameter_along(bare, &believed, &whole))
+                } else {
+                    Direction::Unknown
+                }
             })
             .collect();
         let same = |a: usize, b: usize| match (&directions[a], &directions[b]) {
-            (Some(a), Some(b)) => 1.0 - a.dot(b).powi(2) < SAME_DIRECTION.powi(2),
+            (Direction::Own(a), Direction::Own(b)) => {
+                1.0 - a.dot(b).powi(2) < SAME_DIRECTION.powi(2)
+            }
             _ => false,
         };
         for i in 0..first.len() {
             first[i] = (0..i).find(|&j| first[j] == j && same(j, i)).unwrap_or(i);
         }
-        first
+        let absorbed = self.candidates.iter().zip(&directions);
+        let absorbed = absorbed.filter_map(|(candidate, direction)| match direction {
+            Direction::Dependent(parameter)
+                if candidate.effect.is_none() && !self.problem.effects.contains(&candidate.id) =>
+            {
+                Some(Absorbed {
+                    effect: candidate.id.clone(),
+                    parameter: parameter.clone(),
+                })
+            }
+            _ => None,
+        });
+        (first, absorbed.collect())
+    }
+
+    /// The parameter of the model whose sensitivity alone is collinear with a column.
+    fn parameter_along(
+        &self,
+        set: &Node,
+        believed: &DMatrix<f64>,
+        column: &DVector<f64>,
+    ) -> Option<String> {
+        let along = |own: &DVector<f64>| {
+            let product = own.norm() * column.norm();
+            product > 0.0 && 1.0 - (own.dot(column) / product).powi(2) < DEPENDENT.powi(2)
+        };
+        let mut columns = believed.column_iter();
+        let at = columns.position(|own| along(&own.into_owned()))?;
+        let setup = self.setup(&set.model).ok()?;
+        setup.names().get(set.fit.interior()[at]).cloned()
     }
 
     /// Sensitivities of the outputs to the parameters of a set that are not at a bound, and below them the rows of the priors; `None` if it

@@ -5,7 +5,8 @@ mod at_port;
 use std::collections::BTreeMap;
 
 use self::at_port::candidate;
-use super::effect::{Effect, Place, Role};
+use super::balance::limit;
+use super::effect::{Effect, EffectText, Place, Role};
 use super::fragment::{Action, Fragment};
 use super::port::Port;
 use super::scale::balance_unit;
@@ -131,6 +132,21 @@ impl Candidate {
             given: Given::Fitted,
         });
         Some(candidate)
+    }
+
+    /// What the effect is and how to confirm it, in the words of the port's domain; `None` for a candidate of the model file.
+    #[must_use]
+    pub fn described(&self, spec: &ModelSpec) -> Option<EffectText> {
+        let effect = self.effect?;
+        Some(match self.port {
+            Port::Balance(state) if *effect == limit::EFFECT => {
+                limit::text_of(domain::quantity(spec, state))
+            }
+            _ => EffectText {
+                physics: effect.physics,
+                confirm: effect.confirm,
+            },
+        })
     }
 
     /// Number of fitted parameters.

@@ -25,6 +25,27 @@ fn dimension(unit: &str) -> Option<Dimension> {
     Unit::parse(unit).map(|unit| unit.dimension())
 }
 
+/// The kind of quantity that a state is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Quantity {
+    Level,
+    Position,
+    Temperature,
+    Other,
+}
+
+pub(super) fn quantity(spec: &ModelSpec, state: usize) -> Quantity {
+    if levels(spec).any(|level| level == state) {
+        Quantity::Level
+    } else if spec.speed_of(state).is_some() {
+        Quantity::Position
+    } else if is(spec, Variable::State(state), "K") {
+        Quantity::Temperature
+    } else {
+        Quantity::Other
+    }
+}
+
 fn is(spec: &ModelSpec, variable: Variable, unit: &str) -> bool {
     let own = dimension(&spec.about(variable).unit);
     own.is_some_and(|own| own != Dimension::NONE) && own == dimension(unit)

@@ -109,8 +109,17 @@ pub struct Effect {
     pub symptoms: &'static [&'static str],
 }
 
+/// What an effect is and how to confirm it, in the words of the port's physical domain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EffectText {
+    /// Physics of the effect in a sentence.
+    pub physics: &'static str,
+    /// How to confirm the effect at the plant.
+    pub confirm: &'static str,
+}
+
 /// Numbers of a record that the text of an effect may contain.
-const RECORD_NUMBERS: [&str; 10] = [
+pub(super) const RECORD_NUMBERS: [&str; 10] = [
     "low", "high", "middle", "width", "first", "begin", "zero", "duration", "interval", "balance",
 ];
 

@@ -30,6 +30,7 @@ mod apply;
 mod balance;
 mod between;
 mod candidate;
+mod description;
 mod domain;
 mod effect;
 mod electrical;
@@ -53,7 +54,8 @@ pub use candidate::{
     Candidate, EffectParameter, best_of_each_choice, candidates, candidates_keeping, level_shifts,
     shapes_keeping,
 };
-pub use effect::{Effect, Place, Role, Starts};
+pub use description::DescribedParameter;
+pub use effect::{Effect, EffectText, Place, Role, Starts};
 pub use own::{OwnCandidate, OwnError, OwnParameter, OwnState, own_candidate, own_candidates};
 pub use port::{Port, Ports};
 pub use shape::bells;

@@ -420,3 +420,31 @@ fn an_effect_keeps_the_numbers_of_the_record_that_it_was_written_in() {
     assert!((reading(&find(all, "drift(y)")) - 33.0).abs() < 1e-9);
     assert!((reading(&drift) - 31.7).abs() < 1e-9);
 }
+
+#[test]
+fn a_limit_is_described_in_the_words_of_the_state() {
+    let of = |text: &str, id: &str| {
+        let spec = ModelSpec::parse(text).unwrap();
+        let all = candidates(&spec, &Visited::nominal(&spec));
+        let own = all.into_iter().find(|candidate| candidate.id == id);
+        own.unwrap().described(&spec).unwrap()
+    };
+    let state = |unit: &str| {
+        format!(
+            "model M parameter Real k = 1; input Real u; output Real x(unit=\"{unit}\", start=1); equation der(x) = u - k*x; end M;"
+        )
+    };
+    let tank = of(&state("m"), "limit(x)");
+    assert!(tank.physics.contains("a rim") && !tank.physics.contains("stop"));
+    let block = of(&state("degC"), "limit(x)");
+    assert!(block.physics.contains("a thermostat") && block.confirm.contains("thermostat"));
+    assert!(!block.physics.contains("rim"));
+    let cell = of(&state("V"), "limit(x)");
+    assert!(
+        !["rim", "stop:", "thermostat"]
+            .iter()
+            .any(|word| cell.physics.contains(word))
+    );
+    let cart = "model M parameter Real k = 1; input Real u; output Real x(unit=\"m\", start=1); Real v(unit=\"m/s\", start=0); equation der(x) = v; der(v) = u - k*v; end M;";
+    assert!(of(cart, "limit(x)").physics.contains("an end stop"));
+}

@@ -105,8 +105,8 @@ struct Remove {
 struct Effects {
     /// An effect to describe in full
     effect: Option<String>,
-    /// List only what may be added to the model of this file
-    #[arg(long, value_name = "M.toml", conflicts_with = "effect")]
+    /// Only effects that can act in the model of this file
+    #[arg(long, value_name = "M.toml")]
     model: Option<PathBuf>,
     /// List the effects for a symptom or a word of the process, best first: clog, drift, leak, stick, late, noisy
     #[arg(long, value_name = "WORDS", conflicts_with = "effect")]
@@ -143,6 +143,17 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         })) => say(out, &(edit::add(&model, &effect, place.as_deref())? + "\n")),
         Some(Command::Remove(Remove { effect, model })) => {
             say(out, &(edit::remove(&model, &effect)? + "\n"))
+        }
+        Some(Command::Effects(Effects {
+            effect: Some(effect),
+            model: Some(model),
+            ..
+        })) => {
+            let text = match AnyModelFile::read(&model)? {
+                AnyModelFile::Plant(model) => catalogue::describe_for(&effect, &model, look)?,
+                AnyModelFile::Own(model) => own_model::ports::described(&model, &effect, look)?,
+            };
+            say(out, &text)
         }
         Some(Command::Effects(Effects {
             effect: Some(effect),

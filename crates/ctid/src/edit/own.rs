@@ -5,17 +5,18 @@ use std::path::Path;
 
 use ct_model::ModelSpec;
 use ct_model::effects::Candidate;
+use ct_signals::quoted;
 use effect_search::{Diagnosis, Estimate, Kept};
 use serde::Deserialize;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
 
 use super::Edited;
 use super::layout::{document, push, take_out};
-use crate::Error;
 use crate::model_file::read_text;
 use crate::own_model::effects::{RECORD, every_candidate, find, plain};
 use crate::own_model::{OwnModelFile, read_model};
 use crate::report::rounded;
+use crate::{Error, term_file};
 
 /// Reads the text that a model file names.
 pub(crate) type ReadText<'r> = &'r dyn Fn(&Path) -> Result<ModelSpec, Error>;
@@ -33,6 +34,9 @@ pub(crate) struct Findings {
 
 #[derive(Debug, Clone, Deserialize)]
 struct FoundStep {
+    /// The effect, of the unexplained function.
+    #[serde(default)]
+    effect: Option<String>,
     parameters: Vec<FoundParameter>,
 }
 
@@ -62,10 +66,26 @@ impl Findings {
     /// # Errors
     /// What is wrong and the correction.
     pub fn of_text(text: &str) -> Result<Self, String> {
+        if term_file::is_own(text) {
+            // The effect is in quotes, as a comma separates the names of its port.
+            let effect = text.lines().nth(1).and_then(|row| row.split('"').nth(1));
+            return Err(format!(
+                "this is the table that `ctid diagnose --unknown` wrote, without the numbers that a model of your own keeps: write the result with `ctid diagnose --json RESULT.json`, then `ctid add '{}' --from RESULT.json`",
+                quoted(effect.unwrap_or("shape(x,u)"))
+            ));
+        }
         serde_json::from_str(text).map_err(|error| {
             format!(
                 "this is no result of a model of your own: give what `ctid diagnose --json` wrote ({error})"
             )
+        })
+    }
+
+    /// The name of the unexplained function, for a message.
+    fn unexplained(&self) -> String {
+        let effect = self.unknown.as_ref().and_then(|step| step.effect.as_ref());
+        effect.map_or(String::new(), |effect| {
+            format!("; the missing term of the result is {effect}: `ctid add '{effect}'` keeps it")
         })
     }
 
@@ -122,6 +142,7 @@ impl From<&Diagnosis> for Findings {
             found.collect()
         };
         let step = |parameters: &[Estimate]| FoundStep {
+            effect: None,
             parameters: all(parameters),
         };
         let singles = found.singles.iter().map(|single| FoundSingle {
@@ -130,7 +151,10 @@ impl From<&Diagnosis> for Findings {
         Self {
             model: found.model.clone(),
             steps: found.steps.iter().map(|s| step(&s.parameters)).collect(),
-            unknown: found.unknown.as_ref().map(|u| step(&u.parameters)),
+            unknown: found.unknown.as_ref().map(|u| FoundStep {
+                effect: Some(u.effect.clone()),
+                parameters: all(&u.parameters),
+            }),
             singles: singles.collect(),
             record_numbers: found.record_numbers.clone(),
         }
@@ -168,7 +192,10 @@ pub(crate) fn with_effect(
     };
     let model = OwnModelFile::parse_with(path, text, read)?;
     let all = every_candidate(&model.base, &model.candidates)?;
-    let candidate = find(&model.base, &all, effect).map_err(Error::UnknownEffect)?;
+    let candidate = find(&model.base, &all, effect).map_err(|what| {
+        let unexplained = from.map_or(String::new(), Findings::unexplained);
+        Error::UnknownEffect(what + &unexplained)
+    })?;
     let id = &candidate.id;
     let is_on = model.effects.on.contains(id);
     if is_on && from.is_none() {

@@ -11,7 +11,7 @@ use super::words::{EffectWords, shown_unit};
 use crate::Error;
 use crate::look::{Look, Side, table};
 use crate::numbers;
-use crate::sentences::remarks::rounding;
+use crate::sentences::remarks::{absorbed, rounding};
 use crate::terminal::without_50;
 
 /// Single effects that are listed.
@@ -160,6 +160,7 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
             "{many} effects or more together may compensate for an effect that is not among the candidates: treat them as a description of the records until each is confirmed."
         ));
     }
+    all.extend(diagnosis.absorbed.iter().map(absorbed));
     if !diagnosis.left_out.is_empty() {
         all.push(format!(
             "Left out by the time limit: {}; --effort thorough searches longer.",

@@ -166,7 +166,11 @@ pub(crate) fn find<'c>(
     let ports: Vec<&str> = ids()
         .filter(|id| id.split('(').next() == Some(name))
         .collect();
-    let near = names::suggestion(&id, ids());
+    let mut near = names::suggestion(&id, ids());
+    if near.is_empty() && ports.is_empty() {
+        let without_ports = ids().filter_map(|id| id.split('(').next());
+        near = names::suggestion(name, without_ports);
+    }
     let where_it_acts = match ports.len() {
         0 if all_effects().any(|effect| effect.id == name) => {
             format!("; {name} acts nowhere in {}", spec.name)

@@ -52,8 +52,8 @@ impl EffectWords {
                 place: place(spec, candidate.port),
                 sites: sites(spec, candidate.port),
                 physics: candidate
-                    .effect
-                    .map_or(String::new(), |effect| effect.physics.to_string()),
+                    .described(spec)
+                    .map_or(String::new(), |text| text.physics.to_string()),
             },
         };
         Self(all.iter().map(|c| (c.id.clone(), words(c))).collect())
@@ -65,6 +65,11 @@ impl EffectWords {
             Some(words) if !words.place.is_empty() => format!("{id} {}", words.place),
             _ => id.to_string(),
         }
+    }
+
+    /// Where an effect acts: `at the output y (block)`.
+    pub fn place(&self, id: &str) -> &str {
+        self.0.get(id).map_or("", |words| &words.place)
     }
 
     /// The ports of the effect.

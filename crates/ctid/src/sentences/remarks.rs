@@ -1,5 +1,6 @@
 //! Remarks in addition to the verdict.
 
+use effect_search::Absorbed;
 use missing_effect::{Diagnosis, Rankings, Remark};
 
 use super::{list, rms};
@@ -72,6 +73,19 @@ pub(crate) fn rounding(of: &str, step: f64, unit: &str, share: f64) -> String {
         with_unit(step / 12.0_f64.sqrt(), 2),
         100.0 * share.min(1.0)
     )
+}
+
+/// Note: a candidate of the model file that no search can find.
+pub(crate) fn absorbed(own: &Absorbed) -> String {
+    let effect = &own.effect;
+    match &own.parameter {
+        Some(parameter) => format!(
+            "Note: {effect} cannot be found: its term changes the outputs as the model's parameter {parameter} does, which is fitted. Give {parameter} under [known], or delete [candidates.{effect}]."
+        ),
+        None => format!(
+            "Note: {effect} cannot be found: its term changes the outputs as the model's fitted parameters together do. Give one of them under [known], or delete [candidates.{effect}]."
+        ),
+    }
 }
 
 /// Remark: the two weightings of the residual rank different effects first.

@@ -130,3 +130,18 @@ fn effects_of_a_model_of_ones_own_are_listed_with_its_candidates() {
         ],
     );
 }
+
+#[test]
+fn ports_with_the_same_effects_are_listed_together() {
+    let place = Place::empty();
+    place.write("m.mo", include_str!("../../models/mass-spring.mo"));
+    let text = place.succeeds("check m.mo");
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    // A position has no balance: it may only stop.
+    assert!(
+        text.contains(
+            "balances v: constant, loss, step, periodic, hidden_state, limit x: limit parameters"
+        ),
+        "{text}"
+    );
+}

@@ -83,6 +83,22 @@ fn a_candidate_is_found_with_its_place_added_and_removed() {
     assert!(said.contains("effects = []"), "{said}");
 }
 
+#[test]
+fn a_candidate_that_the_model_contains_already_is_named() {
+    let again = "[candidates.again]\nparameters = { h = { unit = \"W/K\", start = 0.1 } }\nterms = { T = \"-h*(T - 20)\" }\n";
+    let place = place(again);
+    place.write("a.csv", rows(200, 200));
+    let said = place.succeeds("diagnose a.csv --model m.toml --json found.json");
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        said.contains("Note: again cannot be found: its term changes the outputs as the model's parameter k does"),
+        "{said}"
+    );
+    let absorbed = &place.json("found.json")["absorbed"];
+    assert_eq!(absorbed[0]["effect"], "again");
+    assert_eq!(absorbed[0]["parameter"], "k");
+}
+
 /// Another member of a group is added with the size of its single fit.
 #[test]
 fn what_stands_in_for_an_effect_is_added_with_its_size_too() {

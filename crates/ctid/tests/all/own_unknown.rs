@@ -78,6 +78,22 @@ fn a_shape_that_no_effect_has_is_found_and_kept() {
     ] {
         assert!(report.contains(&part), "{part}");
     }
+    // The table is not enough for a model, and the term keeps its name.
+    place.refuses(
+        "add my_shape --model m.toml --from shape.csv",
+        &[
+            "shape.csv",
+            "--json RESULT.json",
+            &format!("ctid add '{effect}'"),
+        ],
+    );
+    place.refuses(
+        "add my_shape --model m.toml --from found.json",
+        &[
+            "\"my_shape\" is no effect",
+            &format!("the missing term of the result is {effect}"),
+        ],
+    );
     place.succeeds(&format!("add {effect} --model m.toml --from found.json"));
     let before = found["steps"][0]["rmse_per_output"]["y"].as_f64().unwrap();
     let mended = place.result("compare a.csv --model m.toml");

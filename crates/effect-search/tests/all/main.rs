@@ -1,6 +1,7 @@
 //! One program for all tests.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod absorbed;
 mod design;
 mod failures;
 mod hidden;

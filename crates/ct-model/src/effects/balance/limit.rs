@@ -1,8 +1,9 @@
 //! `limit(x)`: the state stops at a bound.
 
-use crate::effects::{Effect, Place, Role, Starts};
+use crate::effects::domain::Quantity;
+use crate::effects::{Effect, EffectText, Place, Role, Starts};
 
-pub(super) const EFFECT: Effect = Effect {
+pub(in crate::effects) const EFFECT: Effect = Effect {
     id: "limit",
     place: Place::Balance,
     text: r#"
@@ -30,3 +31,26 @@ end limit;
     confirm: "Drive the state to the bound: does it overflow, hit a stop or cut out?",
     symptoms: &["overflows", "end stop", "stays at a value", "cuts out"],
 };
+
+/// The effect in the words of the state's domain.
+pub(in crate::effects) fn text_of(state: Quantity) -> EffectText {
+    let (physics, confirm) = match state {
+        Quantity::Level => (
+            "The level does not go beyond a bound: the tank overflows at a rim or an outlet.",
+            "Fill the tank to the bound: does it overflow?",
+        ),
+        Quantity::Position => (
+            "The position does not go beyond a bound: an end stop.",
+            "Move it to the bound by hand: does it hit a stop?",
+        ),
+        Quantity::Temperature => (
+            "The temperature does not go beyond a bound: a thermostat or a cut-out switches, or the material melts or boils.",
+            "Heat or cool it to the bound: does a thermostat or a cut-out switch?",
+        ),
+        Quantity::Other => (
+            "The state does not go beyond a bound: it is limited, or switched off there.",
+            "Drive the state to the bound: does it stay there, or is something switched off?",
+        ),
+    };
+    EffectText { physics, confirm }
+}

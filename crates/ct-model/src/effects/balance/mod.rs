@@ -2,7 +2,7 @@
 
 mod constant;
 mod hidden_state;
-mod limit;
+pub(super) mod limit;
 mod loss;
 mod periodic;
 mod step;

@@ -83,6 +83,42 @@ fn effects_are_found_by_what_is_seen() {
 }
 
 #[test]
+fn an_effect_is_described_at_its_port_in_the_model() {
+    let place = place();
+    let of = |words: &str| {
+        let said = place.succeeds(words);
+        said.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let said = of("effects radiation(T,Ta) --model m.toml");
+    for part in [
+        "where in the equation of T (block), with Ta (room)",
+        "radiation_T_Ta_exchange J/(s.K) 0 exchange per unit of difference",
+        "confused with natural_convection(T,Ta), varies_with(p,x), loss(x)",
+        "confirm Cover the surface with foil and repeat a hot run.",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    // A name without a port: every port where it acts.
+    let said = of("effects lag --model m.toml");
+    assert!(
+        said.contains("lag(u), lag(Ta) ") && said.contains("lag(y) "),
+        "{said}"
+    );
+    // A limit in the words of a temperature.
+    let said = of("effects limit(T) --model m.toml");
+    assert!(
+        said.contains("a thermostat") && !said.contains("a rim"),
+        "{said}"
+    );
+    place.refuses(
+        "effects radiaton --model m.toml",
+        &["did you mean radiation"],
+    );
+    assert!(of("effects radiation").contains("confirm Cover the surface with foil"));
+    assert!(of("effects --like radiation").starts_with("radiation(T,Ta)"));
+}
+
+#[test]
 fn identify_takes_a_model_with_effects_where_it_is_linear() {
     let place = place();
     place.write(

@@ -15,7 +15,7 @@ LARGEST_SEED = 2**64 - 1
 
 def whole(name: str, value: object, least: int, most: int | None = None) -> int:
     """A whole number within limits."""
-    if isinstance(value, (int, np.integer)) and least <= value and (most is None or value <= most):
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and least <= value and (most is None or value <= most):
         return int(value)
     limits = f"of {least} or more" if most is None else f"from {least} to {most}"
     raise ModelError(f"{name} is {value!r}: give a whole number {limits}")

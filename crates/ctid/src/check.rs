@@ -42,10 +42,9 @@ pub(crate) fn ideal(spec: &ModelSpec, known: &BTreeMap<String, f64>, look: Look)
         "\n{}\n",
         look.heading("With records without noise, all inputs stepped")
     );
-    let Some(found) = greybox::ideal_records(&Model::new(spec.clone()), known) else {
-        let why =
-            "not simulated: the model delays something, or has no finite slope at its start values";
-        return text + &look.paragraph("  ", why);
+    let found = match greybox::ideal_records(&Model::new(spec.clone()), known) {
+        Ok(found) => found,
+        Err(why) => return text + &look.paragraph("  ", &format!("not simulated: {why}")),
     };
     let way = match found.method {
         _ if spec.states.is_empty() => "no states to simulate",
@@ -78,13 +77,25 @@ pub(crate) fn ideal(spec: &ModelSpec, known: &BTreeMap<String, f64>, look: Look)
     for together in &found.not_determined {
         let what = match together.as_slice() {
             [one] => format!(
-                "{one} has no effect on the outputs, or none apart from the initial states: fix it under [known]"
+                "{one} has no effect of its own on the outputs of such records: fix it under [known], or let the inputs reach where it has one"
             ),
             all => format!(
-                "no record of these outputs determines {}, only a combination of them: fix one of them under [known], or give a [prior]",
+                "such records determine only a combination of {}: fix one of them under [known], or give a [prior]",
                 all.join(", ")
             ),
         };
+        text += &look.paragraph("  ", &what);
+    }
+    if !found.assumed.is_empty() {
+        let ranges = found
+            .assumed
+            .iter()
+            .map(|(name, (low, high))| format!("{name} {} to {}", shown(*low), shown(*high)));
+        let ranges: Vec<String> = ranges.collect();
+        let what = format!(
+            "inputs without min and max in the text are taken as {}",
+            ranges.join(", ")
+        );
         text += &look.paragraph("  ", &what);
     }
     text

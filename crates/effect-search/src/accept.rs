@@ -1,6 +1,6 @@
 //! Acceptance test: backward elimination of effects that the noise may explain as well.
 
-use ct_signals::Record;
+use ct_signals::{ArModel, Record};
 use estimation::{Fit, Noise, coloured};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -10,7 +10,8 @@ use crate::node::{Context, FINE, Node};
 
 impl Context<'_> {
     /// Whether a set lowers the deviance significantly compared with one that lacks some of its effects: chi-square, corrected (Bonferroni)
-    /// for all tried candidates and starts.
+    /// for all tried candidates and starts. A noise model of the lacking set with more coefficients imitates the effects: each of these
+    /// coefficients counts as in Akaike's criterion.
     pub fn beyond_chance(&self, gained: (&Node, &Fit), lacking: (&Node, &Fit)) -> bool {
         let new = gained
             .0
@@ -25,7 +26,9 @@ impl Context<'_> {
             looks *= self.candidates.len() as f64 * (candidate.starts().len() as f64).max(1.0);
         }
         let freedom = freedom.max(gained.1.parameters.saturating_sub(lacking.1.parameters));
-        let fall = lacking.1.deviance - gained.1.deviance;
+        let coefficients = |fit: &Fit| fit.noise.iter().map(ArModel::order).sum::<usize>();
+        let more = coefficients(lacking.1).saturating_sub(coefficients(gained.1));
+        let fall = lacking.1.deviance - gained.1.deviance + 2.0 * more as f64;
         let chance =
             ChiSquared::new(freedom.max(1) as f64).map_or(1.0, |chi| chi.sf(fall.max(0.0)));
         chance * looks < self.thresholds.false_claim

@@ -94,13 +94,24 @@ pub(crate) fn begin<'a>(
         ..FitOptions::default()
     };
     let model = Arc::new(Model::new(problem.spec.clone()));
-    let (fit, visited, tolerance) = {
-        let setup = context.setup(&model)?;
-        let fit = setup.fit(&fit_options)?;
-        let visited = visited(problem, &setup, &fit)?;
+    // The model is compared with sets of effects and needs their criterion, in which every output has a variance of its own: `fit` weights the
+    // outputs by their noise.
+    let fit = context.setup(&model)?.fit(&fit_options)?;
+    let mut bare = Node {
+        added: Vec::new(),
+        model,
+        fit,
+    };
+    if problem.spec.outputs.len() > 1 {
+        let white = Noise::white(problem.spec.outputs.len());
+        bare = context.refitted(&bare, &white, FINE)?;
+    }
+    let (visited, tolerance) = {
+        let (setup, fit) = (context.setup(&bare.model)?, &bare.fit);
+        let visited = visited(problem, &setup, fit)?;
         let noise = setup.output_noise(&fit.x);
         let tolerance = noise.map(|noise| setup.sufficient_tolerance(&fit.x, &noise));
-        (fit, visited, tolerance)
+        (visited, tolerance)
     };
     context.tolerance = tolerance.unwrap_or(ct_model::TOLERANCE);
     context.level_shifts = level_shifts(&problem.spec, &visited);
@@ -111,11 +122,6 @@ pub(crate) fn begin<'a>(
     let is_searched =
         |candidate: &Candidate| !candidate.is_shape() || problem.effects.contains(&candidate.id);
     (context.candidates, context.shapes) = all.into_iter().partition(is_searched);
-    let bare = Node {
-        added: Vec::new(),
-        model,
-        fit,
-    };
     (context.ties, context.absorbed) = context.ties(&bare);
     let mut node = bare;
     for id in &problem.effects {

@@ -42,16 +42,23 @@ pub fn held_out(setup: &ModelSetup, fit: &Fit, test: &[Record]) -> Result<Option
     if test.is_empty() {
         return Ok(None);
     }
-    let found = from_rows(setup, fit, test, STATE_ROWS)?;
+    let found = from_rows(setup, fit, test, (STATE_ROWS, true))?;
     let are_long = test
         .iter()
         .all(|record| record.len() >= MOST_OF_RECORD * LATER_ROWS);
-    let rmse_50 = are_long.then(|| from_rows(setup, fit, test, LATER_ROWS));
+    // A model that has no finite simulation over so many rows has no such score.
+    let later = are_long
+        .then(|| from_rows(setup, fit, test, (LATER_ROWS, false)).ok())
+        .flatten()
+        .filter(|found| {
+            found
+                .scored
+                .iter()
+                .all(|all| all.iter().any(|pairs| !pairs.is_empty()))
+        });
     Ok(Some(HeldOut {
         rmse: found.scored.iter().map(rms).collect(),
-        rmse_50: rmse_50
-            .transpose()?
-            .map(|found| found.scored.iter().map(rms).collect()),
+        rmse_50: later.map(|found| found.scored.iter().map(rms).collect()),
         errors: found
             .scored
             .iter()
@@ -78,12 +85,12 @@ struct Scored {
     state_rows: Vec<usize>,
 }
 
-/// Held-out records with initial states from at least this number of rows.
+/// Held-out records with initial states from this number of rows, or from more if these do not determine them and `may_be_more`.
 fn from_rows(
     setup: &ModelSetup,
     fit: &Fit,
     test: &[Record],
-    least: usize,
+    (least, may_be_more): (usize, bool),
 ) -> Result<Scored, Error> {
     let outputs = fit.rmse.len();
     let mut scored: Vec<Pairs> = vec![Vec::new(); outputs];
@@ -98,7 +105,7 @@ fn from_rows(
             let states = setup
                 .held_out(&first, &fit.x)?
                 .fit_states(&FitOptions::default())?;
-            let known = states_are_known(&of_whole, &states, rows, &fit.rmse);
+            let known = !may_be_more || states_are_known(&of_whole, &states, rows, &fit.rmse);
             if known || MOST_OF_RECORD * 2 * rows > record.len() {
                 break states;
             }

@@ -105,7 +105,9 @@ impl Context<'_> {
         let mut columns = believed.column_iter();
         let at = columns.position(|own| along(&own.into_owned()))?;
         let setup = self.setup(&set.model).ok()?;
-        setup.names().get(set.fit.interior()[at]).cloned()
+        let entry = setup.free()[set.fit.interior()[at]];
+        // An initial state cannot be given under `[known]`.
+        (entry < setup.parameter_count()).then(|| setup.names()[entry].clone())
     }
 
     /// Sensitivities of the outputs to the parameters of a set that are not at a bound, and below them the rows of the priors; `None` if it

@@ -38,8 +38,27 @@ pub struct IdealRecords {
     pub time_constants: Vec<f64>,
     /// The method by which the longest record was simulated.
     pub method: Method,
-    /// Names of the parameters that have no effect on the outputs alone, or in a combination.
+    /// Names of the parameters that have no effect on the outputs of these records alone, or in a combination.
     pub not_determined: Vec<Vec<String>>,
+    /// Names of the inputs without bounds in the text, and the ranges that were taken.
+    pub assumed: Vec<(String, (f64, f64))>,
+}
+
+/// Why a model has no ideal records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NotIdeal {
+    /// The model delays something: its time constants are not known.
+    #[error("the model delays something")]
+    Delay,
+    /// An equation has no finite value or slope at the start values.
+    #[error(
+        "an equation has no finite value or slope at the start values: give other starts, or min and max of the inputs"
+    )]
+    Start,
+    /// The simulation of a record fails.
+    #[error("the simulation fails: give the inputs the bounds of your plant, min and max")]
+    Simulation,
 }
 
 /// The bounds of an input; where one is missing, one unit from the other, or 0 to 1.
@@ -52,10 +71,14 @@ fn range(about: &About) -> (f64, f64) {
     }
 }
 
-/// Simulates a model with ideal records; the parameters of `known` have these values. `None` where the model delays something, or has no
-/// finite slope at its start, or the simulation fails.
-#[must_use]
-pub fn ideal_records(model: &Model, known: &BTreeMap<String, f64>) -> Option<IdealRecords> {
+/// Simulates a model with ideal records; the parameters of `known` have these values.
+///
+/// # Errors
+/// Where the model cannot be simulated so.
+pub fn ideal_records(
+    model: &Model,
+    known: &BTreeMap<String, f64>,
+) -> Result<IdealRecords, NotIdeal> {
     let spec = model.spec();
     let mut parameters = model.parameters();
     for (value, parameter) in parameters.iter_mut().zip(&spec.parameters) {
@@ -71,7 +94,13 @@ pub fn ideal_records(model: &Model, known: &BTreeMap<String, f64>) -> Option<Ide
         .map(|(low, high)| 0.5 * (low + high))
         .collect();
     let starts = model.starts(&parameters);
-    let time_constants = time_constants(model, &parameters, &starts, &middle)?;
+    let time_constants = time_constants(model, &parameters, &starts, &middle).ok_or_else(|| {
+        if model.has_delays() {
+            NotIdeal::Delay
+        } else {
+            NotIdeal::Start
+        }
+    })?;
     let (shortest, longest) = match time_constants.as_slice() {
         [] => (1.0, 1.0),
         [first, .., last] => (*first, *last),
@@ -88,9 +117,10 @@ pub fn ideal_records(model: &Model, known: &BTreeMap<String, f64>) -> Option<Ide
         let inputs = ranges
             .iter()
             .map(|(low, high)| excitation::steps(SAMPLES, HELD, *low, *high, &mut rng).ok());
-        let inputs: Vec<Vec<f64>> = inputs.collect::<Option<_>>()?;
+        let inputs: Vec<Vec<f64>> = inputs.collect::<Option<_>>().ok_or(NotIdeal::Simulation)?;
         let outputs;
-        (outputs, method) = simulate(model, &parameters, interval, &inputs)?;
+        (outputs, method) =
+            simulate(model, &parameters, interval, &inputs).ok_or(NotIdeal::Simulation)?;
         let channel =
             |(about, values): (&About, Vec<f64>)| Channel::new(&about.name, &about.unit, values);
         let names = spec.inputs.iter().map(|input| &input.about);
@@ -102,20 +132,26 @@ pub fn ideal_records(model: &Model, known: &BTreeMap<String, f64>) -> Option<Ide
         let outputs = names.zip(outputs).map(channel).collect();
         records.push(Record::sampled("ideal", interval, inputs, outputs));
     }
-    let setup = ModelSetup::new(model, &records, known, 1.0).ok()?;
+    let setup = ModelSetup::new(model, &records, known, 1.0).map_err(|_| NotIdeal::Simulation)?;
     let mut x = parameters;
     for _ in &records {
         x.extend_from_slice(&starts);
     }
     let mut triangle = Triangle::new(setup.free().len() + 1);
-    setup.each_row(&x, |_, row| {
+    let rows = setup.each_row(&x, |_, row| {
         triangle.push(row);
         true
-    })?;
+    });
     triangle.finish();
-    if !triangle.is_finite() {
-        return None;
+    if rows.is_none() || !triangle.is_finite() {
+        return Err(NotIdeal::Simulation);
     }
+    let unbounded = |about: &&About| !(about.min.is_finite() && about.max.is_finite());
+    let assumed = spec
+        .inputs
+        .iter()
+        .map(|input| &input.about)
+        .filter(unbounded);
     let fitted = setup
         .free()
         .iter()
@@ -132,10 +168,13 @@ pub fn ideal_records(model: &Model, known: &BTreeMap<String, f64>) -> Option<Ide
         .collect();
     not_determined.sort();
     not_determined.dedup();
-    Some(IdealRecords {
+    Ok(IdealRecords {
         time_constants,
         method,
         not_determined,
+        assumed: assumed
+            .map(|about| (about.name.clone(), range(about)))
+            .collect(),
     })
 }
 

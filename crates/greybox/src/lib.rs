@@ -27,7 +27,7 @@ pub use fit::{
     FitOptions, coloured, fit, fit_from, fit_initial_levels, fit_onward, noise_of, prewhitened,
     robust,
 };
-pub use ideal::{IdealRecords, ideal_records};
+pub use ideal::{IdealRecords, NotIdeal, ideal_records};
 pub use many_starts::{keep_best_simulated, with_other_speeds};
 pub use model_setup::ModelSetup;
 pub use not_determined::not_determined;

@@ -20,6 +20,7 @@ const SAMPLES: usize = 5;
 /// Penalty of the prediction's coefficients (ridge regression), as a share of the variance of each signal. The model's output is almost a
 /// combination of its past and of the inputs: what is left is below a hundredth of a per cent of it, and mostly error of the simulation.
 /// Without the penalty a coefficient may be as large as that error is small, and the noise depends on the last digits of the parameters.
+/// The penalty is part of the variance: noise below about a thousandth of an output's movement is not resolved.
 const PENALTY: f64 = 1e-8;
 
 /// The standard deviation of each output's noise \[its unit\]; `None` where there are too few samples to tell.
@@ -63,7 +64,7 @@ fn slowest(records: &[Record]) -> usize {
     slowest.unwrap_or(1)
 }
 
-/// Variance of the prediction error. The penalty reduces the number of coefficients by `sum_j d_j (R'R)^-1_jj` (T. Hastie, R. Tibshirani,
+/// Variance of the prediction error, with the penalty. This reduces the number of coefficients by `sum_j d_j (R'R)^-1_jj` (T. Hastie, R. Tibshirani,
 /// J. Friedman, The Elements of Statistical Learning, 2nd ed., 2009, equation 3.50), `d_j` the penalty of each.
 fn prediction_variance(triangle: &Triangle, samples: usize) -> Option<f64> {
     let columns = triangle.columns() - 1;

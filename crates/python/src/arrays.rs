@@ -23,9 +23,9 @@ pub fn numbers<'py, D: Dimension>(
     let axes = D::NDIM.unwrap_or(1);
     let s = if axes == 1 { "axis" } else { "axes" };
     let numpy = value.py().import("numpy")?;
-    let found = numpy.call_method1("asarray", (value,)).map_err(|_| {
+    let found = numpy.call_method1("asarray", (value,)).map_err(|why| {
         error::of_data(format!(
-            "{name} has rows of different lengths: give an array of numbers with {axes} {s}"
+            "{name} has rows of different lengths, or is no array ({why}): give an array of numbers with {axes} {s}"
         ))
     })?;
     let dtype = found.getattr("dtype")?;

@@ -33,6 +33,12 @@ impl Model {
         &self.spec
     }
 
+    /// Whether the model delays something.
+    #[must_use]
+    pub fn has_delays(&self) -> bool {
+        !self.tape.delays.is_empty()
+    }
+
     /// The compiled operations.
     pub(crate) fn tape(&self) -> &Tape {
         &self.tape

@@ -20,8 +20,11 @@ pub(crate) fn warnings(file: Option<&Path>, text: &str, model: &ModelSpec, look:
     let base = base.unwrap_or_default();
     let with_effects = unit_warnings(model).into_iter();
     let with_effects = with_effects
-        .filter(|warning| base.iter().all(|known| known.of != warning.of))
-        .map(|warning| format!("units in the equation of {}: {}", warning.of, warning.what));
+        .filter(|warning| !base.contains(warning))
+        .map(|warning| {
+            let (of, what) = (warning.of, warning.what);
+            format!("units in the equation of {of} with its effects: {what}: correct the unit of a parameter of an effect or candidate")
+        });
     in_text
         .chain(with_effects)
         .map(|what| look.warning(format!("warning: {what}")) + "\n")

@@ -1,7 +1,5 @@
 //! Fall of the error from step to step.
 
-use std::collections::BTreeMap;
-
 use effect_search::OutputStep;
 use missing_effect::Diagnosis;
 
@@ -70,18 +68,23 @@ pub(crate) fn without_50<'a>(
     unit_of: impl Fn(&str) -> &'a str,
     look: Look,
 ) -> String {
-    let mut of_outputs: BTreeMap<&str, Vec<String>> = BTreeMap::new();
-    for output in steps.flatten() {
-        if let Some(error) = output.rmse_test_50 {
-            let errors = of_outputs.entry(&output.name).or_default();
-            errors.push(numbers::significant(error, 3));
-        }
-    }
-    let lines = of_outputs.into_iter().map(|(name, errors)| {
-        let errors = with_unit(&errors.join(", "), unit_of(name));
-        let rule = "if the initial states are fitted to the first 50 rows and these are not scored";
-        look.paragraph("  ", &format!("{name}, held out, {rule}: {errors}"))
-    });
+    let steps: Vec<&[OutputStep]> = steps.collect();
+    let names = steps.first().into_iter().flat_map(|outputs| outputs.iter());
+    let lines = names
+        .enumerate()
+        .filter_map(|(o, OutputStep { name, .. })| {
+            let errors = steps
+                .iter()
+                .filter_map(|outputs| outputs.get(o)?.rmse_test_50);
+            let errors: Vec<String> = errors.map(|error| numbers::significant(error, 3)).collect();
+            if errors.is_empty() {
+                return None;
+            }
+            let errors = with_unit(&errors.join(", "), unit_of(name));
+            let rule =
+                "if the initial states are fitted to the first 50 rows and these are not scored";
+            Some(look.paragraph("  ", &format!("{name}, held out, {rule}: {errors}")))
+        });
     lines.collect()
 }
 

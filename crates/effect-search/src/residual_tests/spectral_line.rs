@@ -31,8 +31,25 @@ pub struct Line {
     pub chance: f64,
 }
 
+/// The rows of a series that is read at every k-th row; all rows if one reading is between them.
+fn read_rows(series: &[f64]) -> Vec<f64> {
+    let read: Vec<usize> = (0..series.len()).filter(|&k| !series[k].is_nan()).collect();
+    let gaps = || read.windows(2).map(|two| two[1] - two[0]);
+    let every = gaps().min().unwrap_or(1);
+    match read.first() {
+        Some(&first) if every > 1 && gaps().all(|gap| gap % every == 0) => {
+            let from = first % every;
+            series[from..].iter().step_by(every).copied().collect()
+        }
+        _ => series.to_vec(),
+    }
+}
+
 /// The strongest line of a series; `None` if it is too short, or constant.
+///
+/// Of an output that is read at every k-th row only these rows are used: zeros between them would repeat every line at other frequencies.
 pub fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
+    let series = &read_rows(series);
     let n = series.len();
     // Made nearly flat for a comparison of neighbours, by a filter whose order is too low to model a line.
     let mut flat = ArModel::fit(&[series], 1)?.whiten(series);
@@ -71,4 +88,32 @@ pub fn strongest_line(series: &[f64]) -> Result<Option<Line>, Error> {
         cycles,
         chance: lines.len() as f64 * log_chance.exp(),
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use ct_signals::noise;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    #[test]
+    fn the_line_of_a_slow_output_is_that_of_its_readings() {
+        const ROWS: usize = 1200;
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let noise = noise::white(ROWS, 0.5, &mut rng);
+        let value = |(k, e): (usize, f64)| (2.0 * PI * 37.0 * k as f64 / ROWS as f64).sin() + e;
+        let all: Vec<f64> = noise.into_iter().enumerate().map(value).collect();
+        let cycles = |series: &[f64]| strongest_line(series).unwrap().unwrap().cycles;
+        assert_eq!(cycles(&all), 37);
+        let slow = |(k, e): (usize, &f64)| if k % 6 == 2 { *e } else { f64::NAN };
+        let mut slow: Vec<f64> = all.iter().enumerate().map(slow).collect();
+        assert_eq!(cycles(&slow), 37);
+        // One of its readings is lost; and the first half of them: the cycles are those in the whole record.
+        slow[602] = f64::NAN;
+        assert_eq!(cycles(&slow), 37);
+        slow[..600].fill(f64::NAN);
+        assert_eq!(cycles(&slow), 37);
+    }
 }

@@ -37,4 +37,12 @@ fn a_term_that_the_model_has_already_is_named_with_its_parameter() {
         found(&problem).absorbed,
         [of("again", Some("k")), of("both", None)]
     );
+    // A parameter that is known comes before the one that absorbs the term.
+    let spec = ModelSpec::parse(BLOCK).unwrap();
+    let problem = Problem::builder(spec, [record(BLOCK, 0.0, 0.1, 3)])
+        .candidate("again", with_term("q*u"))
+        .known("k", 0.8)
+        .build()
+        .unwrap();
+    assert_eq!(found(&problem).absorbed, [of("again", Some("g"))]);
 }

@@ -141,6 +141,30 @@ fn a_flow_between_two_states_is_named_beside_coloured_noise() {
     assert!(diagnosis.steps[0].rmse_per_output.len() == 2 && diagnosis.steps[0].rmse.is_none());
 }
 
+/// One output has twenty times the noise of the other one; the hidden effect raises the error of the quiet one by a third.
+#[test]
+fn an_effect_is_named_whatever_the_noise_of_the_other_output() {
+    let coupled = PAIR
+        .replace("k1*(T1 - 20)", "k1*(T1 - 20) - 0.008*(T1 - T2)")
+        .replace("k2*(T2 - 20)", "k2*(T2 - 20) + 0.008*(T1 - T2)");
+    for noisy in 0..2 {
+        let mut record = record(&coupled, 0.0, 0.1, 5);
+        let more = noise::white(ROWS, 2.0, &mut ChaCha8Rng::seed_from_u64(8));
+        let values = record.outputs[noisy].values.iter_mut();
+        for (value, more) in values.zip(more) {
+            *value += more;
+        }
+        let found = found(&problem(PAIR, record));
+        assert_eq!(
+            found.effects,
+            ["coupling(T1,T2)"],
+            "{noisy}: {:?}",
+            found.verdict
+        );
+        assert_ne!(found.verdict, Verdict::Partial);
+    }
+}
+
 #[test]
 fn nothing_is_named_where_nothing_is_missing() {
     for seed in 0..4 {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use approx::assert_relative_eq;
 use ct_model::{Method, Model, ModelSpec};
-use greybox::{IdealRecords, ideal_records};
+use greybox::{IdealRecords, NotIdeal, ideal_records};
 
 const BLOCK: &str = "model Block
   parameter Real C(unit=\"J/K\", min=0) = 50;
@@ -75,7 +75,19 @@ fn a_model_without_states_and_one_that_cannot_be_simulated() {
 end Gain;";
     let found = of(text, &[]);
     assert!(found.time_constants.is_empty() && found.not_determined.is_empty());
+    assert_eq!(found.assumed, [("u".to_string(), (0.0, 1.0))]);
     let text = text.replace("a*u + b", "a*log(-1 - u) + b");
-    let model = Model::new(ModelSpec::parse(&text).unwrap());
-    assert_eq!(ideal_records(&model, &BTreeMap::new()), None);
+    let of = |text: &str| {
+        let model = Model::new(ModelSpec::parse(text).unwrap());
+        ideal_records(&model, &BTreeMap::new())
+    };
+    assert_eq!(
+        of(&text.replace("log(-1 - u)", "log(0.5 - u)")),
+        Err(NotIdeal::Simulation)
+    );
+    assert_eq!(of(&text), Err(NotIdeal::Start));
+    assert_eq!(
+        of(&text.replace("log(-1 - u)", "delay(u, 2)")),
+        Err(NotIdeal::Delay)
+    );
 }

@@ -7,8 +7,16 @@ use effect_search::HeldOutError;
 
 use crate::{Error, PerOutput, Step, fit::node::Node};
 
-/// Samples of a held-out record for the fit of its initial levels, which are not scored.
-pub(crate) const HEAD: usize = 5;
+/// The begin of a held-out record, for the fit of its initial levels; it is not scored.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Head {
+    /// This number of samples of each output.
+    Samples(usize),
+    /// This number of rows.
+    Rows(usize),
+}
+
+pub(crate) const HEAD: Head = Head::Samples(5);
 
 /// Simulation of held-out records by a model.
 pub(crate) struct HeldOut {
@@ -18,43 +26,41 @@ pub(crate) struct HeldOut {
     pub outputs: Vec<(usize, f64, HeldOutError)>,
 }
 
-/// Rows until this number of samples of an output is present: the initial levels follow from them.
-fn head(output: &Channel, samples: usize) -> usize {
-    let present = output.values.iter().enumerate();
-    present
-        .filter(|(_, value)| !value.is_nan())
-        .nth(samples - 1)
-        .map_or(output.values.len(), |(last, _)| last + 1)
+/// Rows of the begin: the initial levels follow from them.
+fn rows_of(output: &Channel, head: Head) -> usize {
+    match head {
+        Head::Samples(samples) => {
+            let present = output.values.iter().enumerate();
+            present
+                .filter(|(_, value)| !value.is_nan())
+                .nth(samples - 1)
+                .map_or(output.values.len(), |(last, _)| last + 1)
+        }
+        Head::Rows(rows) => rows.min(output.values.len()),
+    }
 }
 
-/// A record up to the row where each of its outputs has this number of samples, without further samples.
-fn beginning(record: &Record, samples: usize) -> Record {
-    let rows = record.outputs.iter().map(|y| head(y, samples)).max();
+/// A record up to the end of the begin of every output, without further samples.
+fn beginning(record: &Record, head: Head) -> Record {
+    let rows = record.outputs.iter().map(|y| rows_of(y, head)).max();
     let rows = rows.unwrap_or(0);
     let mut begun = Record {
         references: Vec::new(),
         ..record.rows(0..rows)
     };
     for (output, whole) in begun.outputs.iter_mut().zip(&record.outputs) {
-        output.values[head(whole, samples)..].fill(f64::NAN);
+        output.values[rows_of(whole, head)..].fill(f64::NAN);
     }
     begun
 }
 
 /// Initial levels from the first samples with all other parameters fixed; scored on the rest.
-pub(crate) fn hold_out(
-    node: &Node,
-    test: &[Record],
-    samples: usize,
-) -> Result<Option<HeldOut>, Error> {
+pub(crate) fn hold_out(node: &Node, test: &[Record], head: Head) -> Result<Option<HeldOut>, Error> {
     if test.is_empty() {
         return Ok(None);
     }
     let parameters = &node.fit.x[..node.setup.parameter_count()];
-    let heads: Vec<Record> = test
-        .iter()
-        .map(|record| beginning(record, samples))
-        .collect();
+    let heads: Vec<Record> = test.iter().map(|record| beginning(record, head)).collect();
     let mut begun = node.setup.with_records(&heads)?;
     // A fit to a few samples takes no time, and an error from wrong levels would not be an error of the model.
     (begun.time_limit, begun.interrupt) = (None, None);
@@ -73,7 +79,7 @@ pub(crate) fn hold_out(
         let scored = scored.map(|(record, models)| {
             let measured = record.outputs[o].values.iter().copied();
             let pairs = measured.zip(models[o].iter().copied());
-            let pairs = pairs.skip(head(&record.outputs[o], samples));
+            let pairs = pairs.skip(rows_of(&record.outputs[o], head));
             pairs.filter(|(measured, _)| !measured.is_nan()).collect()
         });
         let scored: Vec<Vec<(f64, f64)>> = scored.collect();

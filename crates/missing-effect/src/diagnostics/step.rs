@@ -10,7 +10,7 @@ use crate::{
     Error, Parameter, PerOutput, Step,
     base::closed_loop::widened,
     diagnostics::{
-        held_out::{HEAD, hold_out},
+        held_out::{HEAD, Head, hold_out},
         residual_tests::input_p,
     },
     fit::{node::Node, noise_model::NOISE_ORDER},
@@ -113,11 +113,14 @@ pub(crate) fn report(
     let residuals = setup.residuals(&fit.x)?;
     let held_out = hold_out(node, test, HEAD)?;
     let are_long = |record: &Record| record.len() >= MOST_OF_RECORD * LATER_ROWS;
-    let later = if test.iter().all(are_long) {
-        hold_out(node, test, LATER_ROWS)?
-    } else {
-        None
-    };
+    // A model that has no finite simulation over so many rows has no such score.
+    let later = test
+        .iter()
+        .all(are_long)
+        .then(|| hold_out(node, test, Head::Rows(LATER_ROWS)).ok())
+        .flatten()
+        .flatten()
+        .filter(|later| later.outputs.iter().all(|(count, ..)| *count > 0));
     let count = setup.outputs();
     let first = &setup.records[0];
     let inputs: Vec<Signal> = first

@@ -1,0 +1,78 @@
+//! Where mechanical effects can act, and a stop.
+
+use std::path::Path;
+
+use ct_model::effects::{Visited, apply, candidates};
+use ct_model::{Model, ModelSpec};
+
+use super::driven::Driven;
+
+/// The speed of the motor in the library has the unit `1/s`, as many quantities have; torques are added in its equation.
+#[test]
+fn a_rate_that_torques_change_is_a_speed() {
+    let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/models");
+    let ids = |file: &str| -> Vec<String> {
+        let text = std::fs::read_to_string(library.join(file)).unwrap();
+        let spec = ModelSpec::parse(&text).unwrap();
+        let all = candidates(&spec, &Visited::nominal(&spec));
+        all.into_iter().map(|candidate| candidate.id).collect()
+    };
+    let has = |ids: &[String], id: &str| ids.iter().any(|own| own == id);
+    let motor = ids("dc-motor.mo");
+    for id in ["coulomb(w)", "stribeck(w)", "quadratic_drag(w)"] {
+        assert!(has(&motor, id), "{id} of {motor:?}");
+    }
+    assert!(!has(&motor, "coulomb(i)") && !motor.iter().any(|id| id.starts_with("end_stop")));
+    let spring = ids("mass-spring.mo");
+    assert!(has(&spring, "coulomb(v)") && has(&spring, "end_stop(v,x)"));
+    let fermenter = ids("bioreactor.mo");
+    assert!(!fermenter.iter().any(|id| id.starts_with("coulomb")));
+}
+
+/// A mass on a spring is pushed against a stop: it stays near it, rebounds less than from an elastic one, and the force is not less than zero.
+#[test]
+fn a_stop_ends_the_motion_and_takes_energy() {
+    let driven = Driven::all().swap_remove(1);
+    let all = driven.candidates();
+    let stop = all.iter().find(|c| c.id == "end_stop(v,s)").unwrap();
+    let model = Model::new(apply(&driven.spec, &[stop]).unwrap());
+    let position = |damping: f64| {
+        let mut parameters = model.parameters();
+        for (own, value) in [
+            ("side", 1.0),
+            ("bound", 0.3),
+            ("stiffness", 2000.0),
+            ("damping", damping),
+        ] {
+            let name = &stop
+                .parameters
+                .iter()
+                .find(|p| p.short == own)
+                .unwrap()
+                .name;
+            let at = model
+                .spec()
+                .parameters
+                .iter()
+                .position(|p| p.about.name == *name);
+            parameters[at.unwrap()] = value;
+        }
+        // Without the stop the force holds the mass at 1.5 m.
+        let force = vec![3.0; 4000];
+        model
+            .simulate(&parameters, 0.005, &[&force])
+            .unwrap()
+            .swap_remove(0)
+    };
+    let (elastic, damped) = (position(0.0), position(0.05));
+    let most = damped.iter().copied().fold(0.0, f64::max);
+    assert!(most > 0.3 && most < 0.33, "{most}");
+    let rest = damped.last().unwrap();
+    assert!((rest - (0.3 + 2.4 / 2002.0)).abs() < 1e-3, "{rest}");
+    let rebound = |x: &[f64]| {
+        let hit = x.iter().position(|x| *x > 0.3).unwrap();
+        x[hit..].iter().copied().fold(f64::INFINITY, f64::min)
+    };
+    assert!(rebound(&elastic) < 0.17, "{}", rebound(&elastic));
+    assert!(rebound(&damped) > 0.29, "{}", rebound(&damped));
+}

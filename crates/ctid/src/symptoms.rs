@@ -272,7 +272,7 @@ mod tests {
         for (said, effect) in [
             ("reads too high", "offset(y)"),
             ("the sensor reads too low", "offset(y)"),
-            ("end stop", "limit(x)"),
+            ("end stop", "end_stop(v,x)"),
             ("dead time", "delay(u)"),
             ("right at one level only", "varies_with(p,x)"),
         ] {

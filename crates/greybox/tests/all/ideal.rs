@@ -82,7 +82,7 @@ end Gain;";
         ideal_records(&model, &BTreeMap::new())
     };
     assert_eq!(
-        of(&text.replace("log(-1 - u)", "log(0.5 - u)")),
+        of(&text.replace("log(-1 - u)", "log(0.7 - u)")),
         Err(NotIdeal::Simulation)
     );
     assert_eq!(of(&text), Err(NotIdeal::Start));

@@ -64,7 +64,10 @@ impl<T: Scalar> SimulationState<T> {
                 sliding.add(tape, registers, difference);
                 self.work.evaluate_slopes(tape, drive);
                 let length = drive.interval.length;
-                if self.work.sliding.is_attractive(length, &self.largest) {
+                let Step {
+                    sliding, registers, ..
+                } = &self.work;
+                if sliding.is_attractive(registers, length, &self.largest) {
                     self.put_back(tape, drive);
                 } else {
                     let Step {

@@ -230,8 +230,11 @@ impl<T: Scalar> Sliding<T> {
     }
 
     /// Whether both sides drive the states onto the surface that was added last, by the slopes that were computed last.
-    pub fn is_attractive(&self, interval: f64, largest: &[f64]) -> bool {
+    pub fn is_attractive(&self, registers: &Registers<T>, interval: f64, largest: &[f64]) -> bool {
         let (n, m) = (largest.len(), self.surfaces.len());
+        if self.is_off(m - 1, registers, interval) {
+            return false;
+        }
         let row = &self.rates[(m - 1) * (m + 1)..];
         let share = self.share(m - 1);
         let jumps = |i: usize| {
@@ -241,15 +244,21 @@ impl<T: Scalar> Sliding<T> {
         row[m].value() < row[0].value() && share > 0.0 && share < 1.0 && (0..n).any(jumps)
     }
 
+    /// Whether the states are off a surface: something has made its difference jump.
+    fn is_off(&self, k: usize, registers: &Registers<T>, interval: f64) -> bool {
+        let row = &self.rates[k * (self.surfaces.len() + 1)..];
+        let rate = row[0].value().abs().max(row[k + 1].value().abs());
+        let difference = registers.values[self.surfaces[k].difference].value();
+        difference.abs() > OFF * interval * rate
+    }
+
     /// A guard on which sliding ends, and whether it becomes positive, by the slopes that were computed last.
     pub fn let_go(&self, registers: &Registers<T>, interval: f64) -> Option<(usize, bool)> {
         let m = self.surfaces.len();
         (0..m).find_map(|k| {
-            let row = &self.rates[k * (m + 1)..];
-            let rate = row[0].value().abs().max(row[k + 1].value().abs());
-            let difference = registers.values[self.surfaces[k].difference].value();
-            if difference.abs() > OFF * interval * rate {
-                return Some((k, difference > 0.0));
+            if self.is_off(k, registers, interval) {
+                let difference = registers.values[self.surfaces[k].difference];
+                return Some((k, difference.value() > 0.0));
             }
             let share = self.share(k);
             (!(0.0..=1.0).contains(&share)).then_some((k, share > 1.0))

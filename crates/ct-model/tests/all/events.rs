@@ -259,3 +259,29 @@ end Two;"#;
         }
     }
 }
+
+/// The first event makes the argument of the maximum jump: the maximum changes its branch there, and no state moves at once.
+#[test]
+fn a_guard_that_an_event_makes_jump_moves_no_state() {
+    let text = |right: &str| {
+        format!(
+            "model Jump
+  parameter Real p = 0.713;
+  input Real u;
+  output Real x(start=0.096, fixed=true);
+  Real z(start=0.409, fixed=true);
+equation
+  der(x) = tanh({right}) - 1.3*x;
+  der(z) = -0.3 - 2.3*z;
+end Jump;"
+        )
+    };
+    let one = text("max(if u > time + 0.137 then z else p, x)");
+    let other = text("if u > time + 0.137 then max(z, x) else max(p, x)");
+    let [one, other] = [one, other].map(|text| Case::new(&text, 12, 0.2, |_| vec![0.523]));
+    let ((one_rows, _), (other_rows, _)) = (one.plain(), other.plain());
+    for (a, b) in one_rows.iter().zip(&other_rows) {
+        assert!((a[0] - b[0]).abs() < 1e-9, "{a:?} {b:?}");
+    }
+    one.check_derivatives(1e-5);
+}

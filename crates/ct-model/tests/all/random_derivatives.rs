@@ -1,6 +1,7 @@
 //! Derivatives of random models, through whatever events their expressions have, against central differences.
 
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 use ct_model::{Dual, Model, ModelSpec, Scalar, Simulation, SimulationNumber};
 
@@ -14,6 +15,9 @@ const ERROR: f64 = 1e-5;
 /// ... at a row in which two central differences, of which one has half the step, agree within this share.
 const AGREE: f64 = 3e-6;
 
+/// Without the offset of a comparison, its two sides may touch without crossing, as `x` and `sin(x)` almost do at zero: the time of such an
+/// event is not determined.
+///
 /// An expression of the parameters `p0`..`p2`, the states `x0`.. and the input `u`.
 fn expression(states: usize) -> impl Strategy<Value = String> {
     let leaf = prop_oneof![
@@ -35,7 +39,7 @@ fn expression(states: usize) -> impl Strategy<Value = String> {
             inner.clone().prop_map(|a| format!("sin({a})")),
             inner.clone().prop_map(|a| format!("exp(-({a})^2)")),
             inner.prop_map(|a| format!("abs({a})")),
-            four.prop_map(|(a, b, c, d)| format!("(if {a} > {b} then {c} else {d})")),
+            four.prop_map(|(a, b, c, d)| format!("(if {a} > {b} + 0.137 then {c} else {d})")),
         ]
     })
 }
@@ -76,7 +80,8 @@ fn output<T: SimulationNumber>(model: &Model, parameters: &[T], initial: &[T]) -
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { max_shrink_iters: 200, ..ProptestConfig::default() })]
+    // The same models in every run.
+    #![proptest_config(ProptestConfig { max_shrink_iters: 200, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
     #[test]
     fn derivatives_are_those_of_differences(text in text()) {

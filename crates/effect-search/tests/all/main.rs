@@ -4,6 +4,7 @@
 mod absorbed;
 mod design;
 mod failures;
+mod heat;
 mod hidden;
 mod level_shift;
 mod quantisation;

@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_model::{About, Method, Model, Simulation};
+use ct_model::{About, Method, Model};
 use ct_signals::{Channel, Record, excitation};
 use estimation::{Residuals, Triangle};
 use nalgebra::DMatrix;
@@ -119,8 +119,10 @@ pub fn ideal_records(
             .map(|(low, high)| excitation::steps(SAMPLES, HELD, *low, *high, &mut rng).ok());
         let inputs: Vec<Vec<f64>> = inputs.collect::<Option<_>>().ok_or(NotIdeal::Simulation)?;
         let outputs;
-        (outputs, method) =
-            simulate(model, &parameters, interval, &inputs).ok_or(NotIdeal::Simulation)?;
+        let series: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+        (outputs, method) = model
+            .simulate_with_method(&parameters, interval, &series)
+            .map_err(|_| NotIdeal::Simulation)?;
         let channel =
             |(about, values): (&About, Vec<f64>)| Channel::new(&about.name, &about.unit, values);
         let names = spec.inputs.iter().map(|input| &input.about);
@@ -203,30 +205,4 @@ fn time_constants(
     let mut constants: Vec<f64> = rates.map(|rate| 1.0 / rate).collect();
     constants.sort_by(f64::total_cmp);
     Some(constants)
-}
-
-/// The outputs, and the method by which the last sample was computed.
-fn simulate(
-    model: &Model,
-    parameters: &[f64],
-    interval: f64,
-    inputs: &[Vec<f64>],
-) -> Option<(Vec<Vec<f64>>, Method)> {
-    let mut simulation = Simulation::new(model, parameters, &model.starts(parameters), 0.0);
-    let mut read = vec![0.0; model.spec().outputs.len()];
-    let mut outputs = vec![Vec::with_capacity(SAMPLES); read.len()];
-    let mut row = vec![0.0; inputs.len()];
-    for k in 0..SAMPLES {
-        for (value, input) in row.iter_mut().zip(inputs) {
-            *value = input[k];
-        }
-        simulation.read(&row, &mut read);
-        for (output, reading) in outputs.iter_mut().zip(&read) {
-            output.push(*reading);
-        }
-        simulation
-            .advance(&row, &row, interval * (k + 1) as f64)
-            .ok()?;
-    }
-    Some((outputs, simulation.method()))
 }

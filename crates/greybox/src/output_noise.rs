@@ -64,8 +64,8 @@ fn slowest(records: &[Record]) -> usize {
     slowest.unwrap_or(1)
 }
 
-/// Variance of the prediction error, with the penalty. This reduces the number of coefficients by `sum_j d_j (R'R)^-1_jj` (T. Hastie, R. Tibshirani,
-/// J. Friedman, The Elements of Statistical Learning, 2nd ed., 2009, equation 3.50), `d_j` the penalty of each.
+/// Variance of the prediction error, with the penalty. The effective number of coefficients is smaller by `sum_j d_j (R'R)^-1_jj`, where `d_j` is
+/// the penalty of each (T. Hastie, R. Tibshirani, J. Friedman, The Elements of Statistical Learning, 2nd ed., 2009, equation 3.50).
 fn prediction_variance(triangle: &Triangle, samples: usize) -> Option<f64> {
     let columns = triangle.columns() - 1;
     // The first column is the level: its entry in a row of R is the part of a column that is constant.

@@ -13,7 +13,7 @@ use estimation::{Noise, Residuals, Rows, linearise, within};
 use crate::Error;
 use crate::joined::Joined;
 use crate::node::{Context, Node};
-use crate::score::{DAMPING, Trial, thinned};
+use crate::score::{Trial, step_within, thinned};
 
 /// A start of the candidate's own parameters.
 struct Place {
@@ -73,7 +73,8 @@ impl Context<'_> {
             let scale = free
                 .iter()
                 .map(|&j| triangle.column_norm(j).max(f64::MIN_POSITIVE));
-            let step = triangle.solve(&free, &scale.collect::<Vec<f64>>(), DAMPING);
+            let scale: Vec<f64> = scale.collect();
+            let step = step_within(&triangle, (&setup, &x), &free, &scale);
             let mut stepped = x.clone();
             for (d, &at) in step.iter().zip(setup.free()) {
                 stepped[at] = within(stepped[at] + d, setup.bounds()[at]);

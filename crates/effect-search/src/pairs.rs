@@ -33,7 +33,10 @@ pub(crate) fn joint_scores(
     };
     let weights = &base.fit.weights;
     let every = every_nth(context, 3 * trials.len());
-    let Some(believed) = whitened(&own, (0..own.columns).collect(), noise, weights, every) else {
+    // A parameter at a bound does not leave it.
+    let mut chosen = base.fit.interior().to_vec();
+    chosen.push(own.columns - 1);
+    let Some(believed) = whitened(&own, chosen, noise, weights, every) else {
         return Vec::new();
     };
     let p = believed.ncols() - 1;

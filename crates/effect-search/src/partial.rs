@@ -32,8 +32,10 @@ struct Part {
     set: Node,
     /// The share of the error above the noise that it explains.
     share: f64,
-    /// The squared error of each output in the cross-validation; `None` if the set is no partial explanation.
+    /// The squared error of each output in the cross-validation; `None` if another rule rejects the set, or a simulation is not finite.
     left_out: Option<Vec<f64>>,
+    /// Whether it is a partial explanation.
+    accepted: bool,
 }
 
 impl Context<'_> {
@@ -75,7 +77,7 @@ impl Context<'_> {
                     !within || self.pays(part, less)
                 })
             };
-            let accepted = tested.iter().filter(|part| part.left_out.is_some());
+            let accepted = tested.iter().filter(|part| part.accepted);
             let more = accepted.filter(says_more);
             let more = more.filter(|part| best.as_ref().is_none_or(|less| self.pays(part, less)));
             if let Some(part) = more.max_by(|a, b| a.share.total_cmp(&b.share)) {
@@ -105,7 +107,7 @@ impl Context<'_> {
         set.added.len() + set.added.iter().filter(in_time).count()
     }
 
-    /// A set with the share of the error above the noise that it explains, and, if it is a partial explanation, with its squared error in
+    /// A set with the share of the error above the noise that it explains, and, if no other rule rejects it, with its squared error in
     /// the cross-validation. `base_left_out`: that of the base; `None` if one of its simulations is not finite.
     fn part(
         &self,
@@ -118,7 +120,7 @@ impl Context<'_> {
         let share = explained(&base.fit, &set.fit, &floors);
         let new = &set.added[base.added.len()..];
         let in_time = new.iter().any(|&i| self.candidates[i].follows_time());
-        let accepted = share
+        let plausible = share
             >= if in_time {
                 self.thresholds.partial_share_of_time
             } else {
@@ -132,19 +134,20 @@ impl Context<'_> {
                 .iter()
                 .zip(own_base.noise.iter())
                 .all(|(own, base)| own.sigma() <= self.thresholds.innovation_ratio * base.sigma());
-        let left_out = if accepted {
+        let left_out = if plausible {
             self.left_out_squares(&set)?
         } else {
             None
         };
-        let carried_over = |after: &Vec<f64>| {
-            base_left_out.map_or(0.0, |before| fall(before, after)) >= self.thresholds.carried_over
-        };
-        let left_out = left_out.filter(carried_over);
+        let accepted = left_out
+            .as_deref()
+            .zip(base_left_out)
+            .is_some_and(|(after, before)| fall(before, after) >= self.thresholds.carried_over);
         Ok(Part {
             set,
             share,
             left_out,
+            accepted,
         })
     }
 
@@ -238,14 +241,15 @@ impl Context<'_> {
     }
 }
 
-/// The relative fall of squared errors. Outputs have equal weight; an output without an error before is left out.
+/// The relative fall of squared errors: of several outputs, that of their geometric mean, as in a likelihood with a variance of each
+/// output. An output without an error before is left out.
 pub(crate) fn fall(before: &[f64], after: &[f64]) -> f64 {
     let pairs = before.iter().zip(after);
-    let ratios: Vec<f64> = pairs
+    let logarithms: Vec<f64> = pairs
         .filter(|(before, _)| **before > 0.0)
-        .map(|(before, after)| after / before)
+        .map(|(before, after)| (after / before).ln())
         .collect();
-    1.0 - ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+    1.0 - (logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64).exp()
 }
 
 /// The share of the mean squared error above the noise that a set explains. `floors`: standard deviation of each output's noise \[output

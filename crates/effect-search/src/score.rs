@@ -12,6 +12,7 @@ use std::sync::Arc;
 use ct_model::Model;
 use ct_model::effects::{Port, Role, best_of_each_choice};
 use estimation::{Noise, Residuals, Rows, Triangle, linearise, within};
+use greybox::ModelSetup;
 use rayon::prelude::*;
 
 use crate::Error;
@@ -20,7 +21,7 @@ use crate::node::{Context, Node};
 use crate::residual_tests::strongest_line;
 
 /// Damping of the predicted step, for directions that the data do not determine.
-pub(crate) const DAMPING: f64 = 1e-9;
+const DAMPING: f64 = 1e-9;
 /// Parts of the predicted step from which a fit may begin, as shares of it.
 const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
 
@@ -64,6 +65,19 @@ pub(crate) const QUANTISATION: &str = "quantisation";
 const STEP: &str = "step";
 /// Distances from the best instants at which further starts are scored, round by round, as shares of the longest record.
 const BETWEEN: [f64; 2] = [0.05, 0.025];
+
+/// The step of Gauss and Newton from a point. A parameter at a bound does not leave it: no candidate is credited with what it would explain
+/// beyond.
+pub(crate) fn step_within(
+    triangle: &Triangle,
+    (setup, x): (&ModelSetup, &[f64]),
+    free: &[usize],
+    scale: &[f64],
+) -> Vec<f64> {
+    let of_free = |at: &usize| (x[*at], setup.bounds()[*at]);
+    let (values, bounds): (Vec<f64>, Vec<(f64, f64)>) = setup.free().iter().map(of_free).unzip();
+    triangle.solve_from_bounds((&values, &bounds), free, scale, DAMPING)
+}
 
 impl Context<'_> {
     /// Periods of the strongest lines of a set's residuals, and half a line to either side \[unit of the model's time\].
@@ -221,7 +235,7 @@ impl Context<'_> {
             let scale: Vec<f64> = (0..setup.free().len())
                 .map(|j| triangle.column_norm(j).max(f64::MIN_POSITIVE))
                 .collect();
-            let step = triangle.solve(&free, &scale, DAMPING);
+            let step = step_within(&triangle, (&setup, &x), &free, &scale);
             let predicted = triangle.predicted(&step);
             let mut stepped = x.clone();
             for (d, &at) in step.iter().zip(setup.free()) {

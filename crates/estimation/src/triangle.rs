@@ -214,6 +214,47 @@ impl Triangle {
         step
     }
 
+    /// As [`Triangle::solve`], within bounds for the parameters that are at one: a step that would leave it leaves the parameter there, and
+    /// the others are solved for again. `x`, `bounds`: of every parameter, at the point of linearisation.
+    ///
+    /// ```
+    /// use estimation::Triangle;
+    ///
+    /// // Two collinear columns; the first parameter is at its lower bound.
+    /// let mut triangle = Triangle::new(3);
+    /// for row in [[1.0, 1.0, -2.0], [2.0, 2.0, -4.0]] {
+    ///     triangle.push(&row);
+    /// }
+    /// triangle.finish();
+    /// let bounds = [(0.0, 1.0), (-9.0, 9.0)];
+    /// let step = triangle.solve_from_bounds((&[0.0, 0.0], &bounds), &[0, 1], &[1.0, 1.0], 1e-9);
+    /// assert_eq!(step[0], 0.0);
+    /// assert!((step[1] + 2.0).abs() < 1e-6);
+    /// ```
+    #[must_use]
+    pub fn solve_from_bounds(
+        &self,
+        (x, bounds): (&[f64], &[(f64, f64)]),
+        free: &[usize],
+        scale: &[f64],
+        damping: f64,
+    ) -> Vec<f64> {
+        let mut free = free.to_vec();
+        loop {
+            let step = self.solve(&free, scale, damping);
+            let leaves = |&&j: &&usize| {
+                let (lower, upper) = bounds[j];
+                x[j] <= lower && step[j] < 0.0 || x[j] >= upper && step[j] > 0.0
+            };
+            let length = |j: usize| (scale[j] * step[j]).abs();
+            let leaving = free.iter().filter(leaves).copied();
+            match leaving.max_by(|&a, &b| length(a).total_cmp(&length(b))) {
+                Some(leaving) => free.retain(|&j| j != leaving),
+                None => return step,
+            }
+        }
+    }
+
     /// `|J x - r|^2`; for several outputs the cost of the residual of each ([`Squares::cost`]).
     #[must_use]
     pub fn predicted(&self, x: &[f64]) -> f64 {

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod absorbed;
+mod at_a_bound;
 mod design;
 mod failures;
 mod heat;

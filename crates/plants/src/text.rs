@@ -7,8 +7,8 @@ use ct_model::{
 };
 use ct_signals::Record;
 
-use crate::effects::CATALOGUE;
-use crate::{Domain, EffectInfo, Known, Plant};
+use crate::effects::{CATALOGUE, Place};
+use crate::{Domain, EffectInfo, Known, Placed, Plant};
 
 impl Plant {
     /// The plant as the text of a model ([`ct_model::ModelSpec::parse`]): its fitted parameters in the order of [`Plant::parameters`], its
@@ -97,14 +97,25 @@ impl Plant {
             .collect()
     }
 
+    /// The effects at ports of the plant's text that an effect of the catalogue at its place can be: `dead_zone(u)` of `pump_deadzone`.
+    #[must_use]
+    pub fn at_ports(self, spec: &ModelSpec, placed: &Placed) -> Vec<String> {
+        let all = candidates(spec, &Visited::nominal(spec)).into_iter();
+        let ids = all.map(|candidate| candidate.id);
+        ids.filter(|id| self.names_of(spec, id).contains(&placed.effect.id))
+            .filter(|id| {
+                let port = ports(id).next();
+                port.is_some_and(|port| index_of(self, spec, placed, port) == Some(placed.vessel))
+            })
+            .collect()
+    }
+
     /// The effects of the catalogue that an effect at a port of the plant's text is; empty if it is none. A constant error of the reading is
     /// both `sensor_offset` and, in the only measured vessel, `pipe_height`.
     #[must_use]
     pub fn names_of(self, spec: &ModelSpec, id: &str) -> Vec<&'static str> {
-        let Some((effect, ports)) = id.trim_end_matches(')').split_once('(') else {
-            return Vec::new();
-        };
-        let ports: Vec<char> = ports.split(',').map(|name| kind(spec, name)).collect();
+        let effect = id.split('(').next().unwrap_or(id);
+        let ports: Vec<char> = ports(id).map(|name| kind(spec, name)).collect();
         let is = |pattern: &&str| {
             let (own, at) = pattern
                 .trim_end_matches(')')
@@ -127,6 +138,32 @@ impl Plant {
             .filter(applies)
             .map(|info| info.id)
             .collect()
+    }
+}
+
+/// The names of the variables that an effect acts at.
+fn ports(id: &str) -> impl Iterator<Item = &str> {
+    let names = id.trim_end_matches(')').split_once('(');
+    names.into_iter().flat_map(|(_, names)| names.split(','))
+}
+
+/// The index of the vessel, of the pump or of the output that a variable belongs to, as in [`Placed::vessel`]. Variables of one kind are in
+/// the order of the vessels; the last vessel has an outflow in every plant.
+fn index_of(plant: Plant, spec: &ModelSpec, placed: &Placed, name: &str) -> Option<usize> {
+    let own = kind(spec, name);
+    match spec.find(name)? {
+        Variable::State(_) if placed.effect.place == Place::Sensor => {
+            let mut outputs = spec.outputs.iter();
+            outputs.position(|output| spec.about(output.variable).name == name)
+        }
+        Variable::State(vessel) => Some(vessel),
+        Variable::Input(pump) => Some(pump),
+        Variable::Flow(flow) => Some(plant.vessels() - spec.flows.len() + flow),
+        Variable::Parameter(_) => {
+            let names = spec.parameters.iter().map(|p| p.about.name.as_str());
+            let mut of_kind = names.filter(|name| kind(spec, name) == own);
+            of_kind.position(|other| other == name)
+        }
     }
 }
 
@@ -246,6 +283,30 @@ mod tests {
             tank.general_effects(&tank.spec(&Known::default()).unwrap())
                 .contains(&"step(level)".to_string())
         );
+    }
+
+    #[test]
+    fn an_effect_at_its_place_has_ports_of_that_place() {
+        let at_ports = |plant: Plant, id: &str, vessel: usize| {
+            let spec = plant.spec(&Known::default()).unwrap();
+            let effect = EffectInfo::find(id).unwrap();
+            plant.at_ports(&spec, &Placed { effect, vessel })
+        };
+        let tanks = Plant::CascadedTanks;
+        assert_eq!(at_ports(tanks, "pump_deadzone", 0), ["dead_zone(u)"]);
+        assert_eq!(at_ports(tanks, "valve_drift", 1), ["drift(alpha_lower)"]);
+        assert_eq!(
+            at_ports(tanks, "overflow", 0),
+            ["overflow(level_upper,level_lower)", "limit(level_upper)"]
+        );
+        assert_eq!(at_ports(tanks, "overflow", 1), ["limit(level_lower)"]);
+        assert_eq!(at_ports(tanks, "sensor_lag", 0), ["lag(level_lower)"]);
+        let linear = Plant::CascadedTanksLinear;
+        assert_eq!(at_ports(linear, "valve_drift", 1), ["drift(outflow)"]);
+        assert!(at_ports(linear, "valve_drift", 0).is_empty());
+        let three = Plant::ThreeTank;
+        assert_eq!(at_ports(three, "pump_lag", 1), ["lag(u2)"]);
+        assert_eq!(at_ports(three, "valve_step", 1), ["step(az32)"]);
     }
 
     #[test]

@@ -27,8 +27,7 @@ pub(super) struct Export {
     /// Records (CSV) that the model is fitted to; without one --modelica writes the values of the text and of [known]
     #[arg(value_name = "DATA.csv")]
     data: Vec<PathBuf>,
-    /// Write the model with its fitted values as Modelica, standard errors in comments: one of your own, or a plant of one input and one
-    /// output without effects
+    /// Write the model with its effects and fitted values as Modelica, standard errors in comments
     #[arg(long, value_name = "F.mo")]
     modelica: Option<PathBuf>,
     /// Write record, time, inputs, and of each output what was measured, the model and the residual
@@ -59,11 +58,6 @@ impl Export {
         let curves = self.csv.as_deref().map(|path| (Kind::Record, path));
         let wanted: Vec<(Kind, &Path)> = text.into_iter().chain(curves).collect();
         let outputs = output::plan(&wanted, &inputs)?;
-        if let (AnyModelFile::Plant(model), Some(_)) = (&model, &self.modelica)
-            && let Some(why) = simulate::no_text(model)
-        {
-            return Err(Error::file(&self.model, why));
-        }
         if let (AnyModelFile::Plant(_), []) = (&model, &self.data[..]) {
             return Err(Error::file(
                 &self.model,
@@ -80,7 +74,7 @@ impl Export {
                     interrupt: Some(interrupt::flag()),
                     ..Options::default()
                 };
-                simulate::export_plant(*model, &files, &options)
+                simulate::export_plant(*model, &files, &options, self.modelica.is_some())
             }
             AnyModelFile::Own(model) => {
                 let records = match self.data.is_empty() {

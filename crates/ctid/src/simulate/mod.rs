@@ -7,12 +7,13 @@
 //! | the inputs, read and checked | `inputs.rs` |
 //! | what a person reads | `text.rs` |
 //!
-//! `ctid export` shares its time column and its fits: `curves.rs`, `plant_export.rs`, `own_model/export.rs`.
+//! `ctid export` shares its time column and its fits: `curves.rs`, `plant_export.rs`, `plant_text.rs`, `own_model/export.rs`.
 
 mod curves;
 mod inputs;
 mod plant;
 mod plant_export;
+mod plant_text;
 mod text;
 mod time_column;
 
@@ -25,7 +26,7 @@ pub(crate) use self::inputs::{
 };
 pub use self::plant::of_plant;
 pub(crate) use self::plant::simulate as simulate_plant;
-pub(crate) use self::plant_export::{export as export_plant, no_text};
+pub(crate) use self::plant_export::export as export_plant;
 pub(crate) use self::text::said;
 pub use self::time_column::TimeColumn;
 use crate::output::Found;

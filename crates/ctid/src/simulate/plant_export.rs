@@ -4,6 +4,7 @@ use ct_model::Expression;
 use ct_signals::{Heading, ReadSummary};
 use missing_effect::{Options, Problem};
 
+use super::plant_text::with_effects;
 use super::{Curves, FittedRecord, TimeColumn};
 use crate::Error;
 use crate::input::{Files, Input};
@@ -11,18 +12,8 @@ use crate::model_file::ModelFile;
 use crate::numbers;
 use crate::own_model::{Exported, commented};
 
-/// Reason why a plant cannot be written as Modelica; `None` if it can.
-pub(crate) fn no_text(model: &ModelFile) -> Option<&'static str> {
-    (!model.effects.is_empty() || !model.terms.is_empty()).then_some(
-        "--modelica: a plant with effects cannot be written as Modelica yet; write its curves with --csv",
-    )
-}
-
-/// The text of a plant with fitted values: names and values of its parameters, then of its levels. `None` with effects.
+/// The text of a plant with fitted values: names and values of its parameters, then of its levels.
 fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> Option<String> {
-    if !problem.effects.is_empty() || !problem.terms.is_empty() {
-        return None;
-    }
     let mut record = problem.records[0].clone();
     let mut spec = problem.plant.spec_of(&problem.known, &mut record).ok()?;
     let names: Vec<String> = problem.records.iter().map(|r| r.name.clone()).collect();
@@ -51,7 +42,7 @@ fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> 
     Some(commented(&head, &spec))
 }
 
-/// Fits a plant with its effects to records, and returns the curves and, where the plant can be written so, its Modelica text.
+/// Fits a plant with its effects to records, and returns the curves and, if wanted, its Modelica text.
 ///
 /// # Errors
 /// One line that names the file, the place and the correction.
@@ -59,8 +50,10 @@ pub(crate) fn export(
     model: ModelFile,
     files: &Files,
     options: &Options,
+    with_text: bool,
 ) -> Result<(Exported, Vec<ReadSummary>), Error> {
     let (columns, name) = (model.columns.clone(), model.plant.id().to_string());
+    let hold = model.hold;
     let Input { problem, summaries } = files.read_with(model)?;
     let first = &problem.records[0];
     let name_of = |names: &[String], i: usize, channel: &ct_signals::Channel| {
@@ -95,6 +88,11 @@ pub(crate) fn export(
     let (records, model, text) = fitted
         .map_err(|error| files.blame(error))?
         .map_err(|error: greybox::Error| files.blame(error.into()))?;
+    let text = match with_text {
+        false => None,
+        true if problem.effects.is_empty() && problem.terms.is_empty() => text,
+        true => Some(with_effects(&problem, (&columns, hold), files, options)?),
+    };
     let mut all = Vec::new();
     for (record, model) in records.into_iter().zip(model.chunks(outputs.len())) {
         let path = files

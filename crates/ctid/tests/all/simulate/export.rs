@@ -83,14 +83,6 @@ fn what_cannot_be_exported_is_refused_in_one_line() {
             "DATA.csv",
         ],
     );
-    place.write(
-        "tank.toml",
-        "plant = \"single-tank\"\neffects = [\"overflow\"]\n",
-    );
-    place.refuses(
-        "export tank.toml --modelica t.mo",
-        &["a plant with effects"],
-    );
 }
 
 #[test]
@@ -119,6 +111,42 @@ fn the_curves_of_a_plant_are_exported() {
     let compared = place.result("compare tour.csv --model tour.toml");
     let rmse = compared["steps"][0]["rmse"].as_f64().unwrap();
     assert!((rms / rmse - 1.0).abs() < 1e-6, "{rms} {rmse}");
+}
+
+/// The effect of the bundled record, as the effect at a port of the plant's text.
+#[test]
+fn a_plant_with_an_effect_is_exported_as_modelica() {
+    let place = Place::new();
+    place.succeeds("add overflow --model tour.toml");
+    place.succeeds("export tour.toml tour.csv --modelica mended.mo");
+    let text = place.read("mended.mo");
+    assert!(
+        text.contains("fitted to tour.csv") && text.contains("limit_level"),
+        "{text}"
+    );
+    place.succeeds("check mended.mo");
+    place.write(
+        "mended.toml",
+        "model = \"mended.mo\"\n[columns]\ntime = \"t [s]\"\nu = \"u [V]\"\nlevel = \"y [cm]\"\n",
+    );
+    // The text is fitted already: another fit of it has the same error, and that of the plant.
+    let of_plant = place.result("compare tour.csv --model tour.toml");
+    let of_plant = of_plant["steps"][0]["rmse"].as_f64().unwrap();
+    let of_text = place.result("compare tour.csv --model mended.toml");
+    let of_text = of_text["steps"][0]["rmse"].as_f64().unwrap();
+    assert!(
+        (of_text / of_plant - 1.0).abs() < 0.01,
+        "{of_text} {of_plant}"
+    );
+    // The root is no effect at a port of the linear text: its error is not that of the plant.
+    place.write(
+        "linear.toml",
+        "plant = \"single-tank-linear\"\neffects = [\"sqrt_outflow\"]\n[columns]\ntime = \"t [s]\"\ninput = \"u [V]\"\noutput = \"y [cm]\"\n",
+    );
+    place.refuses(
+        "export linear.toml tour.csv --modelica linear.mo",
+        &["linear.toml: --modelica: ", "--csv"],
+    );
 }
 
 /// With a measured flow into the lower tank, of which both levels are read.

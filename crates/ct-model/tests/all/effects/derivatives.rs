@@ -110,7 +110,7 @@ fn check_derivatives(driven: &Driven, candidate: &Candidate, at: &[f64], toleran
 fn derivatives_are_those_of_differences() {
     for driven in Driven::all() {
         for candidate in driven.with_shapes() {
-            check_derivatives(&driven, &candidate, &active(&candidate), 1e-4);
+            check_derivatives(&driven, &candidate, &active(&candidate), 1e-5);
         }
     }
 }
@@ -120,7 +120,9 @@ fn derivatives_where_the_effect_is_absent_are_those_of_differences() {
     for driven in Driven::all() {
         for candidate in driven.with_shapes().iter().filter(|c| c.is_smooth()) {
             let absent: Vec<f64> = candidate.parameters.iter().map(|p| p.absent).collect();
-            check_derivatives(&driven, candidate, &absent, 1e-4);
+            // A step does not end at the knots of a function of zeros, where the slope of its derivatives jumps.
+            let tolerance = if candidate.is_shape() { 2e-4 } else { 1e-5 };
+            check_derivatives(&driven, candidate, &absent, tolerance);
         }
     }
 }

@@ -33,7 +33,7 @@ pub(crate) fn joint_scores(
     };
     let weights = &base.fit.weights;
     let every = every_nth(context, 3 * trials.len());
-    // A parameter at a bound does not leave it.
+    // A parameter at a bound stays there.
     let mut chosen = base.fit.interior().to_vec();
     chosen.push(own.columns - 1);
     let Some(believed) = whitened(&own, chosen, noise, weights, every) else {

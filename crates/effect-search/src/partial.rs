@@ -267,3 +267,19 @@ pub(crate) fn explained(base: &Fit, last: &Fit, floors: &[f64]) -> f64 {
     }
     ((before - after.max(1.0)) / (before - 1.0)).clamp(0.0, 1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::fall;
+
+    #[test]
+    fn outputs_count_alike_whether_they_become_better_or_worse() {
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        close(fall(&[4.0], &[1.0]), 0.75);
+        // One is four times better, the other four times worse: neither a fall nor a rise.
+        close(fall(&[4.0, 1.0], &[1.0, 4.0]), 0.0);
+        close(fall(&[1.0, 1.0], &[0.25, 1.0]), 0.5);
+        // Of an output without an error nothing is known.
+        close(fall(&[0.0, 2.0], &[0.0, 1.0]), 0.5);
+    }
+}

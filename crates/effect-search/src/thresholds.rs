@@ -135,8 +135,8 @@ pub struct Thresholds {
     /// Or if each further effect reduces the squared error in the cross-validation to at most this share of the smaller set's: either
     /// criterion is sufficient (0 to 1). Chosen.
     pub partial_left_out: f64,
-    /// Smallest share of the mean squared error that a set has to explain on parts of the records to which it was not fitted (0 to 1).
-    /// Chosen.
+    /// Smallest share of the squared error, of several outputs of their geometric mean, that a set has to explain on parts of the records
+    /// to which it was not fitted (0 to 1). Chosen.
     pub carried_over: f64,
     /// Number of folds of the cross-validation: parts of each record, each of which is left out in turn (2 or more). Chosen.
     pub folds: usize,

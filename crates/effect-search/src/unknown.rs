@@ -27,8 +27,8 @@ pub struct PortScore {
     pub effect: String,
     /// Fall of the criterion against the last model, with white noise.
     pub bic_gain: f64,
-    /// Fall of the mean squared error on parts of the records that the function was not fitted to; negative for a rise, `None` if it was
-    /// not computed.
+    /// Fall of the squared error on parts of the records that the function was not fitted to, of several outputs that of their geometric
+    /// mean; negative for a rise, `None` if it was not computed.
     pub share_left_out: Option<f64>,
 }
 
@@ -45,7 +45,7 @@ pub struct Unknown {
     pub unit: String,
     /// Share of the mean squared error above the noise that the function explains in addition to the last model.
     pub share: f64,
-    /// Fall of the mean squared error on parts of the records that the function was not fitted to; `None` if it was not computed.
+    /// As [`PortScore::share_left_out`].
     pub share_left_out: Option<f64>,
     /// Simulation error with it, by output \[unit of the output\].
     pub rmse_per_output: BTreeMap<String, f64>,

@@ -10,6 +10,8 @@ use crate::Squares;
 
 /// Rows are collected in blocks and processed by Householder reflections.
 const BLOCK: usize = 128;
+/// Share of a step that has to be within the bounds of its parameter.
+const ROOM: f64 = 0.01;
 
 /// The triangular factor `R` of all rows pushed so far: `R'R = sum row row'`. Each row is `[j_1 .. j_p, r]`, so the
 /// last column holds the residual's coordinates.
@@ -214,8 +216,9 @@ impl Triangle {
         step
     }
 
-    /// As [`Triangle::solve`], within bounds for the parameters that are at one: a step that would leave it leaves the parameter there, and
-    /// the others are solved for again. `x`, `bounds`: of every parameter, at the point of linearisation.
+    /// As [`Triangle::solve`], within bounds for the parameters that are at one: where less than a hundredth of a step is within its bound,
+    /// the parameter stays as it is, and the others are solved for again, the longest such step first. Other steps are not shortened. `x`,
+    /// `bounds`: of every parameter, at the point of linearisation.
     ///
     /// ```
     /// use estimation::Triangle;
@@ -243,8 +246,8 @@ impl Triangle {
         loop {
             let step = self.solve(&free, scale, damping);
             let leaves = |&&j: &&usize| {
-                let (lower, upper) = bounds[j];
-                x[j] <= lower && step[j] < 0.0 || x[j] >= upper && step[j] > 0.0
+                let ((lower, upper), begun) = (bounds[j], x[j] + ROOM * step[j]);
+                begun < lower && step[j] < 0.0 || begun > upper && step[j] > 0.0
             };
             let length = |j: usize| (scale[j] * step[j]).abs();
             let leaving = free.iter().filter(leaves).copied();

@@ -102,10 +102,13 @@ impl Plant {
     pub fn at_ports(self, spec: &ModelSpec, placed: &Placed) -> Vec<String> {
         let all = candidates(spec, &Visited::nominal(spec)).into_iter();
         let ids = all.map(|candidate| candidate.id);
+        let is_here = |name: &str| index_of(self, spec, placed, name) == Some(placed.vessel);
         ids.filter(|id| self.names_of(spec, id).contains(&placed.effect.id))
             .filter(|id| {
-                let port = ports(id).next();
-                port.is_some_and(|port| index_of(self, spec, placed, port) == Some(placed.vessel))
+                let mut names = ports(id);
+                // A parameter varies with a signal of its own vessel or pump; other pairs of ports are those of two vessels.
+                let here = names.next().is_some_and(is_here);
+                here && (!id.starts_with("varies_with") || names.all(is_here))
             })
             .collect()
     }
@@ -302,10 +305,18 @@ mod tests {
         assert_eq!(at_ports(tanks, "overflow", 1), ["limit(level_lower)"]);
         assert_eq!(at_ports(tanks, "sensor_lag", 0), ["lag(level_lower)"]);
         let linear = Plant::CascadedTanksLinear;
+        assert_eq!(
+            at_ports(linear, "area_varies", 0),
+            ["varies_with(tau1,level_upper)"]
+        );
         assert_eq!(at_ports(linear, "valve_drift", 1), ["drift(outflow)"]);
         assert!(at_ports(linear, "valve_drift", 0).is_empty());
         let three = Plant::ThreeTank;
         assert_eq!(at_ports(three, "pump_lag", 1), ["lag(u2)"]);
+        assert_eq!(
+            at_ports(three, "pump_nonlinearity", 1),
+            ["nonlinearity(u2)", "varies_with(pump_gain_2,u2)"]
+        );
         assert_eq!(at_ports(three, "valve_step", 1), ["step(az32)"]);
     }
 

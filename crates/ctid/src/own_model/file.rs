@@ -87,14 +87,6 @@ pub struct Records {
     pub summaries: Vec<ct_signals::ReadSummary>,
 }
 
-/// Records without missing inputs: one is held for a row, and a longer gap splits the record.
-pub(crate) fn without_gaps(records: &[Record]) -> Vec<Record> {
-    let parts = records
-        .iter()
-        .map(|record| record.without_gaps(1.5 * record.sample_interval()).0);
-    parts.flatten().collect()
-}
-
 /// A model file of a plant or of a user's own model.
 pub enum AnyModelFile {
     /// The file names one of the plants.
@@ -225,9 +217,16 @@ impl OwnModelFile {
         crate::input::on_one_clock(&mut all);
         crate::input::check_clocks(&all[..fitted], &summaries)?;
         let test = all.split_off(fitted);
+        // A missing input is held for one row; a longer gap splits the record.
+        let whole = |records: Vec<Record>| -> Vec<Record> {
+            let parts = records
+                .iter()
+                .map(|record| record.without_gaps(1.5 * record.sample_interval()).0);
+            parts.flatten().collect()
+        };
         Ok(Records {
-            records: without_gaps(&all),
-            test: without_gaps(&test),
+            records: whole(all),
+            test: whole(test),
             time_unit,
             summaries,
         })

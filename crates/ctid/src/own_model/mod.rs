@@ -45,7 +45,7 @@ pub use self::effects::OwnEffects;
 pub use self::export::text;
 pub(crate) use self::export::{Exported, commented, export};
 pub use self::file::{AnyModelFile, OwnModelFile, OwnSettings, Records};
-pub(crate) use self::file::{conversion, read_model, without_gaps};
+pub(crate) use self::file::{conversion, read_model};
 pub use self::fitted::{FitLimit, FittedModel, OutputScore};
 pub(crate) use self::identify::{Beside, OneByOne};
 pub use self::problem::RecordNumbers;

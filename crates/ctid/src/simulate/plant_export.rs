@@ -4,7 +4,7 @@ use ct_model::Expression;
 use ct_signals::{Heading, ReadSummary};
 use missing_effect::{Options, Problem};
 
-use super::plant_text::with_effects;
+use super::plant_text::AtPorts;
 use super::{Curves, FittedRecord, TimeColumn};
 use crate::Error;
 use crate::input::{Files, Input};
@@ -22,6 +22,7 @@ fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> 
         problem.plant.id(),
         names.join(", ")
     )];
+    head.push("Time is in seconds.".to_string());
     head.push("Standard errors (fitted values are below):".to_string());
     for parameter in &mut spec.parameters {
         let name = &parameter.about.name;
@@ -42,6 +43,18 @@ fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> 
     Some(commented(&head, &spec))
 }
 
+/// The root mean square of the simulation error of a plant at each output, on the measured command.
+fn errors_on_command(
+    problem: &Problem,
+    options: &Options,
+) -> Result<Vec<f64>, missing_effect::Error> {
+    let options = Options {
+        simulate_loop: false,
+        ..*options
+    };
+    missing_effect::fitted(problem, &options, |fitted| fitted.fit.rmse.clone())
+}
+
 /// Fits a plant with its effects to records, and returns the curves and, if wanted, its Modelica text.
 ///
 /// # Errors
@@ -55,6 +68,11 @@ pub(crate) fn export(
     let (columns, name) = (model.columns.clone(), model.plant.id().to_string());
     let hold = model.hold;
     let Input { problem, summaries } = files.read_with(model)?;
+    let plain = problem.effects.is_empty() && problem.terms.is_empty();
+    let at_ports = match with_text && !plain {
+        true => Some(AtPorts::of(&problem, files)?),
+        false => None,
+    };
     let first = &problem.records[0];
     let name_of = |names: &[String], i: usize, channel: &ct_signals::Channel| {
         let named = names.get(i).filter(|name| !name.is_empty());
@@ -83,15 +101,23 @@ pub(crate) fn export(
             fitted.setup.records.to_vec(),
             model,
             text(&problem, &values, &errors),
+            fitted.fit.rmse.clone(),
         ))
     });
-    let (records, model, text) = fitted
+    let (records, model, text, rmse) = fitted
         .map_err(|error| files.blame(error))?
         .map_err(|error: greybox::Error| files.blame(error.into()))?;
-    let text = match with_text {
-        false => None,
-        true if problem.effects.is_empty() && problem.terms.is_empty() => text,
-        true => Some(with_effects(&problem, (&columns, hold), files, options)?),
+    let text = match at_ports {
+        None => text,
+        Some(at_ports) => {
+            let errors = match problem.controller {
+                None => rmse,
+                // The text is simulated on the measured command.
+                Some(_) => errors_on_command(&problem, options).map_err(|e| files.blame(e))?,
+            };
+            let read = (&columns, hold);
+            Some(at_ports.fitted(&problem, &records, read, &errors, (files, options))?)
+        }
     };
     let mut all = Vec::new();
     for (record, model) in records.into_iter().zip(model.chunks(outputs.len())) {

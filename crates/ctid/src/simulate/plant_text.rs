@@ -1,146 +1,184 @@
 //! The text of a plant with effects, fitted to its records.
 //!
 //! Each effect of the catalogue becomes the effect at a port of the plant's text that it is. Where an effect can act at several ports
-//! (`drift(alpha)`, `drift(outflow)`) all are fitted, and the one with the least error is written. The error has to be that of the plant.
+//! (`nonlinearity(u)`, `varies_with(pump_gain,u)`) all are fitted, and the one with the least error is written. The error must not be larger
+//! than that of the plant.
 
-use std::collections::BTreeMap;
-
-use ct_signals::{Columns, Hold};
+use ct_model::ModelSpec;
+use ct_signals::{Columns, Hold, Record};
 use greybox::FitOptions;
 use missing_effect::{Options, Problem};
 use rayon::prelude::*;
 
 use crate::input::Files;
-use crate::own_model::{FitLimit, FittedModel, OwnModelFile, OwnSettings, Records, without_gaps};
+use crate::own_model::{FitLimit, FittedModel, OwnModelFile, OwnSettings, Records};
 use crate::{Error, numbers};
 
-/// Largest relative difference between the simulation errors of the plant and of its text.
+/// Largest relative difference by which the simulation error of the text may be above that of the plant.
 const SAME_ERROR: f64 = 0.01;
+/// A difference of errors is rounding below this share of the largest reading.
+const ROUNDING: f64 = 1e-6;
 /// Largest number of combinations of ports.
 const MOST_FITS: usize = 64;
+
+/// The text of a plant, and the sets of effects at its ports that its effects can be.
+pub(super) struct AtPorts {
+    spec: ModelSpec,
+    sets: Vec<Vec<String>>,
+}
 
 fn refused(files: &Files, why: &str) -> Error {
     let what = format!("--modelica: {why}; write its curves with --csv");
     Error::file(&files.model, &what)
 }
 
-/// The text of a plant with its effects, with fitted values and their standard errors. `columns`, `hold`: those of the model file.
-///
-/// # Errors
-/// Where an effect is none of the text's, or the text does not fit as well as the plant.
-pub(super) fn with_effects(
-    problem: &Problem,
-    (columns, hold): (&Columns, Hold),
-    files: &Files,
-    options: &Options,
-) -> Result<String, Error> {
-    let refuse = |why: String| Err(refused(files, &why));
-    let plant = problem.plant;
-    if !problem.terms.is_empty() {
-        return refuse("a term of your own has no port of the plant's text".to_string());
-    }
-    let (mut records, mut spec) = (problem.records.clone(), None);
-    for record in &mut records {
-        let own = plant
-            .spec_of(&problem.known, record)
-            .map_err(|error| Error::Usage(error.to_string()))?;
-        spec.get_or_insert(own);
-        record.references.clear();
-    }
-    let Some(spec) = spec else {
-        return refuse("there is no record".to_string());
-    };
-    let of_text = |name: &str| spec.find(name).is_some();
-    let numbers_of = problem.priors.keys().chain(&problem.fixed);
-    if let Some(name) = numbers_of.into_iter().find(|name| !of_text(name)) {
-        return refuse(format!(
-            "{name} has a prior or a fixed value, and is no parameter of the plant's text"
-        ));
-    }
-    let mut sets: Vec<Vec<String>> = vec![Vec::new()];
-    for placed in &problem.effects {
-        let ports = plant.at_ports(&spec, placed);
-        if ports.is_empty() {
+impl AtPorts {
+    /// The effects of a plant at the ports of its text; looked for before anything is fitted.
+    ///
+    /// # Errors
+    /// Where an effect is none of the text's, or the model file holds what the text has no parameter for.
+    pub(super) fn of(problem: &Problem, files: &Files) -> Result<Self, Error> {
+        let refuse = |why: String| Err(refused(files, &why));
+        let plant = problem.plant;
+        if let Some(term) = problem.terms.first() {
             return refuse(format!(
-                "{} is no effect at a port of the text of {}",
-                placed.effect.id,
+                "the term {} of your own has no place in the text of {}",
+                term.name,
                 plant.id()
             ));
         }
-        let with_each = sets.iter().flat_map(|set| {
-            ports.iter().map(|port| {
-                let mut set = set.clone();
-                set.push(port.clone());
-                set
-            })
-        });
-        sets = with_each.take(MOST_FITS).collect();
-    }
-    let known = problem.fixed.iter().filter_map(|name| {
-        let value = problem.start.get(name)?;
-        Some((name.clone(), *value))
-    });
-    let settings = OwnSettings {
-        columns: columns.clone(),
-        known: known.collect::<BTreeMap<String, f64>>(),
-        priors: problem.priors.clone(),
-        hold,
-        ..OwnSettings::default()
-    };
-    let records = Records {
-        records: without_gaps(&records),
-        test: Vec::new(),
-        time_unit: 1.0,
-        summaries: Vec::new(),
-    };
-    let limit = FitLimit {
-        time: options.time_limit,
-        interrupt: options.interrupt,
-    };
-    let fits = sets.into_par_iter().map(|effects| {
-        let settings = OwnSettings {
-            effects,
-            ..settings.clone()
-        };
-        let file = OwnModelFile::new(plant.id(), spec.clone(), settings)?;
-        FittedModel::fit(&file, records.clone(), &FitOptions::default(), limit)
-    });
-    let fits: Vec<Result<FittedModel, Error>> = fits.collect();
-    let error_of = |fitted: &FittedModel| {
-        let squares = fitted.estimate().rmse.iter().map(|rmse| rmse * rmse);
-        squares.sum::<f64>()
-    };
-    let mut failed = None;
-    let fitted = fits.into_iter().filter_map(|fit| match fit {
-        Ok(fitted) => Some(fitted),
-        Err(error) => {
-            failed = Some(error);
-            None
-        }
-    });
-    let best = fitted.min_by(|a, b| error_of(a).total_cmp(&error_of(b)));
-    let Some(best) = best else {
-        return Err(failed.unwrap_or_else(|| refused(files, "no fit is finite")));
-    };
-    // The text is simulated on the measured command.
-    let options = Options {
-        simulate_loop: false,
-        ..*options
-    };
-    let of_plant =
-        missing_effect::compare(problem, &options).map_err(|error| files.blame(error))?;
-    let last = of_plant.steps.last();
-    let outputs = last.map_or(&[][..], |step| &step.outputs[..]);
-    for (own, output) in best.estimate().rmse.iter().zip(outputs) {
-        if (own / output.rmse - 1.0).abs() > SAME_ERROR {
+        let mut first = problem.records[0].clone();
+        let spec = plant.spec_of(&problem.known, &mut first);
+        let spec = spec.map_err(|error| refused(files, &error.to_string()))?;
+        if spec.inputs.len() != first.inputs.len() {
             return refuse(format!(
-                "with {}, the text of {} has an error of {} and the plant one of {}",
-                best.given().effects.on.join(", "),
+                "the text of {} has {} inputs, and the records have {}",
                 plant.id(),
-                numbers::significant(*own, 3),
-                numbers::significant(output.rmse, 3)
+                spec.inputs.len(),
+                first.inputs.len()
             ));
         }
+        let is_parameter = |name: &str| spec.parameters.iter().any(|p| p.about.name == name);
+        let mut given = problem.priors.keys().chain(&problem.fixed);
+        if let Some(name) = given.find(|name| !is_parameter(name)) {
+            return refuse(format!(
+                "{name} is given (a prior, or fixed), and the text of {} has no such parameter",
+                plant.id()
+            ));
+        }
+        let mut sets: Vec<Vec<String>> = vec![Vec::new()];
+        for placed in &problem.effects {
+            let ports = plant.at_ports(&spec, placed);
+            if ports.is_empty() {
+                return refuse(format!(
+                    "the text of {} has no effect that is {}",
+                    plant.id(),
+                    placed.effect.id
+                ));
+            }
+            let with_each = sets.iter().flat_map(|set| {
+                ports
+                    .iter()
+                    .filter(|port| !set.contains(port))
+                    .map(|port| [&set[..], std::slice::from_ref(port)].concat())
+            });
+            sets = with_each.take(MOST_FITS).collect();
+            if sets.is_empty() {
+                return refuse(format!(
+                    "{} is the same effect in the text of {} as another one of the model file",
+                    placed.effect.id,
+                    plant.id()
+                ));
+            }
+        }
+        Ok(Self { spec, sets })
     }
-    best.text(&format!("plant {}", plant.id()))
+
+    /// The text with fitted values and their standard errors. `records`: of the plant's fit; `columns`, `hold`: of the model file; `errors`:
+    /// the root mean square of the plant's simulation error at each output, on the measured command.
+    ///
+    /// # Errors
+    /// Where the text does not fit as well as the plant.
+    pub(super) fn fitted(
+        &self,
+        problem: &Problem,
+        records: &[Record],
+        (columns, hold): (&Columns, Hold),
+        errors: &[f64],
+        (files, options): (&Files, &Options),
+    ) -> Result<String, Error> {
+        let plant = problem.plant;
+        let mut records = records.to_vec();
+        for record in &mut records {
+            plant
+                .spec_of(&problem.known, record)
+                .map_err(|error| refused(files, &error.to_string()))?;
+            record.references.clear();
+        }
+        let levels = records.iter().flat_map(|record| &record.outputs);
+        let levels = levels.flat_map(|level| &level.values).copied();
+        let largest = levels.fold(0.0, |most: f64, level| most.max(level.abs()));
+        let settings = OwnSettings {
+            columns: columns.clone(),
+            priors: problem.priors.clone(),
+            hold,
+            ..OwnSettings::default()
+        };
+        let records = Records {
+            records,
+            test: Vec::new(),
+            time_unit: 1.0,
+            summaries: Vec::new(),
+        };
+        let limit = FitLimit {
+            time: options.time_limit,
+            interrupt: options.interrupt,
+        };
+        let fits = self.sets.par_iter().map(|effects| {
+            let settings = OwnSettings {
+                effects: effects.clone(),
+                ..settings.clone()
+            };
+            let file = OwnModelFile::new(plant.id(), self.spec.clone(), settings)?;
+            FittedModel::fit(&file, records.clone(), &FitOptions::default(), limit)
+        });
+        let fits: Vec<Result<FittedModel, Error>> = fits.collect();
+        // Root mean square of the ratios of the errors: 1 where the text fits as the plant does.
+        let ratio = |fitted: &FittedModel| {
+            let both = fitted.estimate().rmse.iter().zip(errors);
+            let rounding = ROUNDING * largest;
+            let ratios = both.map(|(own, of_plant)| (own / (of_plant + rounding)).powi(2));
+            (ratios.sum::<f64>() / errors.len() as f64).sqrt()
+        };
+        let (fitted, failed): (Vec<_>, Vec<_>) = fits.into_iter().partition(Result::is_ok);
+        let fitted = fitted.into_iter().flatten();
+        let Some(best) = fitted.min_by(|a, b| ratio(a).total_cmp(&ratio(b))) else {
+            let why = failed.into_iter().find_map(Result::err);
+            let why = why.map_or_else(String::new, |error| error.to_string());
+            return Err(refused(files, &format!("no fit of the text: {why}")));
+        };
+        let ratio = ratio(&best);
+        if ratio <= 1.0 + SAME_ERROR {
+            let text = best.text(&format!("plant {}", plant.id()))?;
+            let effects = problem.effects.iter().zip(&best.given().effects.on);
+            let named: Vec<String> = effects
+                .map(|(placed, port)| format!("{} is {port}", placed.effect.id))
+                .collect();
+            let said = format!("\n// Time is in seconds. {}.\n", named.join(", "));
+            return Ok(text.replacen('\n', &said, 1));
+        }
+        let cut = best.effort().left_out.first();
+        Err(refused(
+            files,
+            &format!(
+                "with {}, the simulation error of the text of {} is {} times that of the plant{}",
+                best.given().effects.on.join(", "),
+                plant.id(),
+                numbers::significant(ratio, 3),
+                cut.map_or_else(String::new, |_| {
+                    ", and its fit reached the time limit: give it more with --effort".to_string()
+                })
+            ),
+        ))
+    }
 }

@@ -6,42 +6,20 @@
 //! `answers` beside `public`, the scores are printed: the first answer in the truth's class, and by how much the error over that
 //! of the true structure falls.
 
-use std::{
-    error::Error,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{error::Error, fs, path::Path};
 
-use ctid::input::Files;
+use ctid_tests::blind;
 use missing_effect::{Diagnosis, Options, Verdict, diagnose};
 use serde_json::{Value, json};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let public = std::env::args()
-        .nth(1)
-        .map_or_else(|| package.join("../../shared/blind/public"), PathBuf::from);
-    if !public.is_dir() {
-        println!("skipped: no blind records at {}", public.display());
+    let Some(public) = blind::folder() else {
         return Ok(());
-    }
-    let mut records: Vec<PathBuf> = fs::read_dir(&public)?
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<Result<_, _>>()?;
-    records.retain(|path| path.extension().is_some_and(|extension| extension == "csv"));
-    records.sort();
+    };
     let mut answers = Vec::new();
     let (mut right, mut scored, mut falls) = (0, 0, Vec::new());
-    for record in records {
-        let name = record
-            .file_stem()
-            .map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
-        let files = Files {
-            data: vec![record.clone()],
-            model: record.with_extension("toml"),
-            test: Vec::new(),
-            options: ct_signals::ReadOptions::default(),
-        };
+    for (name, files) in blind::cases(&public)? {
         let found = diagnose(&files.read()?.problem, &Options::default(), &|_| {})?;
         answers.push(answer(&name, &found));
         let truth = public.join(format!("../answers/{name}.answer.json"));

@@ -6,37 +6,17 @@
 
 use std::error::Error;
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use ct_model::ModelSpec;
-use ctid::input::Files;
+use ctid_tests::blind;
 use plants::Plant;
 use serde_json::Value;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let public = std::env::args()
-        .nth(1)
-        .map_or_else(|| package.join("../../shared/blind/public"), PathBuf::from);
-    if !public.is_dir() {
-        println!("skipped: no blind records at {}", public.display());
+    let Some(public) = blind::folder() else {
         return Ok(());
-    }
-    let mut cases: Vec<PathBuf> = fs::read_dir(&public)?
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<Result<_, _>>()?;
-    cases.retain(|path| path.extension().is_some_and(|extension| extension == "csv"));
-    cases.sort();
-    for case in cases {
-        let name = case
-            .file_stem()
-            .map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
-        let files = Files {
-            data: vec![case.clone()],
-            model: case.with_extension("toml"),
-            test: Vec::new(),
-            options: ct_signals::ReadOptions::default(),
-        };
+    };
+    for (name, files) in blind::cases(&public)? {
         let problem = files.read()?.problem;
         let built_in = missing_effect::diagnose(&problem, &Default::default(), &|_| {})?;
         let mut record = problem.records[0].clone();

@@ -70,11 +70,7 @@ impl Context<'_> {
             x[factor] = 0.0;
             let joined = Joined::at(&setup, known, &columns, &x)?;
             let triangle = linearise(&joined, &x, noise)?;
-            let scale = free
-                .iter()
-                .map(|&j| triangle.column_norm(j).max(f64::MIN_POSITIVE));
-            let scale: Vec<f64> = scale.collect();
-            let step = step_within(&triangle, (&setup, &x), &free, &scale);
+            let step = step_within(&triangle, (&setup, &x), &free);
             let mut stepped = x.clone();
             for (d, &at) in step.iter().zip(setup.free()) {
                 stepped[at] = within(stepped[at] + d, setup.bounds()[at]);

@@ -66,17 +66,19 @@ const STEP: &str = "step";
 /// Distances from the best instants at which further starts are scored, round by round, as shares of the longest record.
 const BETWEEN: [f64; 2] = [0.05, 0.025];
 
-/// The step of Gauss and Newton from a point. A parameter at a bound does not leave it: no candidate is credited with what it would explain
-/// beyond.
+/// The step of Gauss and Newton from a point, of the `free` columns. A parameter at a bound does not leave it: no candidate is credited with
+/// what it would explain beyond.
 pub(crate) fn step_within(
     triangle: &Triangle,
     (setup, x): (&ModelSetup, &[f64]),
     free: &[usize],
-    scale: &[f64],
 ) -> Vec<f64> {
+    let scale: Vec<f64> = (0..setup.free().len())
+        .map(|j| triangle.column_norm(j).max(f64::MIN_POSITIVE))
+        .collect();
     let of_free = |at: &usize| (x[*at], setup.bounds()[*at]);
     let (values, bounds): (Vec<f64>, Vec<(f64, f64)>) = setup.free().iter().map(of_free).unzip();
-    triangle.solve_from_bounds((&values, &bounds), free, scale, DAMPING)
+    triangle.solve_from_bounds((&values, &bounds), free, &scale, DAMPING)
 }
 
 impl Context<'_> {
@@ -232,10 +234,7 @@ impl Context<'_> {
             let free: Vec<usize> = all
                 .filter(|&j| !silent.contains(&setup.free()[j]))
                 .collect();
-            let scale: Vec<f64> = (0..setup.free().len())
-                .map(|j| triangle.column_norm(j).max(f64::MIN_POSITIVE))
-                .collect();
-            let step = step_within(&triangle, (&setup, &x), &free, &scale);
+            let step = step_within(&triangle, (&setup, &x), &free);
             let predicted = triangle.predicted(&step);
             let mut stepped = x.clone();
             for (d, &at) in step.iter().zip(setup.free()) {

@@ -100,7 +100,9 @@ pub(crate) fn export(
         Ok((
             fitted.setup.records.to_vec(),
             model,
-            text(&problem, &values, &errors),
+            (with_text && plain)
+                .then(|| text(&problem, &values, &errors))
+                .flatten(),
             fitted.fit.rmse.clone(),
         ))
     });

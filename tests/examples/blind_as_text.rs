@@ -1,8 +1,8 @@
 //! The blind records with their plants as text beside the built-in plants: verdicts, effects and errors of both diagnoses.
 //! `cargo run --release -p ctid-tests --example blind_as_text`
 //!
-//! The records and their model files lie in `../shared/blind/public` beside the checkout, or in the folder that is given as an argument. The
-//! text is simulated on the measured command; the built-in plant in its loop where the model file has a controller.
+//! The records and their model files lie in `../shared/blind/public` beside the checkout, or in the folder that is given as an argument; a
+//! second argument selects the records whose names contain it. The text is simulated on the measured command; the built-in plant in its loop where the model file has a controller.
 
 use std::error::Error;
 use std::fs;

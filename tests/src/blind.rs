@@ -19,7 +19,8 @@ pub fn folder() -> Option<PathBuf> {
     Some(folder)
 }
 
-/// The names of the records in a folder, sorted, and each with its model file.
+/// The names of the records in a folder, sorted, and each with its model file: those that contain the second argument of the program, if it
+/// has one.
 ///
 /// # Errors
 /// If the folder cannot be read.
@@ -28,6 +29,12 @@ pub fn cases(folder: &Path) -> io::Result<Vec<(String, Files)>> {
         .map(|entry| entry.map(|entry| entry.path()))
         .collect::<Result<_, _>>()?;
     records.retain(|path| path.extension().is_some_and(|extension| extension == "csv"));
+    if let Some(part) = env::args().nth(2) {
+        records.retain(|path| {
+            path.file_stem()
+                .is_some_and(|stem| stem.to_string_lossy().contains(&part))
+        });
+    }
     records.sort();
     let case = |record: PathBuf| {
         let stem = record.file_stem();

@@ -1,4 +1,6 @@
 //! Number of finished runs, and parallel runs that report it.
+//!
+//! Progress is reported to a trait object: functions that are generic in it would be compiled in each crate that calls them.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -39,7 +41,7 @@ pub enum Stage {
 pub(crate) fn in_parallel<T: Send>(
     total: usize,
     stage: Stage,
-    progress: &(impl Fn(Progress) + Sync),
+    progress: &(dyn Fn(Progress) + Sync),
     run: impl Fn(usize) -> Result<T, Error> + Sync,
 ) -> Result<Vec<T>, Error> {
     let counter = Counter::new(total, stage, progress);
@@ -52,15 +54,15 @@ pub(crate) fn in_parallel<T: Send>(
 }
 
 /// Counts finished runs and reports the count.
-pub(crate) struct Counter<'a, F> {
+pub(crate) struct Counter<'a> {
     stage: Stage,
     total: usize,
     done: AtomicUsize,
-    progress: &'a F,
+    progress: &'a (dyn Fn(Progress) + Sync),
 }
 
-impl<'a, F: Fn(Progress) + Sync> Counter<'a, F> {
-    pub(crate) fn new(total: usize, stage: Stage, progress: &'a F) -> Self {
+impl<'a> Counter<'a> {
+    pub(crate) fn new(total: usize, stage: Stage, progress: &'a (dyn Fn(Progress) + Sync)) -> Self {
         Self {
             stage,
             total,

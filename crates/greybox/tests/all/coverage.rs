@@ -7,7 +7,7 @@ use greybox::{FitOptions, Noise, Setup, coloured, fit, fit_from, random_starts, 
 use rayon::prelude::*;
 
 /// Records of a setting in the tests; `RECORDS=800` takes so many.
-const RECORDS: u64 = 200;
+const RECORDS: u64 = 100;
 
 fn records() -> u64 {
     std::env::var("RECORDS").map_or(RECORDS, |records| records.parse().unwrap())

@@ -74,11 +74,7 @@ impl Study {
 ///
 /// # Errors
 /// [`Error::TooFewRunsForVariance`]; no other in practice, as all settings are fixed and sound.
-pub fn study(
-    runs: usize,
-    seed: u64,
-    progress: &(impl Fn(Progress) + Sync),
-) -> Result<Study, Error> {
+pub fn study(runs: usize, seed: u64, progress: &(dyn Fn(Progress) + Sync)) -> Result<Study, Error> {
     if runs < FEWEST {
         return Err(Error::TooFewRunsForVariance {
             runs,

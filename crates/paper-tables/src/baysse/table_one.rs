@@ -141,7 +141,7 @@ impl FirstTable {
     pub(super) fn new(
         runs: usize,
         seed: u64,
-        progress: &(impl Fn(Progress) + Sync),
+        progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<Self, Error> {
         let setup = Setup::new()?;
         let runs = in_parallel(runs, Stage::BaysseTableOne, progress, |run| {

@@ -185,7 +185,7 @@ impl SecondTable {
     pub(super) fn new(
         runs: usize,
         seed: u64,
-        progress: &(impl Fn(Progress) + Sync),
+        progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<Self, Error> {
         let rig = Rig::default();
         let stage = Stage::BaysseTableTwo;

@@ -38,7 +38,7 @@ pub(super) fn larger_p(
     settings: &Settings,
     runs: usize,
     seed: u64,
-    progress: &(impl Fn(Progress) + Sync),
+    progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Vec<LargerP>, Error> {
     let runs = runs.min(MOST_RUNS);
     let [table, ..] = &TABLES;

@@ -121,7 +121,7 @@ pub fn study(
     settings: &Settings,
     runs: usize,
     seed: u64,
-    progress: &(impl Fn(Progress) + Sync),
+    progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Study, Error> {
     if runs < FEWEST {
         return Err(Error::TooFewRunsForRange {

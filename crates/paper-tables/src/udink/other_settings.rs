@@ -72,7 +72,7 @@ pub(super) fn with_other_settings(
     settings: &Settings,
     runs: usize,
     seed: u64,
-    progress: &(impl Fn(Progress) + Sync),
+    progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Vec<Changed>, Error> {
     let runs = runs.min(MOST_RUNS);
     let stage = Stage::UdinkOtherSettings;

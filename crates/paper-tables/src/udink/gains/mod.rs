@@ -141,7 +141,7 @@ pub struct Gains {
 ///
 /// # Errors
 /// None in practice: all settings are fixed and sound.
-pub fn compare(seed: u64, progress: &(impl Fn(Progress) + Sync)) -> Result<Gains, Error> {
+pub fn compare(seed: u64, progress: &(dyn Fn(Progress) + Sync)) -> Result<Gains, Error> {
     let (variants, quiet) = (variants(), samples(QUIET, None)?);
     let noisy: Vec<Vec<Sample>> = (0..NOISES)
         .into_par_iter()

@@ -14,7 +14,7 @@ struct Cli {
     /// Cases of all kinds together
     #[arg(default_value_t = 1000)]
     cases: u64,
-    /// Kinds: record, model, stream, state, request; all where none is given
+    /// Kinds: record, model, text, stream, state, request; all where none is given
     #[arg(long)]
     kind: Vec<Kind>,
     /// Number of the first case of a kind

@@ -23,7 +23,7 @@ pub enum Error {
     },
     /// A prior is not a finite number with a positive standard error within the bounds.
     #[error(
-        "[prior] {name} = [{value}, {std_error}]: the parameter lies between {lower:.4e} and {upper:.4e}; give a value there and a standard error above zero, in its unit"
+        "[prior] {name} = [{value:?}, {std_error:?}]: the parameter lies between {lower:?} and {upper:?}; give a value there and a standard error above zero, in its unit"
     )]
     Prior {
         /// The parameter.

@@ -8,6 +8,7 @@
 //! | numbers, names and damage | `source` |
 //! | records | `records` |
 //! | model files | `models` |
+//! | models of one's own, as text | `texts` |
 //! | rows for the monitor, and its saved states | `streams`, `states` |
 //! | requests to the page | `requests` |
 //! | the process, and the checks | `process` |
@@ -19,6 +20,7 @@ mod requests;
 mod source;
 mod states;
 mod streams;
+mod texts;
 
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
@@ -36,6 +38,8 @@ pub enum Kind {
     Record,
     /// A model file, for the same commands, and to be edited.
     Model,
+    /// A model of one's own as text, for all commands that read one.
+    Text,
     /// Rows that come to `monitor`.
     Stream,
     /// A saved state of `monitor`.
@@ -46,9 +50,10 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Record,
         Self::Model,
+        Self::Text,
         Self::Stream,
         Self::State,
         Self::Request,
@@ -60,6 +65,7 @@ impl Display for Kind {
         f.write_str(match self {
             Self::Record => "record",
             Self::Model => "model",
+            Self::Text => "text",
             Self::Stream => "stream",
             Self::State => "state",
             Self::Request => "request",
@@ -137,6 +143,7 @@ pub fn run(kind: Kind, first: u64, cases: u64, progress: impl Fn(u64) + Sync) ->
     let case = match kind {
         Kind::Record => records::case,
         Kind::Model => models::case,
+        Kind::Text => texts::case,
         Kind::Stream => streams::case,
         Kind::State => states::case,
         Kind::Request => requests::case,

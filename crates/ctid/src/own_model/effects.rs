@@ -176,7 +176,7 @@ pub(crate) fn find<'c>(
             format!("; {name} acts nowhere in {}", spec.name)
         }
         0 => String::new(),
-        1..=8 => format!("; {name} may act here: {}", ports.join(", ")),
+        1..=4 => format!("; {name} may act here: {}", ports.join(", ")),
         count => format!(
             "; {name} may act at {count} ports, such as {}",
             ports[..4].join(", ")

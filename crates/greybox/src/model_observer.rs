@@ -10,7 +10,7 @@
 
 use ct_model::{About, Expression, Input, Model, ModelSpec, Operator, Output, Variable};
 use ct_signals::{Channel, Hold, Record};
-use estimation::{Noise, Stopping, fit_from, within};
+use estimation::{Noise, Residuals, Stopping, fit_from, within};
 
 use crate::ModelSetup;
 
@@ -96,6 +96,9 @@ impl ModelSetup<'_> {
             let model = Model::new(observed(self.model().spec(), &shown, rate / interval));
             let setup = ModelSetup::new(&model, &records, &known, self.time_unit()).ok()?;
             let setup = setup.limited_as(self);
+            if setup.out_of_time() {
+                break;
+            }
             if let Ok(fit) = fit_from(&setup, vec![x.clone().into()], &white, STOPPING) {
                 x = fit.x;
             }

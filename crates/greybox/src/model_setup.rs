@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 
 use ct_model::{Model, Variable};
 use ct_signals::Record;
-use estimation::{Fit, Noise, Prior, Robust, Start, Stopping};
+use estimation::{Fit, Noise, Prior, Residuals, Robust, Start, Stopping};
 
 use self::build::{SETTLED, samples_of};
 use crate::{Error, FitOptions, PriorValue, TimeLimit, clock::Clock, output_noise::output_noise};
@@ -322,7 +322,8 @@ impl<'a> ModelSetup<'a> {
                     .zip(&scales)
                     .all(|(a, b)| (a / b - 1.0).abs() < SETTLED)
             });
-            if settled {
+            // After the time limit each further weighting would still simulate the model with its derivatives.
+            if settled || round > 0 && setup.out_of_time() {
                 break;
             }
             setup.known_scales = Some(scales);

@@ -14,7 +14,7 @@ use crate::input::{self, Files, ReadArguments};
 use crate::interrupt;
 use crate::look::Look;
 use crate::output::{self, Kind};
-use crate::own_model::{self, AnyModelFile};
+use crate::own_model::{self, AnyModelFile, FitLimit};
 use crate::progress::Bar;
 use crate::simulate;
 
@@ -67,11 +67,15 @@ impl Export {
         let fitted = (!self.data.is_empty()).then(|| model.loop_said(look));
         let bar = Bar::new();
         bar.phase("fitting the model");
+        let limit = FitLimit {
+            time: Some(self.effort.limit()),
+            interrupt: Some(interrupt::flag()),
+        };
         let exported = match model {
             AnyModelFile::Plant(model) => {
                 let options = Options {
-                    time_limit: Some(self.effort.limit()),
-                    interrupt: Some(interrupt::flag()),
+                    time_limit: limit.time,
+                    interrupt: limit.interrupt,
                     ..Options::default()
                 };
                 simulate::export_plant(*model, &files, &options, self.modelica.is_some())
@@ -81,7 +85,7 @@ impl Export {
                     true => None,
                     false => Some((model.records(&files)?, &self.data[..])),
                 };
-                own_model::export(&model, records, &FitOptions::default())
+                own_model::export(&model, records, &FitOptions::default(), limit)
             }
         };
         bar.clear();
@@ -90,9 +94,17 @@ impl Export {
             [] => format!("{} as its text and [known] have it", exported.model),
             records => format!("{} fitted to {}", exported.model, records.join(", ")),
         };
+        let warnings = exported.warnings.iter();
+        let warned: String = warnings
+            .map(|warning| {
+                let words = look.paragraph("", &format!("warning: {warning}"));
+                look.warning(words.trim_end()) + "\n"
+            })
+            .collect();
         let text = input::notes(&summaries, look)
             + &fitted.unwrap_or_default()
-            + &look.paragraph("", &said);
+            + &look.paragraph("", &said)
+            + &warned;
         finish(&exported, &text, &outputs, out, look)
     }
 }

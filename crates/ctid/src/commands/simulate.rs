@@ -15,7 +15,7 @@ use crate::input::{self, Files, ReadArguments};
 use crate::interrupt;
 use crate::look::Look;
 use crate::output::{self, Kind};
-use crate::own_model::{self, AnyModelFile};
+use crate::own_model::{self, AnyModelFile, FitLimit};
 use crate::progress::Bar;
 use crate::simulate::{self, FIRST_READINGS, Inputs};
 
@@ -112,11 +112,15 @@ impl Simulate {
         let fitted = (!self.fit.is_empty()).then(|| model.loop_said(look));
         let bar = Bar::new();
         bar.phase("fitting the model");
+        let limit = FitLimit {
+            time: Some(self.effort.limit()),
+            interrupt: Some(interrupt::flag()),
+        };
         let found = match model {
             AnyModelFile::Plant(model) => {
                 let options = Options {
-                    time_limit: Some(self.effort.limit()),
-                    interrupt: Some(interrupt::flag()),
+                    time_limit: limit.time,
+                    interrupt: limit.interrupt,
                     ..Options::default()
                 };
                 simulate::simulate_plant(*model, &files, &inputs, &options)
@@ -126,7 +130,7 @@ impl Simulate {
                     true => None,
                     false => Some(model.records(&files)?),
                 };
-                own_model::simulate(&model, records, &inputs, &FitOptions::default())
+                own_model::simulate(&model, records, &inputs, &FitOptions::default(), limit)
             }
         };
         bar.clear();

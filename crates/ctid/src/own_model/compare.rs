@@ -224,24 +224,35 @@ mod tests {
     use super::*;
     use crate::input::Files;
     use crate::look::Look;
-    use crate::own_model::{AnyModelFile, said};
+    use crate::own_model::{AnyModelFile, export, said, simulate};
+    use crate::simulate::Inputs;
+
+    const CUT: &str = "Left out by the time limit of 0 s: steps of the fit. For a longer search: `--effort thorough` (limit 10 min).";
+
+    /// The heated block of the examples, its record, and the record's file.
+    fn heated_block() -> (OwnModelFile, Records, PathBuf) {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/models");
+        let (model, data) = (
+            folder.join("heated-block.toml"),
+            folder.join("heated-block.csv"),
+        );
+        let AnyModelFile::Own(file) = AnyModelFile::read(&model).unwrap() else {
+            unreachable!("it names a text")
+        };
+        let files = Files {
+            data: vec![data.clone()],
+            test: Vec::new(),
+            model: PathBuf::from("m.toml"),
+            options: ct_signals::ReadOptions::default(),
+        };
+        let records = file.records(&files).unwrap();
+        (*file, records, data)
+    }
 
     /// A time limit that has passed still gives a fit, and one line reports that it was cut short.
     #[test]
     fn the_limit_on_the_time_is_kept_and_said() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/models");
-        let model = folder.join("heated-block.toml");
-        let AnyModelFile::Own(file) = AnyModelFile::read(&model).unwrap() else {
-            unreachable!("it names a text")
-        };
-        let records = file
-            .records(&Files {
-                data: vec![folder.join("heated-block.csv")],
-                test: Vec::new(),
-                model: PathBuf::from("m.toml"),
-                options: ct_signals::ReadOptions::default(),
-            })
-            .unwrap();
+        let (file, records, _) = heated_block();
         let within = |limit: Duration| {
             let options = Options {
                 time_limit: Some(limit),
@@ -252,11 +263,34 @@ mod tests {
         let cut = within(Duration::ZERO);
         assert_eq!(cut.effort.left_out, ["steps of the fit"]);
         let text = said(&cut, Look::plain());
-        let line = "warning: Left out by the time limit of 0 s: steps of the fit. For a longer search: `--effort thorough` (limit 10 min).\n";
-        assert!(text.contains(line), "{text}");
+        assert!(text.contains(&format!("warning: {CUT}\n")), "{text}");
         let whole = within(Duration::from_secs(600));
         assert!(whole.effort.left_out.is_empty() && whole.effort.limit == Some(600.0));
         assert!(whole.steps[0].rmse <= cut.steps[0].rmse);
         assert!(!said(&whole, Look::plain()).contains("time limit"));
+    }
+
+    #[test]
+    fn fits_for_an_export_and_a_simulation_keep_the_limit_too() {
+        let (file, records, data) = heated_block();
+        let inputs = Inputs {
+            path: data.clone(),
+            options: ct_signals::ReadOptions::default(),
+            first: 10,
+        };
+        for (seconds, warnings) in [(0, vec![CUT.to_string()]), (600, Vec::new())] {
+            let limit = FitLimit {
+                time: Some(Duration::from_secs(seconds)),
+                interrupt: None,
+            };
+            let options = FitOptions::default();
+            let paths = std::slice::from_ref(&data);
+            let with_records = Some((records.clone(), paths));
+            let (exported, _) = export(&file, with_records, &options, limit).unwrap();
+            assert_eq!(exported.warnings, warnings);
+            let fitted_to = Some(records.clone());
+            let (simulated, _) = simulate(&file, fitted_to, &inputs, &options, limit).unwrap();
+            assert_eq!(simulated.warnings, warnings);
+        }
     }
 }

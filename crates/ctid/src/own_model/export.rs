@@ -22,6 +22,9 @@ pub(crate) struct Exported {
     pub model: String,
     /// The records of the fit; empty if the values are those of the text.
     pub fitted_to: Vec<String>,
+    /// What the reader has to know of the fit.
+    #[serde(skip)]
+    pub warnings: Vec<String>,
     /// The text.
     #[serde(skip)]
     pub text: Option<String>,
@@ -128,11 +131,13 @@ pub(crate) fn export(
     file: &OwnModelFile,
     records: Option<(Records, &[PathBuf])>,
     options: &FitOptions,
+    limit: FitLimit,
 ) -> Result<(Exported, Vec<ReadSummary>), Error> {
     let mut exported = Exported {
         schema: 1,
         model: file.base.name.clone(),
         fitted_to: Vec::new(),
+        warnings: Vec::new(),
         text: None,
         curves: None,
     };
@@ -144,7 +149,8 @@ pub(crate) fn export(
         exported.text = Some(text(file, &source)?);
         return Ok((exported, Vec::new()));
     };
-    let fitted = FittedModel::fit(file, records, options, FitLimit::default())?;
+    let fitted = FittedModel::fit(file, records, options, limit)?;
+    exported.warnings.extend(fitted.cut_short());
     exported.text = Some(fitted.text(&source)?);
     let (file, records) = (fitted.model(), fitted.records());
     let spec = file.model.spec();

@@ -12,6 +12,7 @@ use missing_effect::Effort;
 use super::file::{OwnModelFile, Records};
 use super::simulate::simulated;
 use crate::Error;
+use crate::findings::{self, Reader};
 use crate::simulate::{ReadInputs, Simulated};
 
 /// Share of the time for adding the effects of the file one after the other.
@@ -46,6 +47,12 @@ pub struct OutputScore {
     pub rmse: f64,
     /// `100 (1 - rmse/s)` with the standard deviation s of the readings that are scored, %.
     pub fit_percent: f64,
+}
+
+/// What was left out of a fit, and how to get it.
+pub(super) fn cut_short(effort: &Effort) -> Option<String> {
+    let said = findings::effort(effort, Reader::Commands);
+    (!said.is_empty()).then(|| said.join(" "))
 }
 
 impl FittedModel {
@@ -162,6 +169,11 @@ impl FittedModel {
     #[must_use]
     pub fn effort(&self) -> &Effort {
         &self.effort
+    }
+
+    /// A warning if the fit was cut short, and how to get a longer one.
+    pub(super) fn cut_short(&self) -> Option<String> {
+        cut_short(&self.effort)
     }
 
     /// The model against its records, as it was fitted.

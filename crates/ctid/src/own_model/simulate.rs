@@ -22,6 +22,7 @@ pub(crate) fn simulate(
     mut records: Option<Records>,
     inputs: &Inputs,
     options: &FitOptions,
+    limit: FitLimit,
 ) -> Result<(Simulated, Vec<ReadSummary>), Error> {
     let read_options = ct_signals::ReadOptions {
         hold: file.hold,
@@ -48,12 +49,7 @@ pub(crate) fn simulate(
     let name = &inputs.path;
     let fitted = match records {
         None => None,
-        Some(records) => Some(FittedModel::fit(
-            file,
-            records,
-            options,
-            FitLimit::default(),
-        )?),
+        Some(records) => Some(FittedModel::fit(file, records, options, limit)?),
     };
     let mended;
     let model = match &fitted {
@@ -64,7 +60,10 @@ pub(crate) fn simulate(
         Some(fitted) => fitted.model(),
     };
     let of = (model, fitted.as_ref(), time_unit);
-    let found = simulated(of, (&read, name, inputs.first), LEVEL, options)?;
+    let mut found = simulated(of, (&read, name, inputs.first), LEVEL, options)?;
+    if let Some(fitted) = &fitted {
+        found.warnings.extend(fitted.cut_short());
+    }
     Ok((found, summaries))
 }
 

@@ -5,7 +5,7 @@ use effect_search::Step;
 
 use super::compare::{Comparison, Curves};
 use super::diagnose::state_rows;
-use crate::findings::{self, Reader};
+use super::fitted::cut_short;
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
@@ -81,9 +81,8 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {
         text += &format!("  {}\n", line.trim_end());
     }
-    let cut = findings::effort(&comparison.effort, Reader::Commands);
-    if !cut.is_empty() {
-        text += &look.warning(format!("warning: {}", cut.join(" ")));
+    if let Some(cut) = cut_short(&comparison.effort) {
+        text += &look.warning(format!("warning: {cut}"));
         text.push('\n');
     }
     let agree = format!(

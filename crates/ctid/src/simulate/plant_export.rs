@@ -138,6 +138,7 @@ pub(crate) fn export(
         schema: 1,
         model: name,
         fitted_to: problem.records.iter().map(|r| r.name.clone()).collect(),
+        warnings: Vec::new(),
         text,
         curves: Some(Curves {
             inputs,

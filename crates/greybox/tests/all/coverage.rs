@@ -178,7 +178,8 @@ fn the_colour_of_the_noise_is_not_biased_by_the_fit() {
         ..Rig::single_tank()
     };
     let truth = rig.truth(1);
-    let estimates: Vec<(f64, f64)> = (0..records())
+    // Fewer records do not show a bias of a hundredth.
+    let estimates: Vec<(f64, f64)> = (0..records().max(200))
         .into_par_iter()
         .map(|seed| {
             let records = [rig.record(seed)];

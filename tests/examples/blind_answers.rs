@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let mut answers = Vec::new();
     let (mut right, mut scored, mut falls) = (0, 0, Vec::new());
-    for (name, files) in blind::cases(&public)? {
+    for (name, files) in blind::cases(&public, "")? {
         let found = diagnose(&files.read()?.problem, &Options::default(), &|_| {})?;
         answers.push(answer(&name, &found));
         let truth = public.join(format!("../answers/{name}.answer.json"));

@@ -5,7 +5,7 @@
 //! second argument selects the records whose names contain it. The text is simulated on the measured command; the built-in plant in its loop where the model file has a controller.
 
 use std::error::Error;
-use std::fs;
+use std::{env, fs};
 
 use ct_model::ModelSpec;
 use ctid_tests::blind;
@@ -16,7 +16,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let Some(public) = blind::folder() else {
         return Ok(());
     };
-    for (name, files) in blind::cases(&public)? {
+    let part = env::args().nth(2).unwrap_or_default();
+    for (name, files) in blind::cases(&public, &part)? {
         let problem = files.read()?.problem;
         let built_in = missing_effect::diagnose(&problem, &Default::default(), &|_| {})?;
         let mut record = problem.records[0].clone();

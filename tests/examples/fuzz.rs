@@ -1,4 +1,4 @@
-//! The program on inputs drawn at random: `cargo run --release -p ctid-tests --example fuzz -- 100000`.
+//! The program on inputs drawn at random: `cargo run --release -p ctid-tests --example fuzz -- 10000`.
 //!
 //! What counts as a fault is said at [`ctid_tests::fuzz::run`]. A fault is printed with the words that run its case again.
 
@@ -8,7 +8,7 @@ use clap::Parser;
 use ctid_tests::fuzz::{Kind, as_program, run};
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Runs the program on records, model files, streams, saved states and requests drawn at random
+/// Runs the program on records, model files, models as text, streams, saved states and requests drawn at random
 #[derive(Debug, Parser)]
 struct Cli {
     /// Cases of all kinds together

@@ -19,22 +19,19 @@ pub fn folder() -> Option<PathBuf> {
     Some(folder)
 }
 
-/// The names of the records in a folder, sorted, and each with its model file: those that contain the second argument of the program, if it
-/// has one.
+/// The names of the records in a folder that contain a text, sorted, and the files of each.
 ///
 /// # Errors
 /// If the folder cannot be read.
-pub fn cases(folder: &Path) -> io::Result<Vec<(String, Files)>> {
+pub fn cases(folder: &Path, part: &str) -> io::Result<Vec<(String, Files)>> {
     let mut records: Vec<PathBuf> = fs::read_dir(folder)?
         .map(|entry| entry.map(|entry| entry.path()))
         .collect::<Result<_, _>>()?;
     records.retain(|path| path.extension().is_some_and(|extension| extension == "csv"));
-    if let Some(part) = env::args().nth(2) {
-        records.retain(|path| {
-            path.file_stem()
-                .is_some_and(|stem| stem.to_string_lossy().contains(&part))
-        });
-    }
+    records.retain(|path| {
+        path.file_stem()
+            .is_some_and(|stem| stem.to_string_lossy().contains(part))
+    });
     records.sort();
     let case = |record: PathBuf| {
         let stem = record.file_stem();

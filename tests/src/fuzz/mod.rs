@@ -38,7 +38,7 @@ pub enum Kind {
     Record,
     /// A model file, for the same commands, and to be edited.
     Model,
-    /// A model of one's own as text, for all commands that read one.
+    /// A model of one's own as text, for commands that read one.
     Text,
     /// Rows that come to `monitor`.
     Stream,

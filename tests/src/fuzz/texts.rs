@@ -1,4 +1,4 @@
-//! Models of one's own: texts of the library with words exchanged, or damaged, and all commands that read them.
+//! Models of one's own: texts of the library with words exchanged, or damaged, and commands that read them, without `monitor` and the page.
 
 use ct_model::ModelSpec;
 
@@ -7,7 +7,7 @@ use super::process::Folder;
 use super::records::OUTPUTS;
 use super::source::Source;
 
-/// Texts whose words are exchanged, and the sampling interval of their records: all parts of the language are in one of them.
+/// Texts whose words are exchanged, and the sampling interval of their records: most parts of the language are in one of them.
 const TEXTS: [(&str, f64); 5] = [
     (
         include_str!("../../../examples/models/heated-block.mo"),

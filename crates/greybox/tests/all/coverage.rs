@@ -6,7 +6,7 @@ use ct_signals::{ArModel, Record};
 use greybox::{FitOptions, Noise, Setup, coloured, fit, fit_from, random_starts, robust};
 use rayon::prelude::*;
 
-/// Records of a setting in the tests; `RECORDS=800` takes so many.
+/// Records of a setting in the tests, except for a bias, which needs 200; `RECORDS=800` takes so many.
 const RECORDS: u64 = 100;
 
 fn records() -> u64 {

@@ -2,7 +2,8 @@
 //! `cargo run --release -p ctid-tests --example blind_as_text`
 //!
 //! The records and their model files lie in `../shared/blind/public` beside the checkout, or in the folder that is given as an argument; a
-//! second argument selects the records whose names contain it. The text is simulated on the measured command; the built-in plant in its loop where the model file has a controller.
+//! second argument selects the records whose names contain it. The text is simulated on the measured command; the built-in plant in its loop
+//! where the model file has a controller.
 
 use std::error::Error;
 use std::{env, fs};

@@ -1,4 +1,5 @@
-//! Models of one's own: texts of the library with words exchanged, or damaged, and commands that read them, without `monitor` and the page.
+//! Models of one's own: texts of the library with words exchanged, or damaged, and the commands that read them, except for `monitor` and the
+//! page.
 
 use ct_model::ModelSpec;
 

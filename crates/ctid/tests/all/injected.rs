@@ -1,5 +1,5 @@
-//! Files are complete even if the system fails: each call for them fails once, with one error or another, and the program is killed at each of them. Afterwards the
-//! folder has the complete old file or the complete new one.
+//! Files are complete even if the system fails: each call for them fails once, with one of two errors in turn, and the program is killed at
+//! each of them. Afterwards the folder has the complete old file or the complete new one.
 //!
 //! The calls fail by `strace`; where it cannot be used the tests are ignored.
 #![cfg(target_os = "linux")]

@@ -6,8 +6,8 @@ use ct_signals::{ArModel, Record};
 use greybox::{FitOptions, Noise, Setup, coloured, fit, fit_from, random_starts, robust};
 use rayon::prelude::*;
 
-/// Records of a setting in the tests, except for a bias, which needs 200; `RECORDS=800` takes so many.
-const RECORDS: u64 = 100;
+/// Records of a setting in the tests; `RECORDS=800` takes so many.
+const RECORDS: u64 = 200;
 
 fn records() -> u64 {
     std::env::var("RECORDS").map_or(RECORDS, |records| records.parse().unwrap())
@@ -178,8 +178,7 @@ fn the_colour_of_the_noise_is_not_biased_by_the_fit() {
         ..Rig::single_tank()
     };
     let truth = rig.truth(1);
-    // Fewer records do not show a bias of a hundredth.
-    let estimates: Vec<(f64, f64)> = (0..records().max(200))
+    let estimates: Vec<(f64, f64)> = (0..records())
         .into_par_iter()
         .map(|seed| {
             let records = [rig.record(seed)];

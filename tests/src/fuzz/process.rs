@@ -10,6 +10,7 @@ use std::process::{self, Child, Command, ExitCode, Stdio};
 use std::thread;
 use std::time::Duration;
 
+use ct_model::ModelSpec;
 use ct_signals::escaped;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -290,12 +291,16 @@ fn numbers(json: &Value) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Checks the numbers of a written file.
+/// Checks the numbers of a written file, and that a written model can be read.
 pub(super) fn result(name: &str, bytes: &[u8]) -> Result<(), String> {
     if name.ends_with(".json") {
         let json: Value =
             serde_json::from_slice(bytes).map_err(|error| format!("{name}: {error}"))?;
         numbers(&json).map_err(|key| format!("{name}: {key} is no number"))?;
+    }
+    if name.ends_with(".mo") {
+        let text = String::from_utf8_lossy(bytes);
+        ModelSpec::parse(&text).map_err(|error| format!("{name}:{error}"))?;
     }
     if name.ends_with(".csv") {
         let text = String::from_utf8_lossy(bytes);

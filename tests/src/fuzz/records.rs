@@ -264,7 +264,7 @@ pub(super) fn command(source: &mut Source) -> String {
 }
 
 /// Files that the commands write.
-pub(super) const OUTPUTS: [&str; 4] = ["out.json", "out.html", "out.csv", "out.mo"];
+pub(super) const OUTPUTS: [&str; 3] = ["out.json", "out.html", "out.csv"];
 
 /// A run on a record.
 pub(super) fn case(source: &mut Source) -> Ended {

@@ -2,10 +2,10 @@
 //! page.
 
 use ct_model::ModelSpec;
+use ct_model::effects::{Visited, candidates};
 
 use super::Ended;
 use super::process::Folder;
-use super::records::OUTPUTS;
 use super::source::Source;
 
 /// Texts whose words are exchanged, and the sampling interval of their records: most parts of the language are in one of them.
@@ -46,17 +46,22 @@ const WORDS: [&str; 30] = [
     ";",
 ];
 
+/// Files that the commands write, but for `add`.
+const OUTPUTS: [&str; 4] = ["out.json", "out.html", "out.csv", "out.mo"];
+
 /// Units that a column may have.
 const UNITS: [&str; 6] = ["", " [V]", " [cm]", " [degC]", " [1]", " [furlong]"];
 
-/// A text in which some words are others: mostly names in equations by other names or numbers, so that most texts are models still.
+/// A text in which up to three words are others: mostly names by other names or numbers, so that most texts are models still.
 fn text(source: &mut Source, original: &str, names: &[&str]) -> String {
-    let mut pieces: Vec<&str> = original
-        .split_inclusive(|c: char| !c.is_alphanumeric())
-        .flat_map(|piece| {
-            let word = piece.trim_end_matches(|c: char| !c.is_alphanumeric());
-            [word, &piece[word.len()..]]
-        })
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut pieces: Vec<&str> = Vec::new();
+    for piece in original.split_inclusive(|c| !is_word(c)) {
+        let word = piece.trim_end_matches(|c| !is_word(c));
+        pieces.extend([word, &piece[word.len()..]]);
+    }
+    let of_names: Vec<usize> = (0..pieces.len())
+        .filter(|&i| names.contains(&pieces[i]))
         .collect();
     for _ in 0..source.below(4) {
         if source.chance(0.15) {
@@ -64,16 +69,12 @@ fn text(source: &mut Source, original: &str, names: &[&str]) -> String {
             pieces[at] = source.pick(&WORDS);
             continue;
         }
-        let begin = pieces.iter().position(|piece| *piece == "equation");
-        let begin = begin.unwrap_or(0);
-        let at = begin + source.below(pieces.len() - begin);
-        if names.contains(&pieces[at]) {
-            pieces[at] = if source.chance(0.3) {
-                source.pick(&["0", "1", "time", "1e-9", "1e30"])
-            } else {
-                source.pick(names)
-            };
-        }
+        let at = of_names[source.below(of_names.len())];
+        pieces[at] = if source.chance(0.3) {
+            source.pick(&["0", "1", "time", "1e-9", "1e30"])
+        } else {
+            source.pick(names)
+        };
     }
     pieces.concat()
 }
@@ -88,43 +89,36 @@ fn signals(spec: &ModelSpec) -> impl Iterator<Item = &str> {
     inputs.chain(outputs).map(|about| about.name.as_str())
 }
 
-/// The names in a text that may be a port, or any word.
-fn port<'a>(source: &mut Source, names: &[&'a str]) -> &'a str {
-    names[source.below(names.len())]
+/// The names of a model that effects and model files may give.
+struct Names<'a> {
+    /// Inputs, outputs, states, parameters and flows.
+    all: Vec<&'a str>,
+    /// Identifiers of the effects that can act in it.
+    effects: Vec<String>,
 }
 
-/// Identifiers of effects at ports that may be there.
-fn effect(source: &mut Source, names: &[&str]) -> String {
-    const ONE: [&str; 22] = [
-        "lag",
-        "delay",
-        "dead_zone",
-        "saturation",
-        "nonlinearity",
-        "gain_drift",
-        "backlash",
-        "offset",
-        "drift",
-        "quantisation",
-        "hysteresis",
-        "constant",
-        "loss",
-        "step",
-        "periodic",
-        "hidden_state",
-        "limit",
-        "stiction",
-        "coulomb",
-        "quadratic_drag",
-        "radiation",
-        "leak_at_height",
-    ];
-    const TWO: [&str; 4] = ["varies_with", "coupling", "input_to", "overflow"];
-    let (first, second) = (port(source, names), port(source, names));
-    match source.below(8) {
-        0 => source.pick(&ONE).to_string(),
-        1 | 2 => format!("{}({first},{second})", source.pick(&TWO)),
-        _ => format!("{}({first})", source.pick(&ONE)),
+impl<'a> Names<'a> {
+    fn of(spec: &'a ModelSpec) -> Self {
+        let variables = spec.variables().map(|v| spec.about(v).name.as_str());
+        let effects = candidates(spec, &Visited::nominal(spec));
+        Self {
+            all: variables.collect(),
+            effects: effects.into_iter().map(|effect| effect.id).collect(),
+        }
+    }
+
+    fn any(&self, source: &mut Source) -> &'a str {
+        source.pick(&self.all)
+    }
+
+    /// Identifier of an effect, now and then of one that cannot act.
+    fn effect(&self, source: &mut Source) -> String {
+        let id = &self.effects[source.below(self.effects.len())];
+        if source.chance(0.85) {
+            return id.clone();
+        }
+        let name = id.split('(').next().unwrap_or_default();
+        format!("{name}({},{})", self.any(source), self.any(source))
     }
 }
 
@@ -161,9 +155,10 @@ fn record(source: &mut Source, spec: &ModelSpec, usual: f64) -> String {
 }
 
 /// A model file that names the text.
-fn model_file(source: &mut Source, spec: &ModelSpec, names: &[&str]) -> String {
-    let effects: Vec<String> = (0..source.below(8) / 6)
-        .map(|_| format!("\"{}\"", effect(source, names)))
+fn model_file(source: &mut Source, spec: &ModelSpec, names: &Names) -> String {
+    let count = [0, 0, 0, 0, 0, 0, 1, 2][source.below(8)];
+    let effects: Vec<String> = (0..count)
+        .map(|_| format!("\"{}\"", names.effect(source)))
         .collect();
     let mut file = format!("model = \"own.mo\"\neffects = [{}]\n", effects.join(", "));
     if source.chance(0.2) {
@@ -179,19 +174,19 @@ fn model_file(source: &mut Source, spec: &ModelSpec, names: &[&str]) -> String {
         file += &format!("{name} = \"{name}{unit}\"\n");
     }
     if source.chance(0.2) {
-        let name = port(source, names);
+        let name = names.any(source);
         file += &format!("[known]\n{name} = {}\n", source.number());
     }
     if source.chance(0.15) {
         file += &format!(
             "[prior]\n{} = [{}, {}]\n",
-            port(source, names),
+            names.any(source),
             source.number(),
             source.number()
         );
     }
     if source.chance(0.15) {
-        let (at, other) = (port(source, names), port(source, names));
+        let (at, other) = (names.any(source), names.any(source));
         file += &format!(
             "[candidates.mine]\nparameters = {{ p = {{ start = {} }} }}\nterms = {{ {at} = \"-p*{other}{}\" }}\n",
             source.number(),
@@ -206,7 +201,7 @@ fn model_file(source: &mut Source, spec: &ModelSpec, names: &[&str]) -> String {
 }
 
 /// Arguments of a command.
-fn command(source: &mut Source, names: &[&str]) -> String {
+fn command(source: &mut Source, names: &Names) -> String {
     match source.below(12) {
         0 => "check own.mo".to_string(),
         1 => "check model.toml".to_string(),
@@ -216,11 +211,11 @@ fn command(source: &mut Source, names: &[&str]) -> String {
         5 => "export --effort quick model.toml data.csv --modelica out.mo".to_string(),
         6 => "export --effort quick model.toml data.csv --csv out.csv".to_string(),
         7 => "effects --model model.toml".to_string(),
-        8 => format!("add {} --model model.toml", effect(source, names)),
+        8 => format!("add {} --model model.toml", names.effect(source)),
         9 => format!(
             "design data.csv --model model.toml --effort quick --between {} {} --out out.csv --json out.json",
-            effect(source, names),
-            effect(source, names)
+            names.effect(source),
+            names.effect(source)
         ),
         10 => "identify data.csv --model model.toml --method rivc --json out.json".to_string(),
         _ => "compare data.csv --effort quick --model model.toml --json out.json --report out.html".to_string(),
@@ -236,10 +231,8 @@ pub(super) fn case(source: &mut Source) -> Ended {
         Ok(spec) => spec,
         Err(error) => return Ended::without_process(false, String::new(), Some(error.to_string())),
     };
-    let states = spec.states.iter().map(|state| state.about.name.as_str());
-    let parameters = spec.parameters.iter().map(|p| p.about.name.as_str());
-    let names: Vec<&str> = signals(&spec).chain(states).chain(parameters).collect();
-    let changed = text(source, original, &names);
+    let names = Names::of(&spec);
+    let changed = text(source, original, &names.all);
     if source.chance(0.1) {
         folder.write("own.mo", source.damaged(changed.as_bytes(), '='));
     } else {

@@ -72,8 +72,10 @@ impl ModelSpec {
         let balances = (0..self.states.len()).map(Port::Balance);
         let fitted = (0..self.parameters.len())
             .filter(|&i| {
+                let variable = Variable::Parameter(i);
                 self.parameters[i].given == Given::Fitted
-                    && self.occurrences(Variable::Parameter(i)) > 0
+                    && self.occurrences(variable) > 0
+                    && !self.is_in_dead_time(variable)
             })
             .map(Variable::Parameter);
         let flows = (0..self.flows.len())
@@ -126,6 +128,19 @@ impl ModelSpec {
             expression.each_variable(&mut |variable| count += usize::from(variable == of));
         }
         count
+    }
+
+    /// Whether the dead time of a delay contains a variable. An effect at it would change the dead time while the model runs, which no
+    /// simulation supports.
+    fn is_in_dead_time(&self, of: Variable) -> bool {
+        let contains = |part: &Expression| {
+            let mut found = false;
+            if let Expression::Delay(_, by) = part {
+                by.each_variable(&mut |variable| found |= variable == of);
+            }
+            found
+        };
+        self.expressions().any(|expression| expression.any(&contains))
     }
 
     /// Whether a flow is more than a reading, an alias, or a product with a fitted parameter that occurs nowhere else.
@@ -206,6 +221,26 @@ fn factors_of<'a>(expression: &'a Expression, all: &mut Vec<&'a Expression>) {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn nothing_acts_at_a_dead_time() {
+        let spec = ModelSpec::parse(
+            "model Late
+               parameter Real k = 1;
+               parameter Real tau = 3;
+               parameter Real share = 0.5;
+               input Real u;
+               output Real y = x;
+               Real x(start=0);
+             equation
+               der(x) = k*delay(u, share*tau) - x;
+             end Late;",
+        )
+        .unwrap();
+        let values = spec.ports().values.into_iter();
+        let values: Vec<String> = values.map(|port| port.names(&spec)).collect();
+        assert_eq!(values, ["k"]);
+    }
 
     #[test]
     fn a_measured_capacity_varies_with_its_own_state_only() {

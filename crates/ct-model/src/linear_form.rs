@@ -115,13 +115,26 @@ impl Model {
         inputs: &[f64],
         time: f64,
     ) -> Option<LinearForm> {
+        let is_delayed = !self.tape().delays.is_empty();
+        (!is_delayed).then(|| self.linear_undelayed(parameters, states, inputs, time))?
+    }
+
+    /// As [`Model::linear_about`], of the model without its dead times.
+    ///
+    /// # Panics
+    /// As there.
+    #[must_use]
+    pub fn linear_undelayed(
+        &self,
+        parameters: &[f64],
+        states: &[f64],
+        inputs: &[f64],
+        time: f64,
+    ) -> Option<LinearForm> {
         let tape = self.tape();
         assert_eq!(parameters.len(), tape.parameters, "parameters");
         assert_eq!(states.len(), tape.states, "states");
         assert_eq!(inputs.len(), tape.inputs, "inputs");
-        if !tape.delays.is_empty() {
-            return None;
-        }
         // One direction at a time: the derivatives with respect to the state or the input at this position.
         let column = |moved: Option<Register>| -> (Vec<Dual<1>>, Vec<Dual<1>>) {
             let parameters: Vec<_> = parameters.iter().map(|p| Dual::constant(*p)).collect();
@@ -134,6 +147,12 @@ impl Model {
                 registers.values[register] = Dual::variable(value, lane);
             }
             tape.evaluate_with_guards(&mut registers);
+            for _ in 0..tape.delays.len() {
+                for (i, &(what, _)) in tape.delays.iter().enumerate() {
+                    registers.values[tape.delayed(i)] = registers.values[what];
+                }
+                tape.evaluate_with_guards(&mut registers);
+            }
             let read = |at: &[Register]| at.iter().map(|&r| registers.values[r]).collect();
             (read(&tape.derivatives), read(&tape.outputs))
         };

@@ -49,6 +49,16 @@ pub enum Error {
         /// Number in the model.
         needed: usize,
     },
+    /// A controller reads an output that its command changes at once.
+    #[error(
+        "the loop cannot be simulated: {output} depends on {input} without a state in between, and the controller of {input} reads it"
+    )]
+    DirectTerm {
+        /// The output.
+        output: String,
+        /// The input.
+        input: String,
+    },
     /// A record has another number of inputs than the model.
     #[error(
         "{record}: it has {given} inputs, but the model has {needed}: name a column for each of them"

@@ -29,7 +29,7 @@ pub use fit::{
 };
 pub use ideal::{IdealRecords, NotIdeal, ideal_records};
 pub use many_starts::{keep_best_simulated, with_other_speeds};
-pub use model_setup::ModelSetup;
+pub use model_setup::{LoopController, ModelSetup, SimulatedLoop};
 pub use not_determined::not_determined;
 pub use prediction::{FitUncertainty, InitialStates, output_errors};
 pub use reading_grid::{ReadingGrid, reading_grid};

@@ -6,6 +6,7 @@
 
 mod build;
 mod rows;
+mod simulated_loop;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,6 +17,7 @@ use ct_signals::Record;
 use estimation::{Fit, Noise, Prior, Residuals, Robust, Start, Stopping};
 
 use self::build::{SETTLED, samples_of};
+pub use self::simulated_loop::{LoopController, SimulatedLoop};
 use crate::{Error, FitOptions, PriorValue, TimeLimit, clock::Clock, output_noise::output_noise};
 
 /// A model, the records, and which parameters are free.
@@ -39,6 +41,8 @@ pub struct ModelSetup<'a> {
     tolerance: f64,
     time_limit: Option<Arc<TimeLimit>>,
     interrupt: Option<&'a AtomicBool>,
+    /// The controllers, if the loop is simulated.
+    simulated_loop: Option<Arc<SimulatedLoop>>,
 }
 
 /// ... and an initial state within this factor.

@@ -140,7 +140,8 @@ impl ModelSpec {
             }
             found
         };
-        self.expressions().any(|expression| expression.any(&contains))
+        self.expressions()
+            .any(|expression| expression.any(&contains))
     }
 
     /// Whether a flow is more than a reading, an alias, or a product with a fitted parameter that occurs nowhere else.
@@ -181,12 +182,15 @@ impl ModelSpec {
 
     /// Whether an output contains a variable without a state in between.
     pub(super) fn is_read_directly(&self, variable: Variable) -> bool {
-        let mut seen = vec![false; self.flows.len()];
         let mut outputs = self.outputs.iter();
-        outputs.any(|output| {
-            let reading = Expression::Variable(output.variable);
-            self.holds(&reading, variable, &mut seen)
-        })
+        outputs.any(|output| self.is_direct(output.variable, variable))
+    }
+
+    /// Whether a state, flow or input is a variable or contains it without a state in between.
+    #[must_use]
+    pub fn is_direct(&self, read: Variable, on: Variable) -> bool {
+        let mut seen = vec![false; self.flows.len()];
+        self.holds(&Expression::Variable(read), on, &mut seen)
     }
 
     fn holds(&self, expression: &Expression, on: Variable, seen: &mut [bool]) -> bool {

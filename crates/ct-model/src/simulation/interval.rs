@@ -55,7 +55,7 @@ impl<T: Scalar> SimulationState<T> {
     ) {
         let Interval { begin, from, .. } = interval;
         let first = !self.begun;
-        let jumps = first || from != self.last;
+        let jumps = first || self.jumps(from);
         let bends = !interval.is_held();
         if !delays.all.is_empty() {
             if first {

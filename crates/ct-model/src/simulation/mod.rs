@@ -281,7 +281,7 @@ impl<T: Scalar> SimulationState<T> {
         until: f64,
         delays: &mut Delays<T>,
     ) -> Result<(), NoSolution> {
-        let is_still = self.begun && interval.is_held() && interval.from == self.last;
+        let is_still = self.begun && interval.is_held() && !self.jumps(interval.from);
         let goes_on = is_still && self.long_step.reaches(until);
         if goes_on && self.go_on_in_long_step(tape, interval, until, delays) {
             return Ok(());
@@ -294,6 +294,18 @@ impl<T: Scalar> SimulationState<T> {
             return Ok(());
         }
         self.steps(tape, interval, until, delays)
+    }
+
+    fn drive(&mut self, driven: &[Option<T>]) {
+        self.work.driven.clear();
+        self.work.driven.extend_from_slice(driven);
+        // A driven input may have other derivatives at the same value.
+        (self.computed, self.ended_within) = (false, false);
+    }
+
+    /// Whether an input jumps between the last interval and one that begins with these inputs.
+    fn jumps(&self, from: &[f64]) -> bool {
+        from != self.last || !self.work.driven.is_empty()
     }
 
     /// Changes from exact steps to explicit ones: the inputs are no longer held, and the model is nonlinear in them.

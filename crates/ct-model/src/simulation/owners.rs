@@ -48,6 +48,12 @@ impl<'a, T: SimulationNumber> Simulation<'a, T> {
     pub fn advance(&mut self, from: &[f64], to: &[f64], until: f64) -> Result<(), NoSolution> {
         T::advance(&mut self.state, self.model, (from, to), until)
     }
+
+    /// Sets inputs that a controller drives: `driven` has an entry for each input, and those with a number are held at it from now on, with
+    /// its derivatives. [`Self::read`] and [`Self::advance`] then take the values of these numbers for such an input.
+    pub fn drive(&mut self, driven: &[Option<T>]) {
+        self.state.drive(driven);
+    }
 }
 
 impl<T> Simulation<'_, T> {

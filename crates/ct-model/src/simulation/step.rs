@@ -18,6 +18,8 @@ pub(super) struct Step<T> {
     pub begun: bool,
     /// Guards on whose surfaces the states slide.
     pub sliding: Sliding<T>,
+    /// The inputs that a controller drives, held, with their derivatives; empty if there is none.
+    pub driven: Vec<Option<T>>,
 }
 
 impl<T: Scalar> Step<T> {
@@ -29,6 +31,7 @@ impl<T: Scalar> Step<T> {
             next: vec![zero; tape.states],
             begun: false,
             sliding: Sliding::none(),
+            driven: Vec::new(),
         }
     }
 
@@ -135,6 +138,11 @@ impl<'a, T: Scalar> Drive<'a, T> {
                 } else {
                     (time - begin) * rise + from
                 };
+            }
+            for (i, driven) in work.driven.iter().enumerate() {
+                if let Some(driven) = driven {
+                    values[tape.input(i)] = *driven;
+                }
             }
         }
         let first = tape.state(0);

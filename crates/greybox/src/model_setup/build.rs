@@ -154,6 +154,7 @@ impl<'a> ModelSetup<'a> {
             tolerance: ct_model::TOLERANCE,
             time_limit: None,
             interrupt: None,
+            simulated_loop: None,
         })
     }
 }

@@ -6,11 +6,25 @@ use estimation::{Prior, Residuals, Sample};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::ModelSetup;
+use super::simulated_loop::Regulators;
+
+/// A row of a record in all simulations: those of the first derivatives come first.
+struct Instant<'a, T> {
+    record: usize,
+    row: usize,
+    /// The outputs of each simulation.
+    read: &'a [T],
+    /// The commands of each simulation, in the order of the controllers; empty without a loop.
+    commands: &'a [T],
+}
 
 impl<'a> ModelSetup<'a> {
     /// The outputs that the model gives, a series for each record and output; `None` where the simulation cannot go on.
     #[must_use]
     pub fn simulate(&self, x: &[f64]) -> Option<Vec<Vec<f64>>> {
+        if self.simulated_loop.is_some() {
+            return self.on_measured_inputs().simulate(x);
+        }
         let residuals = estimation::residuals(self, x)?;
         let measured = self.records.iter().flat_map(|record| &record.outputs);
         let simulated = measured.zip(residuals);
@@ -24,9 +38,9 @@ impl<'a> ModelSetup<'a> {
             return Some(model.collect());
         }
         let mut all = vec![Vec::new(); self.records.len() * self.samples.len()];
-        self.each_instant::<f64>(x, &[], |r, _, outputs| {
-            for (o, y) in outputs.iter().enumerate() {
-                all[r * self.samples.len() + o].push(*y);
+        self.each_instant::<f64>(x, &[], |Instant { record, read, .. }| {
+            for (o, y) in read.iter().enumerate() {
+                all[record * self.samples.len() + o].push(*y);
             }
             Some(())
         })?;
@@ -46,13 +60,13 @@ impl<'a> ModelSetup<'a> {
         let shown = ModelSetup {
             model: &model,
             samples: vec![0; states],
-            ..self.clone()
+            ..self.on_measured_inputs()
         };
         let mut all = vec![Vec::new(); self.records.len() * states];
         if states > 0 {
-            shown.each_instant::<f64>(x, &[], |r, _, values| {
-                for (i, value) in values.iter().enumerate() {
-                    all[r * states + i].push(*value);
+            shown.each_instant::<f64>(x, &[], |Instant { record, read, .. }| {
+                for (i, value) in read.iter().enumerate() {
+                    all[record * states + i].push(*value);
                 }
                 Some(())
             })?;
@@ -60,18 +74,28 @@ impl<'a> ModelSetup<'a> {
         Some(all)
     }
 
-    /// Simulates all records with derivatives with respect to some entries, and passes the outputs row by row to a function: the outputs of as
-    /// many simulations as the derivatives need.
+    /// The setup without its loop.
+    fn on_measured_inputs(&self) -> Self {
+        Self {
+            simulated_loop: None,
+            ..self.clone()
+        }
+    }
+
+    /// Simulates all records with derivatives with respect to some entries, and passes the outputs row by row to a function: the outputs and
+    /// commands of as many simulations as the derivatives need.
     fn each_instant<T: SimulationNumber>(
         &self,
         x: &[f64],
         by: &[usize],
-        mut each: impl FnMut(usize, usize, &[T]) -> Option<()>,
+        mut each: impl FnMut(Instant<'_, T>) -> Option<()>,
     ) -> Option<()> {
         let (count, states) = (self.parameter_count(), self.model.spec().states.len());
         let outputs = self.samples.len();
         let mut inputs = vec![0.0; self.model.spec().inputs.len()];
         let mut to = inputs.clone();
+        let simulated_loop = self.simulated_loop.as_deref();
+        let reads_driven = simulated_loop.is_some_and(|of| of.is_read(self.model.spec()));
         for (r, record) in self.records.iter().enumerate() {
             let own = count + r * states..count + (r + 1) * states;
             let lanes: Vec<usize> = by
@@ -98,6 +122,15 @@ impl<'a> ModelSetup<'a> {
                 })
                 .collect();
             let mut read = vec![T::constant(0.0); outputs * chunks.len()];
+            let mut regulators: Vec<Regulators<'_, T>> = simulated_loop
+                .iter()
+                .flat_map(|of| {
+                    simulations
+                        .iter()
+                        .map(|_| Regulators::new(of, r, inputs.len()))
+                })
+                .collect();
+            let mut commands = Vec::new();
             for k in 0..record.len() {
                 for (i, input) in record.inputs.iter().enumerate() {
                     inputs[i] = input.values[k];
@@ -110,7 +143,28 @@ impl<'a> ModelSetup<'a> {
                 {
                     simulation.read(&inputs, read);
                 }
-                each(r, k, &read)?;
+                commands.clear();
+                let of_simulations = simulations.iter_mut().zip(read.chunks_exact_mut(outputs));
+                for (regulators, (simulation, read)) in regulators.iter_mut().zip(of_simulations) {
+                    let driven = regulators.commands(record, k, read);
+                    simulation.drive(driven);
+                    let controllers = simulated_loop.iter().flat_map(|of| of.controllers());
+                    for i in controllers.map(|controller| controller.input) {
+                        if let Some(driven) = driven[i] {
+                            (inputs[i], to[i]) = (driven.value(), driven.value());
+                            commands.push(driven);
+                        }
+                    }
+                    if reads_driven {
+                        simulation.read(&inputs, read);
+                    }
+                }
+                each(Instant {
+                    record: r,
+                    row: k,
+                    read: &read,
+                    commands: &commands,
+                })?;
                 if k + 1 < record.len() {
                     let until = begin + (record.time[k + 1] - record.time[0]) / self.time_unit;
                     for simulation in &mut simulations {
@@ -163,7 +217,22 @@ impl<'a> ModelSetup<'a> {
         let columns = by.len() + 1;
         let outputs = self.samples.len();
         let mut row = vec![0.0; columns];
-        self.each_instant::<T>(x, by, |r, k, read| {
+        let in_loop = self.simulated_loop.as_deref();
+        let mut response = in_loop.map(|of| (of, of.response(columns)));
+        let driven = in_loop.map_or(0, |of| of.controllers().len());
+        let mut driven_columns = vec![0.0; driven * columns];
+        self.each_instant::<T>(x, by, |instant| {
+            let Instant {
+                record: r,
+                row: k,
+                read,
+                commands,
+            } = instant;
+            if let Some((_, response)) = &mut response
+                && k == 0
+            {
+                response.reset();
+            }
             let own = count + r * states..count + (r + 1) * states;
             for output in 0..outputs {
                 row.fill(0.0);
@@ -175,15 +244,39 @@ impl<'a> ModelSetup<'a> {
                 let model = read[output].value();
                 let measured = self.records[r].outputs[output].values[k];
                 row[columns - 1] = measured - model;
+                if let Some((_, response)) = &response {
+                    response.add_to(output, &mut row);
+                }
                 let sample = Sample {
                     output,
                     first: k == 0,
                     missing: measured.is_nan(),
                 };
-                let finite = row[..columns - 1].iter().all(|v| v.is_finite()) && model.is_finite();
+                let derivatives = row[..columns - 1].iter().all(|v| v.is_finite());
+                let residual = row[columns - 1].is_finite() || sample.missing;
+                let finite = derivatives && residual && model.is_finite();
                 if !(finite && each(sample, &mut row)) {
                     return None;
                 }
+            }
+            if let Some((of, response)) = &mut response {
+                driven_columns.fill(0.0);
+                let all = of
+                    .controllers()
+                    .iter()
+                    .zip(driven_columns.chunks_exact_mut(columns));
+                for (d, (of, columns)) in all.enumerate() {
+                    let mine = (0..by.len()).filter(|&c| by[c] < count || own.contains(&by[c]));
+                    for (lane, column) in mine.enumerate() {
+                        let command = commands[lane / T::LANES * driven + d];
+                        columns[column] = -command.slopes()[lane % T::LANES];
+                    }
+                    let measured = self.records[r].inputs[of.input].values[k];
+                    if let Some(last) = columns.last_mut() {
+                        *last = commands[d].value() - measured;
+                    }
+                }
+                response.advance(&driven_columns);
             }
             Some(())
         })

@@ -1,6 +1,7 @@
 //! The simulated loop: derivatives, a fine reference, replay, and the effect of coloured noise with and without the loop.
 
 mod disturbance;
+mod models;
 
 use crate::support::Rig;
 use ct_signals::{Channel, Record, excitation, noise};

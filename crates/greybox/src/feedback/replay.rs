@@ -1,0 +1,136 @@
+//! The controller of a record simulated on the measured signals.
+
+use ct_signals::{Hold, Record};
+use estimation::Triangle;
+use plants::controller::{Controller, MAX_CONTROLLER_STATES};
+use plants::{Dual, Scalar};
+
+use crate::Error;
+
+/// Checks that the reference at a position moves: a constant one drives nothing.
+pub(crate) fn require_moving_reference(records: &[Record], reference: usize) -> Result<(), Error> {
+    for record in records {
+        if let Some(reference) = record.references.get(reference) {
+            let (low, high) = reference.range();
+            if low >= high {
+                return Err(Error::ConstantReference {
+                    record: record.name.clone(),
+                    value: low,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The controller simulated on the measured signals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Replay {
+    /// The controller's states when the record begins, those that fit the measured command best.
+    pub states: Vec<f64>,
+    /// The measured command less the controller's \[input unit\].
+    pub beside: Vec<f64>,
+    /// Root mean square of the additional input \[input unit\].
+    pub rms: f64,
+    /// Standard deviation of the measured command \[input unit\].
+    pub moves: f64,
+}
+
+/// Rounds of the fit of initial states: without limits the first one is exact.
+const ROUNDS: usize = 6;
+
+/// Runs a controller on the measured reference and reading of a record, and compares the measured command with its own.
+///
+/// # Errors
+/// Where the record has no reference, or its command is not held.
+pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error> {
+    replay_of(controller, record, 0, 0)
+}
+
+/// As [`replay`], of the controller that drives an input, with the reference at a position.
+pub(crate) fn replay_of(
+    controller: &Controller,
+    record: &Record,
+    input: usize,
+    reference: usize,
+) -> Result<Replay, Error> {
+    let Some(reference) = record.references.get(reference) else {
+        return Err(Error::NoReference {
+            record: record.name.clone(),
+        });
+    };
+    if record.inputs[input].hold != Hold::Zero {
+        return Err(Error::CommandNotHeld {
+            record: record.name.clone(),
+        });
+    }
+    record.validate()?;
+    // The controller used readings that the record lacks; they are interpolated linearly.
+    let Some(read) = record.outputs.get(controller.output()) else {
+        return Err(Error::Outputs {
+            record: record.name.clone(),
+            given: record.outputs.len(),
+            needed: controller.output() + 1,
+        });
+    };
+    let y = &read.interpolated();
+    let (r, u) = (&reference.values, &record.inputs[input].values);
+    let n = controller.states();
+    let run = |states: &[f64]| {
+        let duals: Vec<Dual<MAX_CONTROLLER_STATES>> = states
+            .iter()
+            .enumerate()
+            .map(|(lane, value)| Dual::variable(*value, lane))
+            .collect();
+        let mut regulator = controller.start(&duals);
+        let mut triangle = Triangle::new(n + 1);
+        let mut row = vec![0.0; n + 1];
+        let mut beside = Vec::with_capacity(r.len());
+        for k in 0..r.len() {
+            let given = regulator.command(r[k], Dual::constant(y[k]), step(record, k));
+            row[..n].copy_from_slice(&given.eps[..n]);
+            row[n] = u[k] - given.re;
+            triangle.push(&row);
+            beside.push(row[n]);
+        }
+        triangle.finish();
+        let rms = (beside.iter().map(|d| d * d).sum::<f64>() / r.len().max(1) as f64).sqrt();
+        (triangle, beside, rms)
+    };
+    let free: Vec<usize> = (0..n).collect();
+    // Command at zero control error, for the state before saturation.
+    let seen = controller.linear(1.0).c;
+    let mut states: Vec<f64> = seen
+        .iter()
+        .map(|c| {
+            c * (u[0] - controller.direct() * (r[0] - y[0])) / seen.iter().sum::<f64>().max(1.0)
+        })
+        .collect();
+    let mut best = run(&states);
+    for _ in 0..ROUNDS {
+        let step = best.0.solve(&free, &[], 0.0);
+        let moved: Vec<f64> = states.iter().zip(&step).map(|(x, d)| x + d).collect();
+        let next = run(&moved);
+        if next.2 >= best.2 || next.2.is_nan() {
+            break;
+        }
+        (states, best) = (moved, next);
+    }
+    let mean = u.iter().sum::<f64>() / u.len() as f64;
+    let moves = (u.iter().map(|u| (u - mean).powi(2)).sum::<f64>() / u.len() as f64).sqrt();
+    Ok(Replay {
+        states,
+        beside: best.1,
+        rms: best.2,
+        moves,
+    })
+}
+
+/// The time from sample `k` to the next one, the last one as long as the one before.
+pub(crate) fn step(record: &Record, k: usize) -> f64 {
+    let k = k.min(record.len().saturating_sub(2));
+    record
+        .time
+        .get(k + 1)
+        .map_or(1.0, |next| next - record.time[k])
+}

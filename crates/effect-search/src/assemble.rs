@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use ct_model::Given;
 use ct_model::effects::Candidate;
 use ct_signals::ArModel;
-use estimation::{Fit, Noise};
+use estimation::{Fit, Noise, moved_by_weighting};
 use greybox::{Robust, not_determined, weighted_rms};
 
+use crate::control_loop::{ControlLoop, widened};
 use crate::node::{Context, FINE, Node};
 use crate::output_step::output_steps;
 use crate::quantisation::quantisation;
@@ -65,24 +66,29 @@ pub(crate) fn assemble(
         }
     };
     let floors: Vec<f64> = own.noise.iter().map(level).collect();
-    // All models of the error ladder are fitted with white noise, each output scaled by its noise, so that their errors are comparable. The
-    // last model is fitted again with its own noise model if its residual is noise.
+    // All models of the error ladder are fitted on the measured inputs with white noise, each output scaled by its noise, so that their
+    // errors are comparable. The last model is fitted again in its loop, with its own noise model, if its residual is noise.
     let white = Noise::white(outputs.len());
-    let weighted = Context {
-        scales: (outputs.len() > 1).then(|| floors.clone()),
+    let measured = Context {
+        simulated_loop: None,
         ..context.clone()
     };
+    let weighted = Context {
+        scales: (outputs.len() > 1).then(|| floors.clone()),
+        ..measured.clone()
+    };
     let mut ladder = ladder(&weighted, base, last, &white)?;
-    if not_noise.is_none()
-        && let Some(end) = ladder.last_mut()
-        && let Ok(shown) = context.refitted(end, &own.noise, FINE)
-    {
-        *end = shown;
-    }
-    let steps = ladder
+    let mut steps = ladder
         .iter()
-        .map(|node| step(context, base, node, (&own.noise, &floors)))
+        .map(|node| step(&measured, base, node, (&own.noise, &floors)))
         .collect::<Result<Vec<_>, Error>>()?;
+    if not_noise.is_none()
+        && let (Some(end), Some(shown)) = (ladder.last_mut(), steps.last_mut())
+        && let Ok(again) = context.refitted(end, &own.noise, FINE)
+    {
+        *shown = step(context, base, &again, (&own.noise, &floors))?;
+        *end = again;
+    }
     let named = |values: &[f64]| -> BTreeMap<String, f64> {
         let names = outputs.iter().map(|y| y.name.clone());
         names.zip(values.iter().copied()).collect()
@@ -148,6 +154,7 @@ pub(crate) fn assemble(
         record_numbers,
         candidates: context.candidates.len(),
         absorbed: context.absorbed.clone(),
+        control_loop: context.control_loop.clone(),
         left_out,
         seconds: seconds + context.limit.seconds(),
     })
@@ -226,6 +233,13 @@ fn step(
             context.longest_memory(),
         );
         robust.map_or_else(|_| node.fit.std_errors(), |robust| robust.std_errors)
+    };
+    let errors = if ControlLoop::widens(context.control_loop.as_ref()) {
+        let order = context.thresholds.noise_order;
+        let moved = moved_by_weighting(&setup, &node.fit, order, FINE)?;
+        widened(errors, &moved)
+    } else {
+        errors
     };
     let spec = node.spec();
     let units = spec.parameters.iter().map(|p| p.about.unit.clone());

@@ -10,11 +10,12 @@ use ct_model::effects::{
     Candidate, OwnCandidate, OwnError, Visited, candidates_keeping, level_shifts, own_candidates,
     shapes_keeping,
 };
-use ct_model::{Model, ModelSpec};
+use ct_model::{Expression, Model, ModelSpec};
 use estimation::{Fit, Noise, Residuals, within};
 use greybox::{FitOptions, ModelSetup, possible_reading_steps};
 
 use crate::Error;
+use crate::control_loop::enclose;
 use crate::node::{Context, FINE, Node};
 use crate::problem::{Kept, Limit, Options, Problem};
 
@@ -85,6 +86,8 @@ pub(crate) fn begin<'a>(
         ties: Vec::new(),
         absorbed: Vec::new(),
         tolerance: ct_model::TOLERANCE,
+        simulated_loop: None,
+        control_loop: None,
         limit,
         thresholds: options.thresholds,
     };
@@ -106,6 +109,7 @@ pub(crate) fn begin<'a>(
         let white = Noise::white(problem.spec.outputs.len());
         bare = context.refitted(&bare, &white, FINE)?;
     }
+    bare = context.enclosed(bare, options)?;
     let (visited, tolerance) = {
         let (setup, fit) = (context.setup(&bare.model)?, &bare.fit);
         let visited = visited(problem, &setup, fit)?;
@@ -130,7 +134,25 @@ pub(crate) fn begin<'a>(
     Ok((context, node))
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    /// The believed model in its loop, if that can be simulated.
+    fn enclosed(&mut self, bare: Node, options: &Options) -> Result<Node, Error> {
+        let Node { added, model, fit } = bare;
+        let controllers = (&self.problem.controllers[..], options.simulate_loop);
+        let (fit, simulated, control_loop) = {
+            let timed = model
+                .spec()
+                .expressions()
+                .any(|of| of.any(&|part| *part == Expression::Time));
+            let setup = self.setup(&model)?;
+            let enclosed = enclose(setup, fit, controllers, !timed, FINE)?;
+            let simulated = enclosed.setup.simulated_loop().cloned();
+            (enclosed.fit, simulated, enclosed.control_loop)
+        };
+        (self.simulated_loop, self.control_loop) = (simulated, control_loop);
+        Ok(Node { added, model, fit })
+    }
+
     /// A set with one more effect of the model file, fitted from its best start and from the values of the file.
     fn with_listed(&self, node: Node, id: &str) -> Result<Node, Error> {
         let white = Noise::white(self.problem.spec.outputs.len());

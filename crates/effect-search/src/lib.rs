@@ -7,6 +7,7 @@
 mod accept;
 mod assemble;
 mod believed;
+mod control_loop;
 pub mod design;
 mod diagnose;
 mod error;
@@ -35,6 +36,7 @@ mod ties;
 mod unknown;
 
 pub use believed::{Believed, all_candidates, believed};
+pub use control_loop::{ControlLoop, Enclosed, NotSimulated, enclose, widened};
 pub use diagnose::{Progress, diagnose};
 pub use error::Error;
 pub use failures::{Bin, Failure, FailureKind, Failures};

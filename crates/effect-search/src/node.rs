@@ -6,9 +6,10 @@ use std::sync::Arc;
 use ct_model::effects::{Candidate, apply};
 use ct_model::{Model, ModelSpec};
 use estimation::{Fit, Noise, Start, Stopping, fit_from};
-use greybox::{FitOptions, ModelSetup};
+use greybox::{FitOptions, ModelSetup, SimulatedLoop};
 
 use crate::Error;
+use crate::control_loop::ControlLoop;
 use crate::problem::{Limit, Problem};
 use crate::result::Absorbed;
 use crate::thresholds::Thresholds;
@@ -43,6 +44,10 @@ pub(crate) struct Context<'a> {
     pub ties: Vec<usize>,
     /// Candidates of the model file that the model's parameters absorb.
     pub absorbed: Vec<Absorbed>,
+    /// The loop of the records, if it is simulated.
+    pub simulated_loop: Option<Arc<SimulatedLoop>>,
+    /// What is known of the loop.
+    pub control_loop: Option<ControlLoop>,
     pub limit: Limit<'a>,
     pub thresholds: Thresholds,
 }
@@ -98,8 +103,12 @@ impl Context<'_> {
         let setup = ModelSetup::new(model, &problem.records, &known, problem.time_unit)?;
         let setup = setup.with_tolerance(self.tolerance);
         let setup = self.limit.on(setup.with_priors(&priors)?);
-        Ok(match &self.scales {
+        let setup = match &self.scales {
             Some(scales) => setup.with_scales(scales.clone()),
+            None => setup,
+        };
+        Ok(match &self.simulated_loop {
+            Some(simulated) => setup.in_loop(simulated.clone()),
             None => setup,
         })
     }
@@ -116,6 +125,7 @@ impl Context<'_> {
         let setup = self.setup(&model)?;
         let starts = starts.into_iter().map(Start::from).collect();
         let fit = fit_from(&setup, starts, noise, stopping)?;
+        let fit = setup.with_measured_errors(fit);
         Ok(Node { added, model, fit })
     }
 

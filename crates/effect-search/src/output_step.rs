@@ -1,7 +1,7 @@
 //! Results of one model at one output: its error, where it fails, and the tests of its residual.
 
 use ct_model::{Expression, Variable};
-use ct_signals::{ArModel, Channel, Record, residual_tests};
+use ct_signals::{ArModel, Channel, residual_tests};
 use estimation::Fit;
 use greybox::ModelSetup;
 use serde::{Deserialize, Serialize};
@@ -136,7 +136,7 @@ pub fn output_steps(
             rmse_test: test.map(|test| test.rmse[o]),
             rmse_test_50: test.and_then(|test| Some(test.rmse_50.as_ref()?[o])),
             held_out_error: test.map(|test| test.errors[o]),
-            tests: ResidualTests::of(&records[0], &residuals[o]),
+            tests: ResidualTests::of(&setup.external_signals(&records[0]), &residuals[o]),
             failures: locate(&series, &signals, &noise[o]),
         }
     };
@@ -144,24 +144,25 @@ pub fn output_steps(
 }
 
 impl ResidualTests {
-    /// Tests of a residual of one record: whiteness, and the input with the smallest p-value, corrected for the number of inputs.
+    /// Tests of a residual of one record: whiteness, and the signal from outside with the smallest p-value, corrected for the number of
+    /// signals.
     #[must_use]
-    pub fn of(record: &Record, residual: &[f64]) -> Self {
+    pub fn of(external: &[&Channel], residual: &[f64]) -> Self {
         let samples = residual.iter().filter(|e| !e.is_nan()).count();
         let lags = (samples / 10).clamp(2, 60);
         let portmanteau = (samples / 10).clamp(2, 25);
-        let moves = |input: &&Channel| {
+        let moves = |input: &&&Channel| {
             let (low, high) = input.range();
             high > low
         };
-        let inputs: Vec<&Channel> = record.inputs.iter().filter(moves).collect();
+        let inputs: Vec<&&Channel> = external.iter().filter(moves).collect();
         let count = inputs.len() as f64;
         let tested = inputs.iter().filter_map(|input| {
             residual_tests::prewhitened_input_test(&input.values, residual, lags).ok()
         });
         let clearest = tested.min_by(|a, b| a.1.total_cmp(&b.1));
         let (cross, p) = clearest.unwrap_or((vec![f64::NAN; lags + 1], f64::NAN));
-        let bound = 1.96 * (record.len() as f64).sqrt() / samples.max(1) as f64;
+        let bound = 1.96 * (residual.len() as f64).sqrt() / samples.max(1) as f64;
         Self {
             autocorrelation: residual_tests::autocorrelation(residual, lags),
             cross_correlation: cross,

@@ -8,7 +8,7 @@ use std::time::Duration;
 use ct_model::ModelSpec;
 use ct_model::effects::OwnCandidate;
 use ct_signals::Record;
-use greybox::{ModelSetup, PriorValue, TimeLimit};
+use greybox::{LoopController, ModelSetup, PriorValue, TimeLimit};
 use serde::{Deserialize, Serialize};
 
 use crate::thresholds::Thresholds;
@@ -34,6 +34,8 @@ pub struct Problem {
     pub candidates: BTreeMap<String, OwnCandidate>,
     /// Identifiers of effects of the catalogue that are not candidates.
     pub left_out: BTreeSet<String>,
+    /// Controllers that drove the inputs of the records; references are in [`Record::references`].
+    pub controllers: Vec<LoopController>,
     /// Seconds in one unit of the model's time.
     pub time_unit: f64,
     /// The unit of the model's time, as it is written: `s`, `h`.
@@ -58,6 +60,8 @@ pub struct Options<'a> {
     pub starts: usize,
     /// Seed of the starts.
     pub seed: u64,
+    /// Simulate the loop of the controllers from its references; otherwise the model runs on the measured inputs.
+    pub simulate_loop: bool,
     /// Time limit of the search; steps beyond it are left out.
     pub time_limit: Option<Duration>,
     /// Interruption flag: when set, the search ends soon with the best that was found so far.
@@ -72,6 +76,7 @@ impl Default for Options<'_> {
             max_effects: 4,
             starts: 12,
             seed: 1,
+            simulate_loop: true,
             time_limit: None,
             interrupt: None,
             thresholds: Thresholds::DEFAULT,

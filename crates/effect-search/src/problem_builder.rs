@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use ct_model::effects::OwnCandidate;
 use ct_model::{Model, ModelSpec};
 use ct_signals::Record;
-use greybox::{ModelSetup, PriorValue};
+use greybox::{LoopController, ModelSetup, PriorValue};
 
 use crate::{Error, Kept, Problem};
 
@@ -57,6 +57,7 @@ impl Problem {
                 priors: BTreeMap::new(),
                 candidates: BTreeMap::new(),
                 left_out: BTreeSet::new(),
+                controllers: Vec::new(),
                 time_unit: 1.0,
                 time_unit_name: "s".to_string(),
             },
@@ -104,6 +105,12 @@ impl ProblemBuilder {
     /// Leaves effects of the catalogue out of the candidates, by their identifiers.
     pub fn left_out<S: Into<String>>(mut self, effects: impl IntoIterator<Item = S>) -> Self {
         self.problem.left_out = effects.into_iter().map(Into::into).collect();
+        self
+    }
+
+    /// A controller that drove an input of the records.
+    pub fn controller(mut self, controller: LoopController) -> Self {
+        self.problem.controllers.push(controller);
         self
     }
 

@@ -7,7 +7,7 @@ mod starts;
 use serde::{Deserialize, Serialize};
 
 use self::end::End;
-pub use self::prewhitened::{coloured, noise_of, prewhitened};
+pub use self::prewhitened::{coloured, moved_by_weighting, noise_of, prewhitened};
 pub use self::starts::Start;
 use self::starts::{free_bounds, least_cost, minima};
 use crate::{

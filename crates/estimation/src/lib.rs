@@ -68,7 +68,9 @@ mod triangle;
 mod weights;
 
 pub use error::Error;
-pub use fit::{Fit, Start, coloured, fit_from, fit_from_best, noise_of, prewhitened};
+pub use fit::{
+    Fit, Start, coloured, fit_from, fit_from_best, moved_by_weighting, noise_of, prewhitened,
+};
 pub use levenberg_marquardt::{Stop, Stopping, within};
 pub use noise::Noise;
 pub use prior::{Prior, begin_near_priors};

@@ -79,7 +79,7 @@ pub enum Error {
     Stopped,
     /// The loop cannot be simulated without its reference.
     #[error(
-        "{record}: the record holds no reference, which a controller follows: name its column as reference under [columns]"
+        "{record}: the record holds no reference, which a controller follows: name its column as reference in the model file, under [columns] or, for a model of your own, under its [controller.INPUT]"
     )]
     NoReference {
         /// The record.

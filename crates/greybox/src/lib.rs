@@ -21,7 +21,9 @@ mod time_limit;
 
 pub use clock::common_clock;
 pub use error::Error;
-pub use estimation::{Error as NoFit, Fit, Noise, Robust, Rows, Start, Stop, Stopping, Triangle};
+pub use estimation::{
+    Error as NoFit, Fit, Noise, Robust, Rows, Start, Stop, Stopping, Triangle, moved_by_weighting,
+};
 pub use feedback::{LinearPlant, Replay, replay};
 pub use fit::{
     FitOptions, coloured, fit, fit_from, fit_initial_levels, fit_onward, noise_of, prewhitened,

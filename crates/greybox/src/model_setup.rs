@@ -5,6 +5,7 @@
 //! their channels say; an output of a row is read with the inputs of that row.
 
 mod build;
+mod linear_response;
 mod rows;
 mod simulated_loop;
 

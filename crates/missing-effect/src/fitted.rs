@@ -4,7 +4,7 @@ use greybox::{Fit, FitUncertainty, Setup};
 
 use crate::{
     ControlLoop, Error, Options, Problem,
-    base::{closed_loop::other_metric, gaps::Mended},
+    base::{closed_loop::moved_by_weighting, gaps::Mended},
     compare::{Believed, believed},
     fit::noise_model::NOISE_ORDER,
 };
@@ -53,9 +53,7 @@ fn of_whole<R>(
     let parameters = setup.parameter_count();
     let mut uncertainty = FitUncertainty::of(setup, fit, parameters, NOISE_ORDER)?;
     if let (Some(known), true) = (&mut uncertainty, ControlLoop::widens(control_loop.as_ref())) {
-        let other = other_metric(setup, &shown)?;
-        let moved = fit.x.iter().zip(&other).map(|(own, other)| own - other);
-        known.widen(&moved.collect::<Vec<f64>>());
+        known.widen(&moved_by_weighting(setup, fit)?);
     }
     Ok(then(Fitted {
         setup,

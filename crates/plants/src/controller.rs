@@ -1,7 +1,8 @@
 //! Controllers with output limits, to close the loop around a [`crate::Simulator`], for any [`Scalar`].
 //!
 //! - **PI**: `u = b + gain e`, `b+ = b + gain h/integral_time e`, `e = r - y`; anti-windup: the integral is held while the command is at a
-//!   limit and the error would drive it further beyond.
+//!   limit and the error would drive it further beyond. Some controllers update the integral first: `b+ = b + gain h/integral_time e`,
+//!   `u = b+ + gain e` ([`Controller::with_integral_first`]).
 //! - **R/S**: `S(q^-1) u = R(q^-1) e`, `s_0 = 1`, in the transposed direct form `u = x_1 + r_0 e`, `x_i+ = x_(i+1) + r_i e - s_i u`. `u` is
 //!   the limited command (K. J. Astrom, B. Wittenmark, Computer Controlled Systems, 3rd ed. 1997, section 9.4), so that integral action in
 //!   `R/S` does not wind up. If `S(1)` is not zero, one more state holds the command of the operating point.
@@ -24,6 +25,8 @@ enum Kind {
     Pi {
         gain: f64,
         integral_time: f64,
+        /// The integral is updated before the command is computed.
+        integral_first: bool,
     },
     /// `r` and `s` have equal length, and `s[0] = 1`.
     Sampled {
@@ -109,9 +112,23 @@ impl Controller {
             Kind::Pi {
                 gain,
                 integral_time,
+                integral_first: false,
             },
             limits,
         )
+    }
+
+    /// The PI controller that updates its integral before it computes the command; `None` if that is no other controller.
+    #[must_use]
+    pub fn with_integral_first(&self) -> Option<Self> {
+        let mut other = self.clone();
+        match &mut other.kind {
+            Kind::Pi { integral_first, .. } if !*integral_first => {
+                *integral_first = true;
+                Some(other)
+            }
+            _ => None,
+        }
     }
 
     /// `S(q^-1) u = R(q^-1) e`: coefficients of the powers 0, 1, 2, ... of `q^-1`, the delay by one sample; `limits` \[input\].
@@ -226,7 +243,7 @@ impl Controller {
         self.limits
     }
 
-    /// Direct feedthrough: the immediate change of the command per unit of error \[input/output\].
+    /// Direct feedthrough: the immediate change of the command per unit of error \[input/output\], apart from that of the integral.
     #[must_use]
     pub fn direct(&self) -> f64 {
         match &self.kind {
@@ -242,6 +259,7 @@ impl Controller {
             Kind::Pi {
                 gain,
                 integral_time,
+                ..
             } => format!(
                 "gain = {}, integral_time = {} s",
                 short(*gain),
@@ -270,14 +288,19 @@ impl Controller {
         let mut a = vec![vec![0.0; n]; n];
         let mut b = vec![0.0; n];
         let mut c = vec![0.0; n];
+        let mut d = self.direct();
         match &self.kind {
             Kind::Pi {
                 gain,
                 integral_time,
+                integral_first,
             } => {
                 a[0][0] = 1.0;
                 c[0] = 1.0;
                 b[0] = gain * h / integral_time;
+                if *integral_first {
+                    d += b[0];
+                }
             }
             Kind::Sampled {
                 r,
@@ -302,12 +325,7 @@ impl Controller {
                 }
             }
         }
-        LinearController {
-            a,
-            b,
-            c,
-            d: self.direct(),
-        }
+        LinearController { a, b, c, d }
     }
 }
 

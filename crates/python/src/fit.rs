@@ -58,7 +58,7 @@ impl Fit {
             time: None,
             interrupt: Some(stop),
         };
-        let fitted = FittedModel::fit(&model.file, records, options, limit)?;
+        let fitted = FittedModel::fit(&model.file, records, (options, true), limit)?;
         Self::of_fitted(model, frames, fitted)
     }
 

@@ -219,6 +219,7 @@ pub fn outcome(
             .collect(),
         candidates: own,
         left_out: std::collections::BTreeSet::default(),
+        controllers: Vec::new(),
         time_unit: driven.time_unit.0,
         time_unit_name: driven.time_unit.1.to_string(),
     };

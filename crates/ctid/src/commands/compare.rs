@@ -30,8 +30,7 @@ pub(super) struct Compare {
     /// Held-out record: only scored, not used for fits or selection; may be repeated
     #[arg(long, value_name = "T.csv")]
     test: Vec<PathBuf>,
-    /// In a loop with a known [controller]: simulate the loop from its reference (default for a plant), or run the model on the measured
-    /// command (default for your own model)
+    /// In a loop with a known controller: simulate the loop from its reference (default), or run the model on the measured command
     #[arg(long = "loop", value_enum, value_name = "WAY")]
     way: Option<LoopWay>,
     /// Limit on the time of the search; Ctrl-C ends it earlier with the best result so far
@@ -168,11 +167,11 @@ fn unused(tables: &[String], look: Look) -> String {
 }
 
 impl Compare {
-    /// A requested simulation of the loop that is not possible.
-    fn check_loop(&self, model: &OwnModelFile) -> Result<(), Error> {
-        match self.way {
-            Some(LoopWay::Simulated) => model.require_no_loop(),
-            Some(LoopWay::Measured) | None => Ok(()),
+    /// Options for a user's own model.
+    fn own_options(&self) -> effect_search::Options<'static> {
+        effect_search::Options {
+            simulate_loop: self.way != Some(LoopWay::Measured),
+            ..own_model::options(self.seed, self.effort)
         }
     }
 
@@ -184,21 +183,19 @@ impl Compare {
         out: &mut dyn Write,
         look: Look,
     ) -> Result<(), Error> {
-        self.check_loop(model)?;
         let records = model.records(files)?;
         let outputs = self.results.plan(&files.all(), None)?;
-        let options = own_model::options(self.seed, self.effort);
+        let options = self.own_options();
         let bar = Bar::with_limit(options.time_limit);
         bar.phase("fitting the model");
         let comparison = own_model::compare(model, &records, &options);
         bar.clear();
         let notes = model.unit_warnings(look)
             + &input::notes(&records.summaries, look)
-            + &unused(&model.unused, look)
-            + &model.loop_said(look);
+            + &unused(&model.unused, look);
         let comparison = comparison?;
         let notes = notes + &not_kept(model, &comparison.record_numbers, look);
-        let text = notes + &own_model::said(&comparison, look);
+        let text = notes + &own_model::said(model, &comparison, look);
         let page = outputs.iter().any(|output| output.kind() == Kind::Report);
         let page = page.then(|| report::compared(model, &records, &comparison));
         let found = Paged::new(&comparison, page.as_ref());
@@ -243,11 +240,10 @@ impl Diagnose {
         out: &mut dyn Write,
         look: Look,
     ) -> Result<(), Error> {
-        self.compare.check_loop(model)?;
         let records = model.records(files)?;
         let unknown = self.unknown.as_deref();
         let outputs = self.compare.results.plan(&files.all(), unknown)?;
-        let mut options = own_model::options(self.compare.seed, self.compare.effort);
+        let mut options = self.compare.own_options();
         if let Some(most) = self.max_effects {
             options.max_effects = usize::from(most);
         }
@@ -259,7 +255,6 @@ impl Diagnose {
         let diagnosis = diagnosis?;
         let text = model.unit_warnings(look)
             + &input::notes(&records.summaries, look)
-            + &model.loop_said(look)
             + &not_kept(model, &diagnosis.record_numbers, look)
             + &own_model::diagnosis_said(model, &records, &diagnosis, look);
         let page = outputs.iter().any(|output| output.kind() == Kind::Report);

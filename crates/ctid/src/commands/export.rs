@@ -64,7 +64,6 @@ impl Export {
                 "a model file of a plant holds first guesses, no values: give the records that it is fitted to, DATA.csv",
             ));
         }
-        let fitted = (!self.data.is_empty()).then(|| model.loop_said(look));
         let bar = Bar::new();
         bar.phase("fitting the model");
         let limit = FitLimit {
@@ -101,10 +100,7 @@ impl Export {
                 look.warning(words.trim_end()) + "\n"
             })
             .collect();
-        let text = input::notes(&summaries, look)
-            + &fitted.unwrap_or_default()
-            + &look.paragraph("", &said)
-            + &warned;
+        let text = input::notes(&summaries, look) + &look.paragraph("", &said) + &warned;
         finish(&exported, &text, &outputs, out, look)
     }
 }

@@ -108,8 +108,6 @@ impl Simulate {
                 "a model file of a plant holds first guesses, no values: give the records that it is fitted to, --fit DATA.csv",
             ));
         }
-        // Without a fit the given inputs are applied, also if a controller produced them.
-        let fitted = (!self.fit.is_empty()).then(|| model.loop_said(look));
         let bar = Bar::new();
         bar.phase("fitting the model");
         let limit = FitLimit {
@@ -136,9 +134,7 @@ impl Simulate {
         bar.clear();
         let (mut found, summaries) = found?;
         found.readings = self.readings;
-        let text = input::notes(&summaries, look)
-            + &fitted.unwrap_or_default()
-            + &simulate::said(&found, look);
+        let text = input::notes(&summaries, look) + &simulate::said(&found, look);
         finish(&found, &text, &outputs, out, look)
     }
 }

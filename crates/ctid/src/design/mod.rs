@@ -304,7 +304,7 @@ impl Arguments {
         if proposal.design.twins() && self.out.is_none() {
             outputs.retain(|output| output.kind() != Kind::Record);
         }
-        let notes = input::notes(&records.summaries, look) + &model.loop_said(look);
+        let notes = input::notes(&records.summaries, look);
         let text = notes + &own_model::design_said(model, &proposal.design, look);
         finish(&proposal, &text, &outputs, out, look)
     }

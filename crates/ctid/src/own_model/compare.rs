@@ -5,13 +5,15 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ct_signals::{ArModel, Clock};
-use effect_search::{Estimate, NoiseFloor, Options, Step, held_out, output_steps};
+use effect_search::{
+    ControlLoop, Estimate, NoiseFloor, Options, Step, held_out, output_steps, widened,
+};
 use greybox::{FitOptions, TimeLimit, not_determined, weighted_rms};
 use missing_effect::Effort;
 use serde::Serialize;
 
 use super::file::{OwnModelFile, Records};
-use super::fitted::{FitLimit, FittedModel, blame};
+use super::fitted::{FitLimit, FittedModel, blame, blame_search};
 use super::problem::RecordNumbers;
 use crate::Error;
 
@@ -50,6 +52,9 @@ pub struct Comparison {
     pub steps: [Step; 1],
     /// Innovation variance of each output's residual: the part that its past does not predict.
     pub noise: Vec<NoiseFloor>,
+    /// The control loop of the records; `None` if no controller is known and no feedback was detected.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub control_loop: Option<ControlLoop>,
     /// The time limit, and the steps that were cut short.
     pub effort: Effort,
     /// Computing time \[s\].
@@ -80,7 +85,12 @@ pub fn compare(
         time: options.time_limit,
         interrupt: options.interrupt,
     };
-    let fitted = FittedModel::fit(file, records.clone(), &fit_options, limit)?;
+    let fitted = FittedModel::fit(
+        file,
+        records.clone(),
+        (&fit_options, options.simulate_loop),
+        limit,
+    )?;
     let mut comparison = fitted.compare()?;
     comparison.seconds = began.elapsed().as_secs_f64();
     Ok(comparison)
@@ -113,10 +123,8 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
     let simulated = setup
         .simulate(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
-    let test = held_out(&setup, fit, &records.test).map_err(|error| match error {
-        effect_search::Error::Fit(error) => blame(error),
-        other => Error::Columns(other.to_string()),
-    })?;
+    let test = held_out(&setup, fit, &records.test);
+    let test = test.map_err(|error| blame_search(&records.records, error))?;
     if test.is_some() && afterwards.passed() {
         let left_out = "steps of the fit of the held-out records' initial states";
         effort.left_out.push(left_out.to_string());
@@ -154,6 +162,10 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
     let errors = setup
         .robust(fit, options.noise_order)
         .map_or_else(|_| fit.std_errors(), |robust| robust.std_errors);
+    let errors = match fitted.bias_of_feedback(&setup)? {
+        Some(moved) => widened(errors, &moved),
+        None => errors,
+    };
     let free = setup.free();
     let entries = setup.names().iter().zip(units.chain(states)).enumerate();
     let estimates = entries.map(|(i, (name, unit))| Estimate {
@@ -209,6 +221,7 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
         curves: curves.collect(),
         steps: [step],
         noise: noise_floors,
+        control_loop: fitted.control_loop().cloned(),
         effort,
         seconds: 0.0,
     })
@@ -262,12 +275,12 @@ mod tests {
         };
         let cut = within(Duration::ZERO);
         assert_eq!(cut.effort.left_out, ["steps of the fit"]);
-        let text = said(&cut, Look::plain());
+        let text = said(&file, &cut, Look::plain());
         assert!(text.contains(&format!("warning: {CUT}\n")), "{text}");
         let whole = within(Duration::from_secs(600));
         assert!(whole.effort.left_out.is_empty() && whole.effort.limit == Some(600.0));
         assert!(whole.steps[0].rmse <= cut.steps[0].rmse);
-        assert!(!said(&whole, Look::plain()).contains("time limit"));
+        assert!(!said(&file, &whole, Look::plain()).contains("time limit"));
     }
 
     #[test]

@@ -1,17 +1,17 @@
 //! `[controller.u]`: the controller that drove an input of a user's own model in a loop.
-//!
-//! `ctid identify` works with it by the methods that have to do with a loop. Simulations of the model run on the measured inputs: what that
-//! means for a fit is said.
 
 use std::collections::BTreeMap;
 
 use ct_model::{ModelSpec, Variable};
-use ct_signals::quoted;
+use ct_signals::{Columns, Record, quoted};
+use effect_search::ControlLoop;
+use greybox::LoopController;
 use toml::Spanned;
 
-use super::file::OwnModelFile;
+use super::file::{OwnModelFile, Records};
 use crate::look::Look;
 use crate::model_file::{ControllerLaw, ControllerSettings, RawController, Source};
+use crate::sentences::of_the_loop;
 use crate::{Error, names};
 
 /// All controllers of a model file, by the input that each drives.
@@ -97,6 +97,11 @@ pub(super) fn read(
 }
 
 impl OwnController {
+    /// Name of the controller's table: `controller.u`.
+    pub fn table(&self) -> &str {
+        &self.table
+    }
+
     /// Control law with times in seconds; `time_unit`: seconds in one unit of the model's time.
     pub fn in_seconds(&self, time_unit: f64) -> ControllerSettings {
         // For a polynomial in d/dt, highest power first.
@@ -130,55 +135,61 @@ impl OwnController {
 }
 
 impl OwnModelFile {
-    fn driven(&self) -> (String, String) {
-        let tables: Vec<String> = self
-            .controllers
-            .iter()
-            .map(|controller| format!("[{}]", controller.table))
-            .collect();
-        let inputs: Vec<&str> = self
-            .controllers
-            .iter()
-            .map(|controller| self.base.inputs[controller.input].about.name.as_str())
-            .collect();
-        (tables.join(", "), inputs.join(", "))
-    }
-
-    /// Warning about a simulation on measured inputs if the file declares a controller; `None` if it declares none.
-    pub fn loop_note(&self) -> Option<String> {
-        if self.controllers.is_empty() {
-            return None;
+    /// Columns to read a fitted record by: those of the model and the references of its controllers, in their order.
+    pub fn columns_of_fit(&self) -> Columns {
+        let references = self.controllers.iter();
+        let references = references.filter_map(|controller| controller.reference.clone());
+        Columns {
+            references: references.collect(),
+            ..self.columns.clone()
         }
-        let (tables, inputs) = self.driven();
-        Some(format!(
-            "{tables}: the loop is not simulated, the model runs on the measured {inputs}; where the noise is coloured the estimates may be biased, and their standard errors too small"
-        ))
     }
 
-    /// Loop warning in the layout of a command; empty if there is none.
-    pub fn loop_said(&self, look: Look) -> String {
-        self.loop_note().map_or(String::new(), |note| {
-            look.paragraph("", &format!("note: {note}"))
-        })
-    }
-
-    /// For options that need a simulation of the loop.
+    /// Controllers with the times of the records, in seconds. The references are those of [`Self::columns_of_fit`].
     ///
     /// # Errors
-    /// Where the file declares a controller: its loop cannot be simulated.
-    pub fn require_no_loop(&self) -> Result<(), Error> {
-        let Some(first) = self.controllers.first() else {
-            return Ok(());
+    /// Where a controller cannot be sampled at the interval of the records, with its line.
+    pub fn loop_controllers(&self, records: &Records) -> Result<Vec<LoopController>, Error> {
+        let intervals = records.records.iter().map(Record::sample_interval);
+        let interval = intervals.fold(0.0, f64::max);
+        let mut references = 0..;
+        let one = |own: &OwnController| {
+            let controller = own.in_seconds(records.time_unit).controller(interval);
+            let controller = controller.map_err(|error| Error::AtLine {
+                file: self.name.clone(),
+                line: own.line,
+                what: format!("[{}]: {error}", own.table),
+            })?;
+            Ok(LoopController {
+                controller: controller.at_output(own.output),
+                input: own.input,
+                reference: own.reference.as_ref().and_then(|_| references.next()),
+            })
         };
-        let (tables, inputs) = self.driven();
-        Err(Error::AtLine {
-            file: self.name.clone(),
-            line: first.line,
-            what: format!(
-                "{tables}: the loop of a model of your own cannot be simulated; leave --loop out to fit on the measured {inputs}, or write the controller into {} (its reference as an input, its integral as a state, {inputs} as a flow) and delete this table",
-                self.text.display()
-            ),
-        })
+        self.controllers.iter().map(one).collect()
+    }
+
+    /// What a result says of the loop of its records.
+    pub fn loop_sentence(&self, known: &ControlLoop) -> String {
+        let driven = self.controllers.first().map(|controller| controller.input);
+        let unit = driven.map_or("", |input| self.base.inputs[input].about.unit.as_str());
+        of_the_loop(known, unit)
+    }
+
+    /// Warning of a command that does not simulate the loop although the file declares a controller; empty if it declares none.
+    pub fn loop_said(&self, look: Look) -> String {
+        if self.controllers.is_empty() {
+            return String::new();
+        }
+        let controllers = self.controllers.iter();
+        let tables = controllers.clone().map(|own| format!("[{}]", own.table));
+        let inputs = controllers.map(|own| self.base.inputs[own.input].about.name.clone());
+        let note = format!(
+            "note: {}: the loop is not simulated here, the model runs on the measured {}",
+            tables.collect::<Vec<_>>().join(", "),
+            inputs.collect::<Vec<_>>().join(", ")
+        );
+        look.paragraph("", &note)
     }
 }
 

@@ -40,7 +40,7 @@ pub fn design(
         let found = find(&file.base, &all, name).map_err(Error::UnknownEffect)?;
         ids.push(found.id.as_str());
     }
-    let problem = problem(file, records);
+    let problem = problem(file, records)?;
     let found = search(&problem, [ids[0], ids[1]], limits, options, progress);
     found.map_err(|error| match error {
         // An error in the options, not in a file.

@@ -27,7 +27,7 @@ pub fn diagnose(
     options: &Options,
     progress: &(dyn Fn(effect_search::Progress) + Sync),
 ) -> Result<Diagnosis, Error> {
-    let problem = problem(file, records);
+    let problem = problem(file, records)?;
     effect_search::diagnose(&problem, options, progress).map_err(|error| blamed(&problem, &error))
 }
 
@@ -67,7 +67,7 @@ pub(crate) fn said(
         }
     }
     text += &format!("\n{}\n", look.heading(&heading(diagnosis)));
-    for sentence in sentences(diagnosis, &words) {
+    for sentence in sentences(file, diagnosis, &words) {
         text += &look.paragraph("  ", &sentence);
     }
     if let Some(unknown) = &diagnosis.unknown {
@@ -89,7 +89,11 @@ pub(crate) fn heading(diagnosis: &Diagnosis) -> String {
 }
 
 /// Findings in sentences.
-pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<String> {
+pub(super) fn sentences(
+    file: &OwnModelFile,
+    diagnosis: &Diagnosis,
+    words: &EffectWords,
+) -> Vec<String> {
     let mut all = Vec::new();
     for group in &diagnosis.groups {
         let [first, others @ ..] = group.as_slice() else {
@@ -112,7 +116,7 @@ pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<Strin
             ));
         }
     }
-    all.extend(remaining(diagnosis));
+    all.extend(remaining(file, diagnosis));
     all.extend(
         diagnosis
             .unknown
@@ -122,8 +126,8 @@ pub(super) fn sentences(diagnosis: &Diagnosis, words: &EffectWords) -> Vec<Strin
     all
 }
 
-/// Share of the error that the effects explain, and tests of the residual.
-pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
+/// Share of the error that the effects explain, tests of the residual, and the loop of the records.
+pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<String> {
     let mut all = Vec::new();
     if let Some(share) = diagnosis.share {
         all.push(format!(
@@ -161,6 +165,8 @@ pub(crate) fn remaining(diagnosis: &Diagnosis) -> Vec<String> {
         ));
     }
     all.extend(diagnosis.absorbed.iter().map(absorbed));
+    let known = diagnosis.control_loop.iter();
+    all.extend(known.map(|known| file.loop_sentence(known)));
     if !diagnosis.left_out.is_empty() {
         all.push(format!(
             "Left out by the time limit: {}; --effort thorough searches longer.",

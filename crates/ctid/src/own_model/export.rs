@@ -149,8 +149,8 @@ pub(crate) fn export(
         exported.text = Some(text(file, &source)?);
         return Ok((exported, Vec::new()));
     };
-    let fitted = FittedModel::fit(file, records, options, limit)?;
-    exported.warnings.extend(fitted.cut_short());
+    let fitted = FittedModel::fit(file, records, (options, true), limit)?;
+    exported.warnings.extend(fitted.warnings());
     exported.text = Some(fitted.text(&source)?);
     let (file, records) = (fitted.model(), fitted.records());
     let spec = file.model.spec();

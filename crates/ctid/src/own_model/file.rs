@@ -186,13 +186,17 @@ impl OwnModelFile {
             hold: self.hold,
             ..files.options.clone()
         };
-        let read = |path: &PathBuf| -> Result<Reading, Error> {
-            let mut reading = read_csv(path, &self.columns, &options).map_err(|e| self.named(e))?;
+        let read = |(path, columns): (&PathBuf, &Columns)| -> Result<Reading, Error> {
+            let mut reading = read_csv(path, columns, &options).map_err(|e| self.named(e))?;
             reading.record.name = files.name_of(path);
             reading.summary.file.clone_from(&reading.record.name);
             Ok(reading)
         };
-        let all = files.data.iter().chain(&files.test).map(read);
+        let of_fit = self.columns_of_fit();
+        let fitted = files.data.iter().map(|path| (path, &of_fit));
+        // Held-out records are simulated on their measured inputs.
+        let held_out = files.test.iter().map(|path| (path, &self.columns));
+        let all = fitted.chain(held_out).map(read);
         let all = all.collect::<Result<Vec<Reading>, Error>>()?;
         self.gathered(all, files.data.len(), self.time_unit(&files.data[0])?)
     }
@@ -246,15 +250,20 @@ impl OwnModelFile {
         let outputs = spec.outputs.iter().map(|o| spec.about(o.variable));
         let columns = self.columns.inputs.iter().chain(&self.columns.outputs);
         let mut signals = columns.zip(inputs.chain(outputs));
-        let own = signals.find(|(column, _)| *wanted == format!("\"{}\"", quoted(column)));
-        match own {
+        let is_wanted = |column: &str| *wanted == format!("\"{}\"", quoted(column));
+        let own = signals.find(|(column, _)| is_wanted(column));
+        let mut controllers = self.controllers.iter();
+        let mend = match own {
+            Some((_, about)) => Some((about.name.as_str(), "[columns]".to_string())),
+            None => controllers
+                .find(|own| own.reference.as_deref().is_some_and(is_wanted))
+                .map(|own| ("reference", format!("[{}]", own.table()))),
+        };
+        match mend {
             None => error.into(),
-            Some((_, about)) => {
-                let mend = format!("set {} = \"...\" under [columns]", about.name);
-                Error::Columns(format!(
-                    "{file}, row {row}{}",
-                    fault.said("[columns]", &mend)
-                ))
+            Some((key, table)) => {
+                let mend = format!("set {key} = \"...\" under {table}");
+                Error::Columns(format!("{file}, row {row}{}", fault.said(&table, &mend)))
             }
         }
     }
@@ -269,6 +278,18 @@ impl OwnModelFile {
         for (channel, about) in channels.zip(self.signals()) {
             convert(&record.name, channel, about)?;
             channel.name.clone_from(&about.name);
+        }
+        let spec = self.model.spec();
+        let with_reference = self
+            .controllers
+            .iter()
+            .filter(|own| own.reference.is_some());
+        for (channel, own) in record.references.iter_mut().zip(with_reference) {
+            convert(
+                &record.name,
+                channel,
+                spec.about(spec.outputs[own.output].variable),
+            )?;
         }
         Ok(())
     }

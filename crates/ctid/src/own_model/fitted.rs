@@ -4,9 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use ct_model::Expression;
 use ct_signals::{Columns, Reading, Record};
-use effect_search::{Options, held_out};
-use greybox::{Fit, FitOptions, FitUncertainty, ModelSetup, Robust, TimeLimit};
+use effect_search::{ControlLoop, NotSimulated, Options, enclose, held_out, widened};
+use greybox::{
+    Fit, FitOptions, FitUncertainty, ModelSetup, Robust, SimulatedLoop, TimeLimit,
+    moved_by_weighting,
+};
 use missing_effect::Effort;
 
 use super::file::{OwnModelFile, Records};
@@ -18,6 +22,10 @@ use crate::simulate::{ReadInputs, Simulated};
 /// Share of the time for adding the effects of the file one after the other.
 const OF_EFFECTS: f64 = 0.5;
 
+/// If the error of an output changes by a larger share in the simulated loop, the fit on the measured inputs is the result: its error is the
+/// smallest that the model can have.
+const SAME_ERROR: f64 = 0.005;
+
 /// A model, the records that it is fitted to, and the fit.
 #[derive(Clone)]
 pub struct FittedModel {
@@ -26,6 +34,8 @@ pub struct FittedModel {
     records: Records,
     options: FitOptions,
     fit: Fit,
+    simulated_loop: Option<Arc<SimulatedLoop>>,
+    control_loop: Option<ControlLoop>,
     effort: Effort,
 }
 
@@ -56,14 +66,15 @@ pub(super) fn cut_short(effort: &Effort) -> Option<String> {
 }
 
 impl FittedModel {
-    /// Fits a model, with its effects in it, to records.
+    /// Fits a model, with its effects in it, to records; `simulate_loop`: the loop of the file's controllers is simulated from its references
+    /// if that is possible.
     ///
     /// # Errors
     /// If the records do not allow a fit, with the names of those that cause it.
     pub fn fit(
         file: &OwnModelFile,
         records: Records,
-        options: &FitOptions,
+        (options, simulate_loop): (&FitOptions, bool),
         limit: FitLimit,
     ) -> Result<Self, Error> {
         let began = Instant::now();
@@ -71,6 +82,7 @@ impl FittedModel {
             seed: options.seed,
             time_limit: limit.time.map(|time| time.mul_f64(OF_EFFECTS)),
             interrupt: limit.interrupt,
+            simulate_loop,
             ..Options::default()
         };
         let model = file.mended_within(Some(&records), &of_effects)?;
@@ -86,6 +98,8 @@ impl FittedModel {
         let setup = setup.with_time_limit(time.clone(), limit.interrupt);
         let fit = setup.fit(options);
         let fit = fit.map_err(|error| blame(&records.records, &error))?;
+        let (fit, simulated_loop, control_loop) =
+            in_loop(file, &records, (setup, fit), (options, simulate_loop))?;
         if time.passed() {
             time.leave_out("steps of the fit");
         }
@@ -102,6 +116,8 @@ impl FittedModel {
             records,
             options: *options,
             fit,
+            simulated_loop,
+            control_loop,
             effort,
         })
     }
@@ -117,7 +133,8 @@ impl FittedModel {
         fit: Fit,
     ) -> Result<Self, Error> {
         let model = file.mended(Some(&records))?;
-        let entries = setup_of(&model, &records)?.names().len();
+        let setup = setup_of(&model, &records)?;
+        let entries = setup.names().len();
         if entries != fit.x.len() {
             return Err(Error::Usage(format!(
                 "the fit has {} entries, and {} has {entries} with these records: fit it again",
@@ -125,12 +142,16 @@ impl FittedModel {
                 file.base.name
             )));
         }
+        let (fit, simulated_loop, control_loop) =
+            in_loop(file, &records, (setup, fit), (options, true))?;
         Ok(Self {
             given: file.clone(),
             model,
             records,
             options: *options,
             fit,
+            simulated_loop,
+            control_loop,
             effort: Effort::default(),
         })
     }
@@ -165,15 +186,23 @@ impl FittedModel {
         &self.options
     }
 
+    /// The control loop of the records; `None` if the file has no controller and no feedback was detected.
+    #[must_use]
+    pub fn control_loop(&self) -> Option<&ControlLoop> {
+        self.control_loop.as_ref()
+    }
+
     /// The time limit of the fit, and the steps that were cut short.
     #[must_use]
     pub fn effort(&self) -> &Effort {
         &self.effort
     }
 
-    /// A warning if the fit was cut short, and how to get a longer one.
-    pub(super) fn cut_short(&self) -> Option<String> {
-        cut_short(&self.effort)
+    /// What the reader has to know of the fit: whether it was cut short, and whether the loop of its records is not simulated.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let known = self.control_loop.as_ref().filter(|known| !known.simulated);
+        let of_loop = known.map(|known| self.given.loop_sentence(known));
+        cut_short(&self.effort).into_iter().chain(of_loop).collect()
     }
 
     /// The model against its records, as it was fitted.
@@ -181,7 +210,11 @@ impl FittedModel {
     /// # Errors
     /// Those of the fit, which has passed them.
     pub fn setup(&self) -> Result<ModelSetup<'_>, Error> {
-        setup_of(&self.model, &self.records)
+        let setup = setup_of(&self.model, &self.records)?;
+        Ok(match &self.simulated_loop {
+            Some(simulated) => setup.in_loop(simulated.clone()),
+            None => setup,
+        })
     }
 
     /// The uncertainty of all fitted parameters, with the noise model of the residual; `None` if the simulation at the fit is not finite.
@@ -190,14 +223,44 @@ impl FittedModel {
     /// As [`FittedModel::setup`].
     pub fn robust(&self) -> Result<Option<Robust>, Error> {
         let setup = self.setup()?;
-        Ok(setup.robust(&self.fit, self.options.noise_order).ok())
+        let mut robust = setup.robust(&self.fit, self.options.noise_order).ok();
+        if let Some(robust) = &mut robust
+            && let Some(moved) = self.bias_of_feedback(&setup)?
+        {
+            robust.std_errors = widened(std::mem::take(&mut robust.std_errors), &moved);
+        }
+        Ok(robust)
     }
 
     /// Uncertainty of the parameters; `None` if the records do not determine all of them.
     pub(super) fn uncertainty(&self, setup: &ModelSetup) -> Result<Option<FitUncertainty>, Error> {
         let count = setup.parameter_count();
         let known = FitUncertainty::of(setup, &self.fit, count, self.options.noise_order);
-        known.map_err(|error| blame(&self.records.records, &error))
+        let mut known = known.map_err(|error| blame(&self.records.records, &error))?;
+        if let Some(known) = &mut known
+            && let Some(moved) = self.bias_of_feedback(setup)?
+        {
+            known.widen(&moved);
+        }
+        Ok(known)
+    }
+
+    /// About the bias of each entry from feedback in a loop that is not simulated; `None` without such a loop.
+    ///
+    /// # Errors
+    /// Where a fit with the other weighting fails.
+    pub(super) fn bias_of_feedback(&self, setup: &ModelSetup) -> Result<Option<Vec<f64>>, Error> {
+        let FitOptions {
+            noise_order,
+            stopping,
+            ..
+        } = self.options;
+        if !ControlLoop::widens(self.control_loop.as_ref()) {
+            return Ok(None);
+        }
+        let moved = moved_by_weighting(setup, &self.fit, noise_order, stopping);
+        let moved = moved.map_err(|error| blame(&self.records.records, &error.into()))?;
+        Ok(Some(moved))
     }
 
     /// The model on the inputs of another record. Where that has readings its initial states are fitted to the `first` of each output, or
@@ -235,10 +298,8 @@ impl FittedModel {
     /// Where a record is not one of this model, or its initial states cannot be fitted.
     pub fn score(&self, test: &[Record]) -> Result<Vec<OutputScore>, Error> {
         let setup = self.setup()?;
-        let found = held_out(&setup, &self.fit, test).map_err(|error| match error {
-            effect_search::Error::Fit(error) => blame(test, &error),
-            other => Error::Columns(other.to_string()),
-        })?;
+        let found = held_out(&setup, &self.fit, test);
+        let found = found.map_err(|error| blame_search(test, error))?;
         let Some(found) = found else {
             return Ok(Vec::new());
         };
@@ -280,6 +341,30 @@ impl FittedModel {
     }
 }
 
+/// A fit in the loop of its records, if that can be simulated, and what is known of the loop.
+fn in_loop(
+    file: &OwnModelFile,
+    records: &Records,
+    (setup, fit): (ModelSetup, Fit),
+    (options, simulate): (&FitOptions, bool),
+) -> Result<(Fit, Option<Arc<SimulatedLoop>>, Option<ControlLoop>), Error> {
+    let controllers = file.loop_controllers(records)?;
+    let mut expressions = setup.model().spec().expressions();
+    let timed = expressions.any(|of| of.any(&|part| *part == Expression::Time));
+    let of_loop = (&controllers[..], simulate);
+    let enclosed = enclose(setup, fit.clone(), of_loop, !timed, options.stopping);
+    let enclosed = enclosed.map_err(|error| blame_search(&records.records, error))?;
+    if let Some((change, output)) = enclosed.change_of_error(&fit)
+        && change.abs() > SAME_ERROR
+    {
+        let output = output.to_string();
+        let why = NotSimulated::ModelError { output, change };
+        return Ok((fit, None, Some(ControlLoop::measured(why))));
+    }
+    let simulated_loop = enclosed.setup.simulated_loop().cloned();
+    Ok((enclosed.fit, simulated_loop, enclosed.control_loop))
+}
+
 /// A model with its effects in it against records.
 fn setup_of<'a>(model: &'a OwnModelFile, records: &'a Records) -> Result<ModelSetup<'a>, Error> {
     let setup = ModelSetup::new(
@@ -299,5 +384,13 @@ pub(super) fn blame(records: &[Record], error: &greybox::Error) -> Error {
     Error::File {
         file: names.join(", "),
         what: error.to_string(),
+    }
+}
+
+/// An error of the search, with its records.
+pub(super) fn blame_search(records: &[Record], error: effect_search::Error) -> Error {
+    match error {
+        effect_search::Error::Fit(error) => blame(records, &error),
+        other => Error::Columns(other.to_string()),
     }
 }

@@ -24,8 +24,11 @@ pub(crate) fn options(seed: u64, effort: EffortLevel) -> Options<'static> {
 }
 
 /// The problem for a search.
-pub(super) fn problem(file: &OwnModelFile, records: &Records) -> Problem {
-    Problem {
+///
+/// # Errors
+/// As [`OwnModelFile::loop_controllers`].
+pub(super) fn problem(file: &OwnModelFile, records: &Records) -> Result<Problem, Error> {
+    Ok(Problem {
         spec: file.base.clone(),
         effects: file.effects.on.clone(),
         kept: file.effects.kept.clone(),
@@ -35,9 +38,10 @@ pub(super) fn problem(file: &OwnModelFile, records: &Records) -> Problem {
         priors: file.priors.clone(),
         candidates: file.candidates.clone(),
         left_out: BTreeSet::new(),
+        controllers: file.loop_controllers(records)?,
         time_unit: records.time_unit,
         time_unit_name: unit_of(records.time_unit).to_string(),
-    }
+    })
 }
 
 /// An error of the search, with the records that it is of.
@@ -78,7 +82,7 @@ impl OwnModelFile {
         } = match records {
             None => self.as_it_stands()?,
             Some(records) => {
-                let problem = problem(self, records);
+                let problem = problem(self, records)?;
                 believed(&problem, options).map_err(|e| blamed(&problem, &e))?
             }
         };

@@ -112,7 +112,11 @@ pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> D
     shown.seconds = found.seconds;
     Document {
         diagnosis: shown,
-        sentences: Vec::new(),
+        sentences: found
+            .control_loop
+            .iter()
+            .map(|known| file.loop_sentence(known))
+            .collect(),
         term: None,
     }
 }
@@ -152,7 +156,7 @@ pub fn diagnosed(
     let unknown = found.unknown.as_ref();
     Document {
         diagnosis: shown,
-        sentences: sentences(found, &words),
+        sentences: sentences(file, found, &words),
         term: unknown.map(|unknown| missing_term(&words, unknown)),
     }
 }

@@ -49,7 +49,7 @@ pub(crate) fn simulate(
     let name = &inputs.path;
     let fitted = match records {
         None => None,
-        Some(records) => Some(FittedModel::fit(file, records, options, limit)?),
+        Some(records) => Some(FittedModel::fit(file, records, (options, true), limit)?),
     };
     let mended;
     let model = match &fitted {
@@ -62,7 +62,7 @@ pub(crate) fn simulate(
     let of = (model, fitted.as_ref(), time_unit);
     let mut found = simulated(of, (&read, name, inputs.first), LEVEL, options)?;
     if let Some(fitted) = &fitted {
-        found.warnings.extend(fitted.cut_short());
+        found.warnings.extend(fitted.warnings());
     }
     Ok((found, summaries))
 }

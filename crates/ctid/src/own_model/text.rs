@@ -5,6 +5,7 @@ use effect_search::Step;
 
 use super::compare::{Comparison, Curves};
 use super::diagnose::state_rows;
+use super::file::OwnModelFile;
 use super::fitted::cut_short;
 use crate::look::{Look, Side, table};
 use crate::numbers;
@@ -13,7 +14,7 @@ use crate::sentences::FailureWords;
 use crate::terminal::{FAILURES, residual_tests, without_50};
 
 /// The complete comparison, with a plot of the first record.
-pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
+pub(crate) fn said(file: &OwnModelFile, comparison: &Comparison, look: Look) -> String {
     let [step] = &comparison.steps;
     let name = [std::slice::from_ref(&comparison.model), &comparison.effects].concat();
     let mut text = format!("{}\n\n", look.heading(&name.join(" + ")));
@@ -84,6 +85,9 @@ pub(crate) fn said(comparison: &Comparison, look: Look) -> String {
     if let Some(cut) = cut_short(&comparison.effort) {
         text += &look.warning(format!("warning: {cut}"));
         text.push('\n');
+    }
+    if let Some(known) = &comparison.control_loop {
+        text += &look.paragraph("  ", &file.loop_sentence(known));
     }
     let agree = format!(
         "{} of {} starts ended in this minimum",

@@ -1,12 +1,12 @@
 //! Whether the control loop is simulated, and why not.
 
-use missing_effect::{ControlLoop, NotSimulated};
+use effect_search::{ControlLoop, NotSimulated};
 
 /// Consequence of running a model on the measured command of a loop.
 const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and values of the criterion are biased; the standard errors are enlarged to allow for this.";
 
 /// Description of the loop; `input_unit`: unit of the command.
-pub(super) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
+pub(crate) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
     let mismatch = known.mismatch.unwrap_or(f64::NAN);
     if known.simulated {
         return format!(
@@ -18,9 +18,13 @@ pub(super) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
         return format!("The loop is not simulated. {MEASURED}");
     };
     let why = match why {
-        NotSimulated::UnknownController { lags } => {
+        NotSimulated::UnknownController { lags, input } => {
+            let (command, table) = match input {
+                None => ("the command", "controller".to_string()),
+                Some(input) => (input.as_str(), format!("controller.{input}")),
+            };
             return format!(
-                "Feedback detected: the command depends on the last {lags} residuals (F test beside the command's own past, p {}), and the model file has no [controller]; give the controller and the reference, so that the loop can be simulated. {MEASURED}",
+                "Feedback detected: {command} depends on the last {lags} residuals (F test beside its own past, p {}), and the model file has no [{table}]; give the controller and the reference, so that the loop can be simulated. {MEASURED}",
                 chance(known.feedback_p.unwrap_or(f64::NAN))
             );
         }
@@ -41,6 +45,23 @@ pub(super) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
             record: record.clone(),
         }
         .to_string(),
+        NotSimulated::DirectTerm { output, input } => greybox::Error::DirectTerm {
+            output: output.clone(),
+            input: input.clone(),
+        }
+        .to_string(),
+        NotSimulated::Unstable { radius } => format!(
+            "the controller makes the fitted model unstable ({}), so it cannot have produced the record: check its sign, gain and times, and their units",
+            match radius {
+                Some(radius) =>
+                    format!("an eigenvalue of magnitude {radius:.3} over a sampling interval"),
+                None => "the simulation of the loop grows without bound".to_string(),
+            }
+        ),
+        NotSimulated::ModelError { output, change } => format!(
+            "in it the error at {output} would change by {:+.1} %, so the model lacks an effect; `ctid diagnose` simulates the loop to find it",
+            100.0 * change
+        ),
         NotSimulated::OtherController { share } => format!(
             "the measured command disagrees with the controller of the model file, R/S (r - y), by {mismatch:.3} {input_unit} rms, {:.0} % of its variation: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
             100.0 * share

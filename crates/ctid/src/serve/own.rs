@@ -230,7 +230,6 @@ impl Own {
             "time": columns.and_then(|columns| columns.time.clone()),
             "signals": signals,
             "unused": unused,
-            "loop": model.as_ref().ok().and_then(OwnModelFile::loop_note),
             "effects": model.as_ref().ok().map(|model| model.effects.on.clone()),
             "ports": ports,
             "diagnosis": diagnosis,

@@ -65,7 +65,7 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
         .map_or_else(Vec::new, |step| step.rmse_per_output.keys().collect());
     json!({
         "headline": diagnosis_heading(found),
-        "sentences": diagnosis_remaining(found),
+        "sentences": diagnosis_remaining(model, found),
         "groups": groups.collect::<Vec<_>>(),
         "outputs": outputs.iter().map(|name| json!({ "name": name, "unit": units(name) })).collect::<Vec<_>>(),
         "steps": steps.collect::<Vec<_>>(),

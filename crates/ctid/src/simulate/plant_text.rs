@@ -140,7 +140,12 @@ impl AtPorts {
                 ..settings.clone()
             };
             let file = OwnModelFile::new(plant.id(), self.spec.clone(), settings)?;
-            FittedModel::fit(&file, records.clone(), &FitOptions::default(), limit)
+            FittedModel::fit(
+                &file,
+                records.clone(),
+                (&FitOptions::default(), false),
+                limit,
+            )
         });
         let fits: Vec<Result<FittedModel, Error>> = fits.collect();
         // Root mean square of the ratios of the errors: 1 where the text fits as the plant does.

@@ -1,4 +1,4 @@
-//! `[controller.u]` of a user's own model: `identify` uses it, and other commands warn that they run on the measured input.
+//! `[controller.u]` of a user's own model: `identify` uses it, and fits simulate the loop.
 
 use std::fmt::Write;
 
@@ -88,38 +88,95 @@ fn identify_works_with_the_controller_in_the_units_of_the_model() {
     );
 }
 
+/// Estimate and standard error of a parameter in the last step of a result.
+fn estimate(found: &serde_json::Value, name: &str) -> [f64; 2] {
+    let steps = found["steps"].as_array().unwrap();
+    let all = steps.last().unwrap()["parameters"].as_array().unwrap();
+    let one = all.iter().find(|one| one["name"] == name).unwrap();
+    ["value", "std_error"].map(|key| one[key].as_f64().unwrap())
+}
+
+/// Words of a text, whatever the lines.
+fn unfolded(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 #[test]
-fn a_loop_that_is_not_simulated_is_refused_or_said() {
+fn the_loop_is_simulated_in_the_units_of_the_model() {
     let place = place();
-    let says = [
-        "m.toml:6: [controller.u]: the loop of a model of your own cannot be simulated",
-        "leave --loop out",
-        "write the controller into plant.mo",
-    ];
     for command in ["compare", "diagnose"] {
-        place.refuses(
-            &format!("{command} loop.csv --model m.toml --loop simulated"),
-            &says,
+        let said = place.succeeds(&format!("{command} loop.csv --model m.toml --json r.json"));
+        let said = unfolded(&said);
+        assert!(
+            said.contains("The loop is simulated from its reference"),
+            "{said}"
         );
+        let found = place.json("r.json");
+        assert_eq!(found["control_loop"]["simulated"], true);
+        assert!(found["control_loop"]["mismatch"].as_f64().unwrap() < 1e-3);
+        for (name, truth) in [("K", 2.0), ("tau", 1.0)] {
+            let [value, error] = estimate(&found, name);
+            assert!(
+                (value - truth).abs() < 4.0 * error && error < 0.05 * truth,
+                "{command}, {name}: {value} {error}"
+            );
+        }
+        let measured = format!("{command} loop.csv --model m.toml --loop measured --json r.json");
+        let said = unfolded(&place.succeeds(&measured));
+        assert!(
+            said.contains("The loop is not simulated: as requested"),
+            "{said}"
+        );
+        let found = place.json("r.json");
+        assert_eq!(found["control_loop"]["simulated"], false);
+        // With the bias of feedback in the standard error, the interval is wider and contains the true value too.
+        let [value, error] = estimate(&found, "K");
+        assert!((value - 2.0).abs() < 4.0 * error, "{value} {error}");
     }
-    let note = "note: [controller.u]: the loop is not simulated, the model runs on the measured u";
-    let unfolded = |text: String| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    // Without its controller in the file, feedback is detected.
+    let file = file(0.8);
+    place.write("m.toml", &file[..file.find("[controller").unwrap()]);
+    let said = unfolded(&place.succeeds("compare loop.csv --model m.toml"));
+    let detected = "Feedback detected: u depends on the last 7 residuals";
+    assert!(said.contains(detected), "{said}");
+    assert!(said.contains("has no [controller.u]"), "{said}");
+}
+
+#[test]
+fn a_loop_that_is_not_simulated_says_why() {
+    let place = place();
+    let compared = |file: String, why: &str| {
+        place.write("m.toml", file);
+        let said = unfolded(&place.succeeds("compare loop.csv --model m.toml"));
+        let said = said.split_once("The loop is not simulated: ").unwrap().1;
+        assert!(said.starts_with(why), "{said}");
+    };
+    let without_reference = file(0.8).replace("reference = \"r [mm]\"\n", "");
+    compared(without_reference, "loop.csv: the record holds no reference");
+    compared(file(1.6), "the measured command disagrees");
+    // Exports and simulations say it too; in a simulation without a fit, given inputs are used as they are.
     for command in [
-        "compare loop.csv --model m.toml",
-        "diagnose loop.csv --model m.toml --loop measured",
         "simulate m.toml loop.csv --out y.csv --fit loop.csv",
         "export m.toml loop.csv --csv curves.csv",
     ] {
-        let said = unfolded(place.succeeds(command));
-        assert!(said.contains(note), "{said}");
+        let said = unfolded(&place.succeeds(command));
+        assert!(said.contains("The loop is not simulated"), "{said}");
     }
-    // In a simulation, given inputs are used as they are.
-    let said = unfolded(place.succeeds("simulate m.toml loop.csv --out z.csv"));
-    assert!(!said.contains("note: [controller.u]"), "{said}");
-    // An invalid controller is reported with its line.
+    let said = unfolded(&place.succeeds("simulate m.toml loop.csv --out z.csv"));
+    assert!(!said.contains("The loop"), "{said}");
+    // An invalid controller is reported with its line, a missing column with its key.
     place.write("m.toml", file(0.8).replace("controller.u", "controller.w"));
     place.refuses(
         "compare loop.csv --model m.toml",
         &["m.toml:6: w is no input of Plant: it has u"],
+    );
+    place.write("m.toml", file(0.8).replace("r [mm]", "set [mm]"));
+    place.refuses(
+        "compare loop.csv --model m.toml",
+        &[
+            "loop.csv",
+            "set [mm]",
+            "set reference = \"...\" under [controller.u]",
+        ],
     );
 }

@@ -2,6 +2,7 @@
 
 mod bands;
 mod energy;
+pub mod feedback;
 mod first_order;
 mod spectral_line;
 mod stationarity;
@@ -137,7 +138,7 @@ impl Context<'_> {
         for (i, residual) in residuals.iter().enumerate() {
             let record = &records[i / outputs];
             let lags = (samples(residual) / 10).clamp(2, 25);
-            for input in &record.inputs {
+            for input in setup.external_signals(record) {
                 let (low, high) = input.range();
                 if high <= low {
                     continue;

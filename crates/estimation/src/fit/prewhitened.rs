@@ -45,6 +45,32 @@ pub fn coloured(
     Ok(fit)
 }
 
+/// How far each entry moves in the fit with the other weighting: white noise for a fit with a noise model, the noise model of the residual
+/// (order zero to `order`) for one with white noise. Without feedback both are consistent; with feedback that is not simulated the
+/// difference is about their bias.
+///
+/// # Errors
+/// As [`fit_from`].
+pub fn moved_by_weighting(
+    model: &impl Residuals,
+    fit: &Fit,
+    order: usize,
+    stopping: Stopping,
+) -> Result<Vec<f64>, Error> {
+    let other = if fit.noise.order() == 0 {
+        coloured(model, fit.clone(), order, stopping)?
+    } else {
+        let white = Noise::white(fit.noise.outputs());
+        fit_from(model, vec![fit.x.clone().into()], &white, stopping)?
+    };
+    Ok(fit
+        .x
+        .iter()
+        .zip(&other.x)
+        .map(|(own, other)| own - other)
+        .collect())
+}
+
 /// The prewhitened fit (iterated GLS): an autoregressive noise model of order zero to `order` for each output from its residual, a fit in
 /// their weighting, until the two agree. `memory`: the noise model's memory is at most so many samples, so that no root near one takes
 /// slow physics for noise ([`ct_signals::ArModel::with_memory_at_most`]).

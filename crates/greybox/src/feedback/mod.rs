@@ -32,7 +32,7 @@ use plants::controller::Controller;
 use plants::{Command, Dual, MAX_VESSELS, Scalar, Simulator, Structure};
 
 pub use self::replay::{Replay, replay};
-pub(crate) use self::replay::{replay_of, require_moving_reference, step};
+pub(crate) use self::replay::{fitting, replay_of, require_moving_reference, step};
 pub(crate) use self::response::{LinearResponse, Response};
 use crate::Error;
 
@@ -111,13 +111,17 @@ impl Feedback {
         records: &[Record],
         plant: LinearPlant,
     ) -> Result<Self, Error> {
-        require_moving_reference(records, 0)?;
-        let replays = records
-            .iter()
-            .map(|record| replay(controller, record))
-            .collect::<Result<_, _>>()?;
+        for record in records {
+            require_moving_reference(record, Some(0))?;
+        }
+        let (controller, replays) = fitting(controller, |controller| {
+            records
+                .iter()
+                .map(|record| replay(controller, record))
+                .collect()
+        })?;
         Ok(Self {
-            controller: controller.clone(),
+            controller,
             replays: Arc::new(replays),
             released: false,
             response: Arc::new(plant.response()),

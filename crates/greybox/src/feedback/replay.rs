@@ -8,19 +8,21 @@ use plants::{Dual, Scalar};
 use crate::Error;
 
 /// Checks that the reference at a position moves: a constant one drives nothing.
-pub(crate) fn require_moving_reference(records: &[Record], reference: usize) -> Result<(), Error> {
-    for record in records {
-        if let Some(reference) = record.references.get(reference) {
-            let (low, high) = reference.range();
-            if low >= high {
-                return Err(Error::ConstantReference {
-                    record: record.name.clone(),
-                    value: low,
-                });
-            }
-        }
+pub(crate) fn require_moving_reference(
+    record: &Record,
+    reference: Option<usize>,
+) -> Result<(), Error> {
+    let Some(reference) = reference.and_then(|at| record.references.get(at)) else {
+        return Ok(());
+    };
+    let (low, high) = reference.range();
+    if low < high {
+        return Ok(());
     }
-    Ok(())
+    Err(Error::ConstantReference {
+        record: record.name.clone(),
+        value: low,
+    })
 }
 
 /// The controller simulated on the measured signals.
@@ -32,8 +34,40 @@ pub struct Replay {
     pub beside: Vec<f64>,
     /// Root mean square of the additional input \[input unit\].
     pub rms: f64,
+    /// The same without the largest hundredth of its values, one at least: before a controller begins, and in a hand's moves, the command is
+    /// not its own.
+    pub usual: f64,
     /// Standard deviation of the measured command \[input unit\].
     pub moves: f64,
+}
+
+/// Share of the additional input that may be anything.
+const UNUSUAL: f64 = 0.01;
+
+/// Root mean square of the values without the largest ones.
+fn usual(beside: &[f64]) -> f64 {
+    let mut squares: Vec<f64> = beside.iter().map(|d| d * d).collect();
+    squares.sort_by(f64::total_cmp);
+    let most = (UNUSUAL * squares.len() as f64).ceil() as usize;
+    squares.truncate(squares.len().saturating_sub(most));
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+}
+
+/// The controller of these records: as it is given or, if that agrees better with the measured commands, with its integral updated first
+/// ([`Controller::with_integral_first`]); and its replays, a record each.
+pub(crate) fn fitting(
+    controller: &Controller,
+    replays: impl Fn(&Controller) -> Result<Vec<Replay>, Error>,
+) -> Result<(Controller, Vec<Replay>), Error> {
+    let given = replays(controller)?;
+    let worst = |all: &[Replay]| all.iter().map(|replay| replay.usual).fold(0.0, f64::max);
+    if let Some(other) = controller.with_integral_first() {
+        let found = replays(&other)?;
+        if worst(&found) < 0.5 * worst(&given) {
+            return Ok((other, found));
+        }
+    }
+    Ok((controller.clone(), given))
 }
 
 /// Rounds of the fit of initial states: without limits the first one is exact.
@@ -44,7 +78,7 @@ const ROUNDS: usize = 6;
 /// # Errors
 /// Where the record has no reference, or its command is not held.
 pub fn replay(controller: &Controller, record: &Record) -> Result<Replay, Error> {
-    replay_of(controller, record, 0, 0)
+    replay_of(controller, record, 0, Some(0))
 }
 
 /// As [`replay`], of the controller that drives an input, with the reference at a position.
@@ -52,9 +86,9 @@ pub(crate) fn replay_of(
     controller: &Controller,
     record: &Record,
     input: usize,
-    reference: usize,
+    reference: Option<usize>,
 ) -> Result<Replay, Error> {
-    let Some(reference) = record.references.get(reference) else {
+    let Some(reference) = reference.and_then(|at| record.references.get(at)) else {
         return Err(Error::NoReference {
             record: record.name.clone(),
         });
@@ -120,8 +154,9 @@ pub(crate) fn replay_of(
     let moves = (u.iter().map(|u| (u - mean).powi(2)).sum::<f64>() / u.len() as f64).sqrt();
     Ok(Replay {
         states,
-        beside: best.1,
         rms: best.2,
+        usual: usual(&best.1),
+        beside: best.1,
         moves,
     })
 }

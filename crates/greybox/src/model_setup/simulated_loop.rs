@@ -4,18 +4,15 @@
 use std::sync::Arc;
 
 use ct_model::{ModelSpec, Scalar, Variable};
-use ct_signals::Record;
+use ct_signals::{Channel, Record};
 use nalgebra::DMatrix;
 use plants::controller::{Controller, Regulator};
 
 use super::ModelSetup;
 use crate::Error;
 use crate::feedback::{
-    LinearResponse, Replay, Response, replay_of, require_moving_reference, step,
+    LinearResponse, Replay, Response, fitting, replay_of, require_moving_reference, step,
 };
-
-/// A model whose linear response grows by this number of factors e over the longest record is not linearised: its loop acts on the rows.
-const GROWTH: f64 = 3.0;
 
 /// A controller that drives an input of a model; it reads the output [`Controller::output`].
 #[derive(Debug, Clone, PartialEq)]
@@ -24,8 +21,8 @@ pub struct LoopController {
     pub controller: Controller,
     /// The input that it drives, by its position.
     pub input: usize,
-    /// Its reference, by its position among the references of a record.
-    pub reference: usize,
+    /// Its reference, by its position among the references of a record; `None` if it is not recorded.
+    pub reference: Option<usize>,
 }
 
 /// Controllers around a model, with the measured signals of its records.
@@ -35,6 +32,8 @@ pub struct SimulatedLoop {
     /// By record and controller.
     replays: Vec<Vec<Replay>>,
     response: Arc<LinearResponse>,
+    /// Sampling interval \[s\].
+    interval: f64,
 }
 
 impl SimulatedLoop {
@@ -58,21 +57,31 @@ impl SimulatedLoop {
                     input: spec.about(Variable::Input(of.input)).name.clone(),
                 });
             }
-            require_moving_reference(setup.records, of.reference)?;
+            for record in setup.records {
+                require_moving_reference(record, of.reference)?;
+            }
         }
-        let replay = |record: &Record| {
-            let all = controllers.iter();
-            all.map(|of| replay_of(&of.controller, record, of.input, of.reference))
-                .collect()
-        };
+        let mut fitted = Vec::new();
+        let mut replays = vec![Vec::new(); setup.records.len()];
+        for of in controllers {
+            let (controller, own) = fitting(&of.controller, |controller| {
+                let replay = |r: &Record| replay_of(controller, r, of.input, of.reference);
+                setup.records.iter().map(replay).collect()
+            })?;
+            fitted.push(LoopController {
+                controller,
+                ..of.clone()
+            });
+            for (of_record, own) in replays.iter_mut().zip(own) {
+                of_record.push(own);
+            }
+        }
+        let inputs: Vec<usize> = controllers.iter().map(|of| of.input).collect();
         Ok(Self {
-            replays: setup
-                .records
-                .iter()
-                .map(replay)
-                .collect::<Result<_, Error>>()?,
-            response: Arc::new(response(setup, x, controllers)?),
-            controllers: controllers.to_vec(),
+            replays,
+            response: Arc::new(setup.response(x, &inputs)?),
+            interval: setup.sample_interval(),
+            controllers: fitted,
         })
     }
 
@@ -86,6 +95,62 @@ impl SimulatedLoop {
     #[must_use]
     pub fn replays(&self) -> &[Vec<Replay>] {
         &self.replays
+    }
+
+    /// The largest magnitude of the eigenvalues of the linear loop over one sampling interval, without limits and dead times: above one it
+    /// grows. `None` where the model has no linear response.
+    #[must_use]
+    pub fn radius(&self) -> Option<f64> {
+        let LinearResponse { a, b, outputs } = &*self.response;
+        if a.is_empty() {
+            return None;
+        }
+        let linear = self.controllers.iter();
+        let linear: Vec<_> = linear
+            .map(|of| of.controller.linear(self.interval))
+            .collect();
+        let n = a.len();
+        let all = n + linear.iter().map(|own| own.b.len()).sum::<usize>();
+        let mut matrix = DMatrix::<f64>::zeros(all, all);
+        for (i, row) in a.iter().enumerate() {
+            for (j, value) in row.iter().enumerate() {
+                matrix[(i, j)] = *value;
+            }
+        }
+        // States x of the model, then z of each controller: e = -(C x), u = c z + d e.
+        let mut at = n;
+        for ((of, own), b) in self.controllers.iter().zip(&linear).zip(b) {
+            let m = own.b.len();
+            for &(j, c) in &outputs[of.controller.output()] {
+                for i in 0..n {
+                    matrix[(i, j)] -= b[i] * own.d * c;
+                }
+                for i in 0..m {
+                    matrix[(at + i, j)] -= own.b[i] * c;
+                }
+            }
+            for i in 0..n {
+                for j in 0..m {
+                    matrix[(i, at + j)] = b[i] * own.c[j];
+                }
+            }
+            for i in 0..m {
+                // A constant for an operating point is not a part of the loop.
+                let row = &own.a[i];
+                let constant = own.b[i] == 0.0 && (0..m).all(|j| row[j] == f64::from(i == j));
+                for j in 0..m {
+                    matrix[(at + i, at + j)] = if constant { 0.0 } else { row[j] };
+                }
+            }
+            at += m;
+        }
+        let eigenvalues = matrix.complex_eigenvalues();
+        Some(
+            eigenvalues
+                .iter()
+                .map(|value| value.norm())
+                .fold(0.0, f64::max),
+        )
     }
 
     /// Whether an output contains a driven input without a state in between.
@@ -133,7 +198,8 @@ impl<'a, T: Scalar> Regulators<'a, T> {
         for ((of, replay), running) in
             (self.of.controllers.iter().zip(replays)).zip(&mut self.running)
         {
-            let reference = record.references[of.reference].values[k];
+            let reference = of.reference.and_then(|at| record.references.get(at));
+            let reference = reference.map_or(f64::NAN, |channel| channel.values[k]);
             let read = outputs[of.controller.output()];
             let command =
                 running.command_beside(reference, read, replay.beside[k], step(record, k));
@@ -157,8 +223,7 @@ impl<'a> ModelSetup<'a> {
 
     /// Root mean square of the difference from the measurements in a simulation on the measured inputs, for each output \[its unit\], without
     /// missing samples; `None` where the simulation cannot go on.
-    #[must_use]
-    pub fn rmse(&self, x: &[f64]) -> Option<Vec<f64>> {
+    fn rmse(&self, x: &[f64]) -> Option<Vec<f64>> {
         let simulated = self.simulate(x)?;
         let of_output = |o: usize| {
             let measured = self.records.iter().map(move |record| &record.outputs[o]);
@@ -172,73 +237,36 @@ impl<'a> ModelSetup<'a> {
         };
         Some((0..self.outputs()).map(of_output).collect())
     }
-}
 
-/// The linear response of a model to its driven inputs at the mean of its simulated states and measured inputs. Delays are left out, and so
-/// is a direct term: the response affects the variance of estimates only. A model that grows has none.
-fn response(
-    setup: &ModelSetup,
-    x: &[f64],
-    controllers: &[LoopController],
-) -> Result<LinearResponse, Error> {
-    let spec = setup.model.spec();
-    let (n, count) = (spec.states.len(), setup.parameter_count());
-    let series = setup.simulate_states(x).ok_or(Error::Stopped)?;
-    let rows: usize = setup.records.iter().map(Record::len).sum();
-    let mean = |all: &mut dyn Iterator<Item = f64>| all.sum::<f64>() / rows as f64;
-    let states: Vec<f64> = (0..n)
-        .map(|i| mean(&mut series.iter().skip(i).step_by(n).flatten().copied()))
-        .collect();
-    let inputs: Vec<f64> = (0..spec.inputs.len())
-        .map(|i| {
-            let records = setup.records.iter();
-            mean(&mut records.flat_map(|record| record.inputs[i].values.iter().copied()))
-        })
-        .collect();
-    let time = setup.model_time(0);
-    let time = time.get(time.len() / 2).copied().unwrap_or(0.0);
-    let model = setup.model;
-    let form = model.linear_undelayed(&x[..count], &states, &inputs, time);
-    let form = form.ok_or(Error::Stopped)?;
-    let interval = setup.records.iter().map(Record::sample_interval);
-    let interval = interval.fold(0.0, f64::max) / setup.time_unit;
-    // Phi and g of held inputs are blocks of one matrix exponential.
-    let m = controllers.len();
-    let mut blocks = DMatrix::zeros(n + m, n + m);
-    for i in 0..n {
-        for j in 0..n {
-            blocks[(i, j)] = form.a[i][j] * interval;
-        }
-        for (j, of) in controllers.iter().enumerate() {
-            blocks[(i, n + j)] = form.b[i][of.input] * interval;
-        }
+    /// The controllers and their loop, if it is simulated.
+    #[must_use]
+    pub fn simulated_loop(&self) -> Option<&Arc<SimulatedLoop>> {
+        self.simulated_loop.as_ref()
     }
-    let blocks = blocks.exp();
-    let phi = blocks.view((0, 0), (n, n)).into_owned();
-    let largest = phi
-        .complex_eigenvalues()
-        .iter()
-        .map(|v| v.norm())
-        .fold(0.0, f64::max);
-    let longest = setup.records.iter().map(Record::len).max().unwrap_or(0);
-    if !(largest.ln() * longest as f64 <= GROWTH) {
-        return Ok(LinearResponse {
-            a: Vec::new(),
-            b: Vec::new(),
-            outputs: vec![Vec::new(); spec.outputs.len()],
+
+    /// The signals of a record that come from outside: in a simulated loop the references, which replace the inputs that controllers drive.
+    #[must_use]
+    pub fn external_signals<'r>(&self, record: &'r Record) -> Vec<&'r Channel> {
+        let inputs = record.inputs.iter().enumerate();
+        let external = inputs.map(|(i, input)| {
+            let in_loop = self.simulated_loop.iter().flat_map(|of| &of.controllers);
+            let mut driven = in_loop.filter(|of| of.input == i);
+            let reference = driven.next().and_then(|of| of.reference);
+            reference
+                .and_then(|at| record.references.get(at))
+                .unwrap_or(input)
         });
+        external.collect()
     }
-    let row = |c: &Vec<f64>| {
-        let all = c.iter().copied().enumerate();
-        all.filter(|(_, coefficient)| *coefficient != 0.0).collect()
-    };
-    let column = |j: usize| blocks.view((0, j), (n, 1)).iter().copied().collect();
-    Ok(LinearResponse {
-        a: phi
-            .row_iter()
-            .map(|row| row.iter().copied().collect())
-            .collect(),
-        b: (n..n + m).map(column).collect(),
-        outputs: form.c.iter().map(row).collect(),
-    })
+
+    /// A fit of this setup with the errors of a simulation on the measured inputs: the fit in a loop does not compute them.
+    #[must_use]
+    pub fn with_measured_errors(&self, mut fit: estimation::Fit) -> estimation::Fit {
+        if self.simulated_loop.is_some()
+            && let Some(rmse) = self.rmse(&fit.x)
+        {
+            fit.rmse = rmse;
+        }
+        fit
+    }
 }

@@ -2,14 +2,12 @@
 //!
 //! In this order: `problem.rs` and `problem_builder.rs` (plant, records, options), `check.rs` (what records of one problem must share),
 //! `gaps.rs` (rows without an input are held or cut out), `believed.rs` (the fit from many starts), `control_loop.rs` (time constants and
-//! stability of the fitted plant), `feedback_test.rs` (whether the command answers to the noise), `closed_loop.rs` (the loop simulated
-//! where it is known). `time_limit.rs` shares the time out to the phases of a search.
+//! stability of the fitted plant), `closed_loop.rs` (the loop simulated where it is known). `time_limit.rs` shares the time out to the phases of a search.
 
 pub(crate) mod believed;
 mod check;
 pub(crate) mod closed_loop;
 pub(crate) mod control_loop;
-mod feedback_test;
 pub(crate) mod gaps;
 mod problem;
 mod problem_builder;

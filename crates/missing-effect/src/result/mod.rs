@@ -1,6 +1,5 @@
 //! The result of a diagnosis: plain structs, written to JSON unchanged; all printed and plotted results are derived from them.
 
-mod control_loop;
 mod gaps;
 mod noise_floor;
 mod not_noise;
@@ -13,12 +12,11 @@ mod step;
 mod unknown;
 
 use ct_signals::Clock;
-pub use effect_search::Verdict;
+pub use effect_search::{ControlLoop, NotSimulated, Verdict};
 use plants::{Domain, Plant};
 use serde::{Deserialize, Serialize};
 
 pub use self::{
-    control_loop::{ControlLoop, NotSimulated},
     gaps::{LONGEST_HOLD, MendedGaps},
     noise_floor::{NoiseFloor, NoiseSource},
     not_noise::NotNoise,

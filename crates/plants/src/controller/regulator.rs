@@ -35,14 +35,17 @@ impl<T: Scalar> Regulator<T> {
             Kind::Pi {
                 gain,
                 integral_time,
+                integral_first,
             } => {
-                let wanted = states[0] + error * *gain + beside;
+                let next = states[0] + error * (gain * h / integral_time);
+                let integral = if *integral_first { next } else { states[0] };
+                let wanted = integral + error * *gain + beside;
                 let given = limit(wanted);
                 self.limited = wanted.value() != given.value();
                 let push = gain * error.value();
                 let outwards = (wanted.value() - given.value()) * push > 0.0;
                 if !outwards {
-                    states[0] = states[0] + error * (gain * h / integral_time);
+                    states[0] = next;
                 }
                 given
             }

@@ -88,3 +88,23 @@ fn the_linear_controller_is_the_one_that_runs() {
         }
     }
 }
+
+#[test]
+fn an_integral_that_is_updated_first_is_another_controller() {
+    let (gain, time, h) = (0.7, 30.0, 2.0);
+    let none = (f64::NEG_INFINITY, f64::INFINITY);
+    let given = Controller::pi(gain, time, none).unwrap();
+    let other = given.with_integral_first().unwrap();
+    assert!(other.with_integral_first().is_none());
+    // The linear form of both agrees with the running controller.
+    for controller in [given, other] {
+        let (linear, mut running) = (controller.linear(h), controller.start(&[3.0]));
+        let mut integral = 3.0;
+        for k in 0..20 {
+            let error = (f64::from(k) * 0.7).sin();
+            let command = running.command(error, 0.0, h);
+            assert!((command - (integral + linear.d * error)).abs() < 1e-12);
+            integral += linear.b[0] * error;
+        }
+    }
+}

@@ -71,8 +71,15 @@ impl Work {
         let options = ReadOptions::from(model.hold);
         let (mut fitted, mut held_out): (Vec<Reading>, Vec<Reading>) = Default::default();
         let mut time_unit = None;
+        let of_fit = model.columns_of_fit();
         for upload in &mut session.records {
-            let reading = upload.reading(&model.columns, &options);
+            // Held-out records are simulated on their measured inputs.
+            let columns = if upload.held_out {
+                &model.columns
+            } else {
+                &of_fit
+            };
+            let reading = upload.reading(columns, &options);
             let reading = reading.map_err(Refusal::input)?;
             if upload.held_out {
                 held_out.push(reading);
@@ -255,6 +262,7 @@ impl Work {
             "starts": step.starts,
             "starts_agree": step.starts_agree,
             "not_determined": step.not_determined.iter().map(|of| of.join(", ")).collect::<Vec<_>>(),
+            "loop": found.control_loop.as_ref().map(|known| self.model.loop_sentence(known)),
             "curves": curves.collect::<Vec<_>>(),
         })
     }

@@ -205,8 +205,8 @@ export async function show(state) {
   $("own-check-part").hidden = !own.check;
   $("own-check").textContent = own.check || "";
   const unused = (own.unused || []).map((one) => `[${one}]`).join(", ");
-  $("own-unused").hidden = !unused && !own.loop;
-  $("own-unused").textContent = [own.loop ? `${own.loop}.` : "", unused ? `Fits do not use ${unused}.` : ""].join(" ").trim();
+  $("own-unused").hidden = !unused;
+  $("own-unused").textContent = unused ? `Fits do not use ${unused}.` : "";
   const ready = !own.text_error && !own.file_error && !state.job && state.records.some((one) => !one.held_out) && state.records.every((one) => one.read);
   $("own-fit").disabled = !ready;
   $("own-diagnose").disabled = !ready;
@@ -251,8 +251,9 @@ function words() {
   table($("own-parameters"), [["Parameter"], ["Estimate", true], ["± standard error", true], ["Unit"]],
     body.parameters.map((one) => [make("code", {}, one.name), one.value, one.error ?? (one.known ? "known" : "–"), units(one.unit)]));
   $("own-starts").textContent = `${body.starts_agree} of ${body.starts} starts ended in this minimum. –: the data do not determine it, or it is at a bound.`;
+  const loop = body.loop ? [make("p", {}, body.loop)] : [];
   fill($("own-untold"), body.not_determined.map((of) => make("p", { className: "warning" },
-    of.includes(",") ? `These records determine only a combination of ${of}: give one of them under [known], or a [prior].` : `${of} has no effect on the readings of these records: give it under [known], or excite the plant more.`)));
+    of.includes(",") ? `These records determine only a combination of ${of}: give one of them under [known], or a [prior].` : `${of} has no effect on the readings of these records: give it under [known], or excite the plant more.`)).concat(loop));
 }
 
 const inUnit = (name, unit) => plots.named(plots.plain(name), plots.pretty(unit));

@@ -58,7 +58,7 @@ impl Loop {
         let of = |(i, controller): (usize, &Controller)| LoopController {
             controller: controller.clone().at_output(i),
             input: i,
-            reference: i,
+            reference: Some(i),
         };
         Self {
             model: Model::new(ModelSpec::parse(text).unwrap()),
@@ -227,7 +227,7 @@ fn a_built_in_plant_as_text_has_the_same_rows() {
     let controllers = [LoopController {
         controller: pi(),
         input: 0,
-        reference: 0,
+        reference: Some(0),
     }];
     let truth = rig.truth(1);
     let simulated = SimulatedLoop::new(&setup, &truth, &controllers).unwrap();
@@ -279,6 +279,29 @@ fn coloured_noise_in_a_loop_biases_only_fits_on_the_measured_command() {
         assert!(bias(1, i).abs() < 3.0, "{i}: {}", bias(1, i));
     }
     assert!((0..2).any(|i| bias(0, i).abs() > 6.0));
+}
+
+/// A PI controller may update its integral before or after its command: the records tell. Its first rows may be under manual control.
+#[test]
+fn the_order_of_the_integral_and_a_beginning_by_hand_are_found() {
+    let given = Controller::pi(3.0, 40.0, (0.0, 30.0)).unwrap();
+    for truth in [given.clone(), given.with_integral_first().unwrap()] {
+        let own = Loop::new(HEATER, std::slice::from_ref(&truth), 11.0);
+        let (mut record, _) = own.record(300, 0.3, 0.8, 4);
+        record.inputs[0].values[0] += 20.0;
+        let records = [record];
+        let as_given = Loop::new(HEATER, std::slice::from_ref(&given), 11.0);
+        let setup = as_given.setup(&records);
+        let found = SimulatedLoop::new(&setup, &own.truth(), &as_given.controllers).unwrap();
+        let replay = &found.replays()[0][0];
+        assert_eq!(found.controllers()[0].controller, truth);
+        assert!(
+            replay.rms > 1.0 && replay.usual < 0.1,
+            "{} {}",
+            replay.rms,
+            replay.usual
+        );
+    }
 }
 
 #[test]

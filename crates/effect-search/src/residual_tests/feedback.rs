@@ -28,7 +28,7 @@ use statrs::statistics::{Data, OrderStatistics};
 /// Past changes of the input in the regression.
 const OWN: usize = 12;
 /// The residuals that are tested: the present one and those before it.
-pub(crate) const LAGS: usize = 7;
+pub const LAGS: usize = 7;
 /// The input has to change at this share of the samples at least.
 const MOVES: f64 = 0.5;
 /// Least share of the input's changes, beyond its own past, that past residuals explain: a smaller share causes no relevant bias.
@@ -44,7 +44,8 @@ const CLIPPED: f64 = 5.0;
 ///
 /// `input` and `residual`: one value for each sample of one record; `gain`: a number of the sign of the plant's gain, `None` where it
 /// is not to be relied on.
-pub(crate) fn feedback_p(input: &[f64], residual: &[f64], gain: Option<f64>) -> f64 {
+#[must_use]
+pub fn feedback_p(input: &[f64], residual: &[f64], gain: Option<f64>) -> f64 {
     let first = OWN.max(LAGS) + 1;
     let n = input.len().min(residual.len());
     let columns = 3 + OWN + LAGS + 1;

@@ -1,0 +1,325 @@
+//! The control loop that the records come from: it is simulated from its references if its controllers are known; otherwise a warning is
+//! given.
+//!
+//! The noise is fed back through the inputs that controllers drive. A model that is simulated with these measured inputs is biased,
+//! depending on the spectrum of the noise; a model whose loop is simulated from the references is not.
+
+use ct_signals::Record;
+use estimation::{Fit, Stopping, fit_from};
+use greybox::{LoopController, ModelSetup, Replay, SimulatedLoop};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+use crate::Error;
+use crate::residual_tests::feedback::{LAGS, feedback_p};
+
+/// Significance level of the feedback test.
+const FEEDBACK: f64 = 1e-4;
+/// Largest relative difference between the controller's command and the measured one. A controller with a larger difference is not used; a
+/// smaller difference is simulated as a known input of the loop.
+const OTHER_CONTROLLER: f64 = 0.05;
+/// A loop that grows by this number of factors e over the longest record cannot have produced it.
+const GROWTH: f64 = 1.0;
+/// Sampling intervals after which the sign of an input's gain is that of its step response.
+const STEP_RESPONSE: usize = 50;
+
+/// The loop that the records come from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ControlLoop {
+    /// The loop was simulated from its reference; otherwise the model ran on the measured command.
+    pub simulated: bool,
+    /// p-value of the hypothesis that the command does not depend on the noise; `None` if a controller is known.
+    pub feedback_p: Option<f64>,
+    /// Measured command minus the controller's output for the measured reading, root mean square, in the input's unit; `None` if not
+    /// computed.
+    pub mismatch: Option<f64>,
+    /// Why the loop was not simulated; `None` if it was.
+    pub not_simulated: Option<NotSimulated>,
+}
+
+/// Reason why a loop is not simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum NotSimulated {
+    /// No controller is known, and the command depends on past residuals.
+    UnknownController {
+        /// Number of past residuals in the feedback test.
+        lags: usize,
+        /// The input; `None` for the command of a plant.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        input: Option<String>,
+    },
+    /// The options ask for the measured command.
+    AsRequested,
+    /// Readings are missing, so the controller cannot be checked against its commands.
+    MissingReadings {
+        /// The record, by its name.
+        record: String,
+    },
+    /// The record contains no reference.
+    NoReference {
+        /// The record, by its name.
+        record: String,
+    },
+    /// The reference is constant, so only noise excites the loop.
+    ConstantReference {
+        /// The record, by its name.
+        record: String,
+        /// Value of the reference \[output unit\].
+        #[serde(deserialize_with = "crate::not_finite::number")]
+        value: f64,
+    },
+    /// The record says that the command is interpolated, but a controller holds it.
+    CommandNotHeld {
+        /// The record, by its name.
+        record: String,
+    },
+    /// A controller reads an output that its command changes at once.
+    DirectTerm {
+        /// The output.
+        output: String,
+        /// The input that the controller drives.
+        input: String,
+    },
+    /// The linear loop of the fitted model and its controllers grows, so it cannot have produced the records.
+    Unstable {
+        /// Largest magnitude of its eigenvalues over one sampling interval; `None` if the simulation of the loop fails.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        radius: Option<f64>,
+    },
+    /// In the simulated loop the fitted model has another error at an output: it lacks an effect, whose influence the loop weights otherwise.
+    ModelError {
+        /// The output.
+        output: String,
+        /// Relative change of its error.
+        change: f64,
+    },
+    /// The measured command disagrees with the controller's output by `mismatch`.
+    OtherController {
+        /// `mismatch` over the standard deviation of the command, above 0.05; not finite for a command that hardly changes.
+        #[serde(deserialize_with = "crate::not_finite::number")]
+        share: f64,
+    },
+}
+
+impl NotSimulated {
+    /// The reason behind an error of a loop.
+    ///
+    /// # Errors
+    /// All other errors.
+    pub fn because(error: greybox::Error) -> Result<Self, greybox::Error> {
+        Ok(match error {
+            greybox::Error::NoReference { record } => Self::NoReference { record },
+            greybox::Error::ConstantReference { record, value } => {
+                Self::ConstantReference { record, value }
+            }
+            greybox::Error::CommandNotHeld { record } => Self::CommandNotHeld { record },
+            greybox::Error::DirectTerm { output, input } => Self::DirectTerm { output, input },
+            error => return Err(error),
+        })
+    }
+}
+
+impl ControlLoop {
+    /// A loop whose model ran on the measured command.
+    #[must_use]
+    pub fn measured(why: NotSimulated) -> Self {
+        Self {
+            simulated: false,
+            feedback_p: None,
+            mismatch: None,
+            not_simulated: Some(why),
+        }
+    }
+
+    /// A simulated loop whose commands differ by `mismatch` from the measured ones.
+    #[must_use]
+    pub fn simulated(mismatch: f64) -> Self {
+        Self {
+            simulated: true,
+            feedback_p: None,
+            mismatch: Some(mismatch),
+            not_simulated: None,
+        }
+    }
+
+    /// Feedback through an input, if the p-value of its test is small.
+    #[must_use]
+    pub fn detected(p: f64, input: Option<String>) -> Option<Self> {
+        (p < FEEDBACK).then(|| Self {
+            feedback_p: Some(p),
+            ..Self::measured(NotSimulated::UnknownController { lags: LAGS, input })
+        })
+    }
+
+    /// Difference between the measured commands and those of the controllers, for the worst one.
+    ///
+    /// # Errors
+    /// The loop is not simulated where the difference is too large.
+    pub fn mismatch_of<'a>(replays: impl IntoIterator<Item = &'a Replay>) -> Result<f64, Self> {
+        let replays = replays.into_iter();
+        let shares = replays.map(|replay| {
+            (
+                replay.rms,
+                replay.usual / replay.moves.max(f64::MIN_POSITIVE),
+            )
+        });
+        let (mismatch, share) = shares.fold(
+            (0.0, 0.0),
+            |worst, own| {
+                if own.1 >= worst.1 { own } else { worst }
+            },
+        );
+        if share > OTHER_CONTROLLER {
+            return Err(Self {
+                mismatch: Some(mismatch),
+                ..Self::measured(NotSimulated::OtherController { share })
+            });
+        }
+        Ok(mismatch)
+    }
+
+    /// Standard errors have to include the bias from feedback.
+    #[must_use]
+    pub fn widens(known: Option<&Self>) -> bool {
+        known.is_some_and(|known| !known.simulated)
+    }
+}
+
+impl Enclosed<'_> {
+    /// The largest relative change of an output's error on the measured inputs between a fit on these and the fit in the simulated loop, and
+    /// the output. Of a model without an error the two fits differ by a part of their standard errors.
+    #[must_use]
+    pub fn change_of_error(&self, measured: &Fit) -> Option<(f64, &str)> {
+        let outputs = &self.setup.records()[0].outputs;
+        let pairs = self.fit.rmse.iter().zip(&measured.rmse);
+        let changes = pairs.map(|(looped, measured)| looped / measured - 1.0);
+        let named = changes.zip(outputs.iter().map(|output| output.name.as_str()));
+        named.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
+    }
+}
+
+/// A fitted model in its loop.
+#[derive(Debug)]
+pub struct Enclosed<'a> {
+    /// The setup, in the simulated loop if that is possible.
+    pub setup: ModelSetup<'a>,
+    /// The fit in this loop.
+    pub fit: Fit,
+    /// What is known of the loop; `None` without controllers and without detected feedback.
+    pub control_loop: Option<ControlLoop>,
+}
+
+/// Closes the loop around a fitted model if possible, and tests for feedback if no controller is known.
+///
+/// - `controllers`: those that drove the inputs; `simulate`: whether their loop is simulated.
+/// - `may_test`: the feedback test can be used. A function of time that was fitted to the records has also fitted their noise, with future
+///   values: its residual cannot be tested.
+///
+/// # Errors
+/// Where a fit fails.
+pub fn enclose<'a>(
+    setup: ModelSetup<'a>,
+    fit: Fit,
+    (controllers, simulate): (&[LoopController], bool),
+    may_test: bool,
+    stopping: Stopping,
+) -> Result<Enclosed<'a>, Error> {
+    let measured = |setup, fit, control_loop| {
+        Ok(Enclosed {
+            setup,
+            fit,
+            control_loop,
+        })
+    };
+    if controllers.is_empty() {
+        let detected = may_test.then(|| detected(&setup, &fit)).flatten();
+        return measured(setup, fit, detected);
+    }
+    let why = |why| Some(ControlLoop::measured(why));
+    if !simulate {
+        return measured(setup, fit, why(NotSimulated::AsRequested));
+    }
+    if let Some(record) = lacking(setup.records(), controllers) {
+        return measured(setup, fit, why(NotSimulated::MissingReadings { record }));
+    }
+    let simulated = match SimulatedLoop::new(&setup, &fit.x, controllers) {
+        Ok(simulated) => simulated,
+        Err(error) => {
+            let because = NotSimulated::because(error)?;
+            return measured(setup, fit, why(because));
+        }
+    };
+    let mismatch = match ControlLoop::mismatch_of(simulated.replays().iter().flatten()) {
+        Ok(mismatch) => mismatch,
+        Err(other) => return measured(setup, fit, Some(other)),
+    };
+    let rows = setup.records().iter().map(Record::len).max().unwrap_or(0);
+    if let Some(radius) = simulated.radius()
+        && radius.ln() * rows as f64 > GROWTH
+    {
+        let radius = Some(radius);
+        return measured(setup, fit, why(NotSimulated::Unstable { radius }));
+    }
+    let closed = setup.clone().in_loop(Arc::new(simulated));
+    match fit_from(&closed, vec![fit.x.clone().into()], &fit.noise, stopping) {
+        Ok(again) => {
+            let again = closed.with_measured_errors(again.continuing(&fit));
+            measured(closed, again, Some(ControlLoop::simulated(mismatch)))
+        }
+        Err(estimation::Error::NoFiniteStart { .. }) => {
+            measured(setup, fit, why(NotSimulated::Unstable { radius: None }))
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Standard errors that allow for a bias from feedback, by the change of each entry with the other weighting
+/// ([`estimation::moved_by_weighting`]).
+#[must_use]
+pub fn widened(std_errors: Vec<Option<f64>>, moved: &[f64]) -> Vec<Option<f64>> {
+    let pairs = std_errors.into_iter().zip(moved);
+    pairs
+        .map(|(error, moved)| error.map(|error| error.hypot(*moved)))
+        .collect()
+}
+
+/// The first record that lacks readings of a controlled output, or values of a reference.
+fn lacking(records: &[Record], controllers: &[LoopController]) -> Option<String> {
+    let lacks = |record: &&Record| {
+        controllers.iter().any(|of| {
+            let read = record.outputs.get(of.controller.output());
+            let reference = of.reference.and_then(|at| record.references.get(at));
+            let mut channels = read.into_iter().chain(reference);
+            channels.any(|channel| channel.missing() > 0)
+        })
+    };
+    records.iter().find(lacks).map(|record| record.name.clone())
+}
+
+/// Feedback through an input, by the test with the smallest p-value, corrected for the number of tests; `None` if there is none, or the
+/// simulation is not finite.
+fn detected(setup: &ModelSetup, fit: &Fit) -> Option<ControlLoop> {
+    let residuals = estimation::residuals(setup, &fit.x)?;
+    let gains = setup.step_gains(&fit.x, STEP_RESPONSE).ok()?;
+    let outputs = setup.outputs();
+    let (mut least, mut through, mut tests) = (1.0, None, 0.0);
+    for (i, residual) in residuals.iter().enumerate() {
+        let record = &setup.records()[i / outputs];
+        // A missing reading has not affected the controller.
+        let read = residual.iter().map(|e| if e.is_nan() { 0.0 } else { *e });
+        let read: Vec<f64> = read.collect();
+        for (input, gains) in record.inputs.iter().zip(&gains) {
+            let gain = gains[i % outputs];
+            if gain == 0.0 {
+                continue;
+            }
+            tests += 1.0;
+            let p = feedback_p(&input.values, &read, Some(gain));
+            if p < least {
+                (least, through) = (p, Some(input.name.clone()));
+            }
+        }
+    }
+    ControlLoop::detected((least * tests).min(1.0), through)
+}

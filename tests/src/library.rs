@@ -22,8 +22,12 @@ use self::drive::{Drive, range, side_measurements};
 pub use self::jobs::jobs;
 pub use self::outcome::outcome;
 
-/// Inputs and outputs of one record, each a series.
-type Series = (Vec<Vec<f64>>, Vec<Vec<f64>>);
+/// One simulated record: a series for each input and output, and for the reference of its controller.
+struct Series {
+    inputs: Vec<Vec<f64>>,
+    outputs: Vec<Vec<f64>>,
+    reference: Vec<f64>,
+}
 
 /// Correlation of coloured noise from row to row.
 const CORRELATION: f64 = 0.8;

@@ -18,6 +18,8 @@ const FEEDBACK: f64 = 1e-4;
 /// Largest relative difference between the controller's command and the measured one. A controller with a larger difference is not used; a
 /// smaller difference is simulated as a known input of the loop.
 const OTHER_CONTROLLER: f64 = 0.05;
+/// Largest share of rows without a reading of a controlled output.
+const LACKING: f64 = 0.2;
 /// A loop that grows by this number of factors e over the longest record cannot have produced it.
 const GROWTH: f64 = 1.0;
 /// Sampling intervals after which the sign of an input's gain is that of its step response.
@@ -284,14 +286,16 @@ pub fn widened(std_errors: Vec<Option<f64>>, moved: &[f64]) -> Vec<Option<f64>> 
         .collect()
 }
 
-/// The first record that lacks readings of a controlled output, or values of a reference.
+/// The first record that lacks many readings of a controlled output, or a value of a reference. At rows without a reading the controller has
+/// used one that the record does not contain; it is interpolated, and the difference of the commands there is simulated as a known input.
 fn lacking(records: &[Record], controllers: &[LoopController]) -> Option<String> {
     let lacks = |record: &&Record| {
         controllers.iter().any(|of| {
             let read = record.outputs.get(of.controller.output());
             let reference = of.reference.and_then(|at| record.references.get(at));
-            let mut channels = read.into_iter().chain(reference);
-            channels.any(|channel| channel.missing() > 0)
+            let rows = record.len() as f64;
+            read.is_some_and(|read| read.missing() as f64 > LACKING * rows)
+                || reference.is_some_and(|reference| reference.missing() > 0)
         })
     };
     records.iter().find(lacks).map(|record| record.name.clone())
@@ -301,7 +305,7 @@ fn lacking(records: &[Record], controllers: &[LoopController]) -> Option<String>
 /// simulation is not finite.
 fn detected(setup: &ModelSetup, fit: &Fit) -> Option<ControlLoop> {
     let residuals = estimation::residuals(setup, &fit.x)?;
-    let gains = setup.step_gains(&fit.x, STEP_RESPONSE).ok()?;
+    let gains = setup.step_gains(&fit.x, STEP_RESPONSE);
     let outputs = setup.outputs();
     let (mut least, mut through, mut tests) = (1.0, None, 0.0);
     for (i, residual) in residuals.iter().enumerate() {

@@ -13,6 +13,7 @@ use crate::control_loop::ControlLoop;
 use crate::problem::{Limit, Problem};
 use crate::result::Absorbed;
 use crate::thresholds::Thresholds;
+use crate::ties::Tie;
 
 /// Stopping criteria of a first fit, which only has to give a rank.
 pub(crate) const ROUGH: Stopping = Stopping {
@@ -41,7 +42,7 @@ pub(crate) struct Context<'a> {
     /// A level shift of each reading ([`ct_model::effects::level_shifts`]), which no search adds.
     pub level_shifts: Vec<Candidate>,
     /// For each candidate the first one with a collinear sensitivity ([`Context::ties`]); empty where they are not known.
-    pub ties: Vec<usize>,
+    pub ties: Vec<Tie>,
     /// Candidates of the model file that the model's parameters absorb.
     pub absorbed: Vec<Absorbed>,
     /// The loop of the records, if it is simulated.

@@ -34,24 +34,40 @@ pub(crate) struct Grown {
 }
 
 impl Context<'_> {
-    /// Fits of candidates added to a set.
+    /// Fits of candidates added to a set. Of tied candidates only the first one is fitted from its starts; the fits of the others begin at its
+    /// end, with a size of the same influence, where they end at once if their influence is the same in all orders.
     pub fn refits(&self, node: &Node, trials: &[Trial], noise: &Noise) -> Vec<Node> {
-        let fits = trials.par_iter().filter_map(|trial| {
+        let fitted = |trial: &Trial, starts: Vec<Vec<f64>>| {
             if self.limit.passed() {
                 return None;
             }
             let mut added = node.added.clone();
             added.push(trial.candidate);
-            self.fitted(
-                added,
-                trial.model.clone(),
-                trial.starts.clone(),
-                noise,
-                ROUGH,
+            self.fitted(added, trial.model.clone(), starts, noise, ROUGH)
+                .ok()
+        };
+        let repeats = |k: usize| {
+            let candidate = trials[k].candidate;
+            let before: Vec<usize> = trials[..k].iter().map(|trial| trial.candidate).collect();
+            self.is_tied_to_one_of(candidate, &before)
+        };
+        let (others, first): (Vec<usize>, Vec<usize>) =
+            (0..trials.len()).partition(|&k| repeats(k));
+        let first = first.par_iter();
+        let first = first.filter_map(|&k| fitted(&trials[k], trials[k].starts.clone()));
+        let mut fits: Vec<Node> = first.collect();
+        let others = others.par_iter().filter_map(|&k| {
+            let trial = &trials[k];
+            let mut starts = fits.iter();
+            let start = starts.find_map(|of| self.tied_start(of, &trial.model, trial.candidate));
+            fitted(
+                trial,
+                start.map_or_else(|| trial.starts.clone(), |start| vec![start]),
             )
-            .ok()
         });
-        best_first(fits.collect())
+        let others: Vec<Node> = others.collect();
+        fits.extend(others);
+        best_first(fits)
     }
 
     /// Whether a fit has a parameter at a bound, or one that the records do not determine.

@@ -9,8 +9,9 @@
 
 use std::sync::Arc;
 
+use ct_model::Model;
 use ct_model::effects::Role;
-use estimation::{Noise, rows};
+use estimation::{Noise, Residuals, rows, within};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -18,10 +19,19 @@ use crate::node::{Context, Node};
 use crate::pairs::{basis_of, every_nth, project, whitened};
 use crate::result::Absorbed;
 
+/// The first candidate with a sensitivity that is collinear with that of a candidate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tie {
+    /// Its position; that of the candidate itself if there is none.
+    pub first: usize,
+    /// Change of the candidate's size that has the influence of a unit change of the first one's.
+    pub scale: f64,
+}
+
 /// Direction of a candidate's sensitivity.
 enum Direction {
-    /// The part that is orthogonal to the sensitivities of the believed parameters, of length one.
-    Own(DVector<f64>),
+    /// The part that is orthogonal to the sensitivities of the believed parameters, of length one, and its length.
+    Own(DVector<f64>, f64),
     /// The believed parameters explain it: one of them alone, or several together.
     Dependent(Option<String>),
     Unknown,
@@ -33,18 +43,19 @@ const SAME_DIRECTION: f64 = 1e-4;
 const DEPENDENT: f64 = 1e-3;
 
 impl Context<'_> {
-    /// For each candidate, the first one with a collinear sensitivity: itself if there is none; and the candidates of the model file that
-    /// the model's own parameters absorb. `bare`: the model without effects.
-    pub fn ties(&self, bare: &Node) -> (Vec<usize>, Vec<Absorbed>) {
-        let mut first: Vec<usize> = (0..self.candidates.len()).collect();
+    /// For each candidate, the first one with a collinear sensitivity; and the candidates of the model file that the model's own parameters
+    /// absorb. `bare`: the model without effects.
+    pub fn ties(&self, bare: &Node) -> (Vec<Tie>, Vec<Absorbed>) {
+        let alone = |first| Tie { first, scale: 1.0 };
+        let mut ties: Vec<Tie> = (0..self.candidates.len()).map(alone).collect();
         let every = every_nth(self, self.candidates.len());
         let Some(believed) = self.sensitivities(bare, every) else {
-            return (first, Vec::new());
+            return (ties, Vec::new());
         };
         let basis = basis_of(&believed);
-        let directions: Vec<Direction> = first
-            .par_iter()
-            .map(|&i| {
+        let directions: Vec<Direction> = (0..ties.len())
+            .into_par_iter()
+            .map(|i| {
                 if self.limit.passed() {
                     return Direction::Unknown;
                 }
@@ -59,7 +70,7 @@ impl Context<'_> {
                 project(&basis, &mut column);
                 let after = column.norm();
                 if after > DEPENDENT * before {
-                    Direction::Own(column / after)
+                    Direction::Own(column / after, after)
                 } else if before > 0.0 {
                     Direction::Dependent(self.parameter_along(bare, &believed, &whole))
                 } else {
@@ -67,14 +78,23 @@ impl Context<'_> {
                 }
             })
             .collect();
-        let same = |a: usize, b: usize| match (&directions[a], &directions[b]) {
-            (Direction::Own(a), Direction::Own(b)) => {
-                1.0 - a.dot(b).powi(2) < SAME_DIRECTION.powi(2)
+        // The scale of the second one if both have the same direction.
+        let scale = |a: usize, b: usize| match (&directions[a], &directions[b]) {
+            (Direction::Own(a, of_a), Direction::Own(b, of_b)) => {
+                let cosine = a.dot(b);
+                (1.0 - cosine.powi(2) < SAME_DIRECTION.powi(2)).then(|| cosine * of_a / of_b)
             }
-            _ => false,
+            _ => None,
         };
-        for i in 0..first.len() {
-            first[i] = (0..i).find(|&j| first[j] == j && same(j, i)).unwrap_or(i);
+        for i in 0..ties.len() {
+            let mut earlier = (0..i).filter(|&j| ties[j].first == j);
+            let tie = earlier.find_map(|first| {
+                Some(Tie {
+                    first,
+                    scale: scale(first, i)?,
+                })
+            });
+            ties[i] = tie.unwrap_or(ties[i]);
         }
         let absorbed = self.candidates.iter().zip(&directions);
         let absorbed = absorbed.filter_map(|(candidate, direction)| match direction {
@@ -88,7 +108,7 @@ impl Context<'_> {
             }
             _ => None,
         });
-        (first, absorbed.collect())
+        (ties, absorbed.collect())
     }
 
     /// The parameter of the model whose sensitivity alone is collinear with a column.
@@ -156,9 +176,34 @@ impl Context<'_> {
 
     /// Whether a set has another candidate with the same sensitivity.
     pub fn is_tied_to_one_of(&self, candidate: usize, added: &[usize]) -> bool {
-        let tie = |i: usize| self.ties.get(i).copied().unwrap_or(i);
+        let first = |i: usize| self.ties.get(i).map_or(i, |tie| tie.first);
         added
             .iter()
-            .any(|&i| i != candidate && tie(i) == tie(candidate))
+            .any(|&i| i != candidate && first(i) == first(candidate))
+    }
+
+    /// The start of a candidate's fit at the influence of a tied one that was fitted in its place; `None` where they are not tied.
+    pub fn tied_start(&self, fitted: &Node, model: &Model, candidate: usize) -> Option<Vec<f64>> {
+        let last = *fitted.added.last()?;
+        let (of, other) = (self.ties.get(candidate)?, self.ties.get(last)?);
+        if of.first != other.first {
+            return None;
+        }
+        let [own] = &self.candidates[candidate].parameters[..] else {
+            return None;
+        };
+        let [fitted_own] = &self.candidates[last].parameters[..] else {
+            return None;
+        };
+        let setup = self.setup(model).ok()?;
+        let mut x = self.transfer(fitted, model, setup.start());
+        let mut parameters = model.spec().parameters.iter();
+        let at = parameters.position(|p| p.about.name == own.name)?;
+        let moved = fitted.value(&fitted_own.name)? - fitted_own.absent;
+        x[at] = within(
+            own.absent + moved * of.scale / other.scale,
+            setup.bounds()[at],
+        );
+        Some(x)
     }
 }

@@ -49,6 +49,16 @@ pub enum Error {
         /// Number in the model.
         needed: usize,
     },
+    /// A controller drives an input or reads an output that the model does not have.
+    #[error(
+        "a controller drives input {input} and reads output {output}, counted from 0: the model has not both of them"
+    )]
+    LoopSignals {
+        /// The input.
+        input: usize,
+        /// The output.
+        output: usize,
+    },
     /// A controller reads an output that its command changes at once.
     #[error(
         "the loop cannot be simulated: {output} depends on {input} without a state in between, and the controller of {input} reads it"

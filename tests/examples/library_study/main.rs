@@ -50,6 +50,9 @@ struct Arguments {
     /// Time limit of a diagnosis \[s\].
     #[arg(long, default_value_t = 40.0)]
     limit: f64,
+    /// Diagnose records of a closed loop on their measured inputs.
+    #[arg(long)]
+    measured: bool,
     /// Says more of each record.
     #[arg(long)]
     verbose: bool,
@@ -86,6 +89,7 @@ fn main() {
     let mut skipped: BTreeMap<String, usize> = BTreeMap::new();
     let options = Options {
         time_limit: Some(Duration::from_secs_f64(arguments.limit)),
+        simulate_loop: !arguments.measured,
         ..Options::default()
     };
     for job in &jobs {

@@ -4,6 +4,8 @@ use ct_model::effects::Visited;
 use ct_model::{Model, ModelSpec, Simulation};
 use ct_signals::{Channel, Hold, Record};
 use ctid_examples::model_records::DrivenModel;
+use greybox::LoopController;
+use plants::controller::Controller;
 
 use super::Series;
 
@@ -54,7 +56,8 @@ impl Drive<'_> {
     ) -> Option<Vec<Series>> {
         let model = Model::new(spec.clone());
         let parameters = model.parameters();
-        let (u, y, gain, rows) = controller(self.driven.name);
+        let (u, y, gain, _) = controller(self.driven.name);
+        let loops = self.controllers();
         let mut all = Vec::new();
         for (r, (inputs, own)) in self.inputs.iter().zip(&self.initial).enumerate() {
             let mut initial = model.starts(&parameters);
@@ -65,29 +68,28 @@ impl Drive<'_> {
             let mut simulation = Simulation::new(&model, &parameters, &initial, begin);
             let mut outputs = vec![Vec::new(); spec.outputs.len()];
             let mut read = vec![0.0; outputs.len()];
-            let (mut integral, mut middle) = (0.0, None);
-            // A command answers to the reading of the row before: the terminals of a cell follow its current at once.
-            let mut measured: Option<f64> = None;
+            let middle = 0.5 * (low + high);
+            let mut running = loops.first().map(|of| of.controller.start(&[middle]));
+            let (mut reference, mut first) = (Vec::new(), None);
             let rows_of = inputs[u].len();
             for k in 0..rows_of {
                 let now = |inputs: &[Vec<f64>], k: usize| -> Vec<f64> {
                     inputs.iter().map(|input| input[k]).collect()
                 };
-                if let (true, Some(measured)) = (self.closed, measured) {
-                    // The reference moves as the command of the open loop does, around where the output began.
-                    let reference = *middle.get_or_insert(measured)
-                        + 0.5 * (inputs[u][k] - 0.5 * (low + high)) / gain;
-                    let error = reference - measured;
-                    let command = 0.5 * (low + high) + gain * error + integral;
-                    let within = command.clamp(low, high);
-                    if within == command {
-                        integral += gain * error / rows;
-                    }
-                    inputs[u][k] = within;
+                let asked = inputs[u][k];
+                // A command answers to the reading of the row before: the terminals of a cell follow their current at once.
+                if let Some(running) = &running {
+                    inputs[u][k] = running.clone().command(0.0, 0.0, 1.0);
                 }
                 let from = now(&inputs, k);
                 simulation.read(&from, &mut read);
-                measured = Some(read[y] + noise.get(r).map_or(0.0, |n| n[y][k]));
+                if let Some(running) = &mut running {
+                    let measured = read[y] + noise.get(r).map_or(0.0, |n| n[y][k]);
+                    // The reference moves as the command of the open loop does, around where the output began.
+                    let wanted = *first.get_or_insert(measured) + 0.5 * (asked - middle) / gain;
+                    running.command(wanted, measured, 1.0);
+                    reference.push(wanted);
+                }
                 for (output, value) in outputs.iter_mut().zip(&read) {
                     output.push(*value);
                 }
@@ -104,9 +106,31 @@ impl Drive<'_> {
             if outputs.iter().flatten().any(|v| !v.is_finite()) {
                 return None;
             }
-            all.push((inputs, outputs));
+            all.push(Series {
+                inputs,
+                outputs,
+                reference,
+            });
         }
         Some(all)
+    }
+
+    /// The controller of the records, if there is one: `(1 - q^-1) u = gain (q^-1 - (1 - 1/rows) q^-2) e`.
+    pub(super) fn controllers(&self) -> Vec<LoopController> {
+        let (input, output, gain, rows) = controller(self.driven.name);
+        let (low, high) = range(&self.inputs[0][input]);
+        let r = [0.0, gain, gain * (1.0 / rows - 1.0)];
+        let law = Controller::sampled(&r, &[1.0, -1.0], (low, high));
+        let of = |law: Controller| LoopController {
+            controller: law.at_output(output),
+            input,
+            reference: Some(0),
+        };
+        law.ok()
+            .filter(|_| self.closed)
+            .map(of)
+            .into_iter()
+            .collect()
     }
 
     pub(super) fn records(
@@ -121,7 +145,12 @@ impl Drive<'_> {
         } else {
             Hold::Zero
         };
-        let one = |(r, (inputs, outputs)): (usize, &Series)| {
+        let one = |(r, series): (usize, &Series)| {
+            let Series {
+                inputs,
+                outputs,
+                reference,
+            } = series;
             let rows = inputs[0].len();
             let begin = r as f64 * 1.02 * rows as f64 * self.driven.interval;
             let channel = |about: &ct_model::About, values: Vec<f64>| {
@@ -143,7 +172,13 @@ impl Drive<'_> {
                     .map(|(input, values)| channel(&input.about, values.clone()).with_hold(hold))
                     .collect(),
                 outputs: read.collect(),
-                references: Vec::new(),
+                references: if reference.is_empty() {
+                    Vec::new()
+                } else {
+                    let (_, y, ..) = controller(self.driven.name);
+                    let about = spec.about(spec.outputs[y].variable);
+                    vec![Channel::new("reference", &about.unit, reference.clone())]
+                },
                 calendar: None,
             }
         };
@@ -165,7 +200,7 @@ pub(super) fn visited(
 ) -> Result<Visited, String> {
     let model = Model::new(spec.clone());
     let mut all: Option<Visited> = None;
-    for ((r, (inputs, _)), initial) in simulated.iter().enumerate().zip(&drive.initial) {
+    for ((r, Series { inputs, .. }), initial) in simulated.iter().enumerate().zip(&drive.initial) {
         let rows = inputs[0].len();
         let begin = r as f64 * 1.02 * rows as f64 * drive.driven.interval;
         let time: Vec<f64> = (0..rows)

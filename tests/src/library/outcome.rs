@@ -219,7 +219,7 @@ pub fn outcome(
             .collect(),
         candidates: own,
         left_out: std::collections::BTreeSet::default(),
-        controllers: Vec::new(),
+        controllers: drive.controllers(),
         time_unit: driven.time_unit.0,
         time_unit_name: driven.time_unit.1.to_string(),
     };
@@ -326,7 +326,8 @@ pub fn outcome(
         },
         if verbose {
             format!(
-                "\n    believed {:?}, {} of {} starts agree\n    singles {:?}\n    weights {:?}\n    truth {:?}",
+                "\n    loop {:?}\n    believed {:?}, {} of {} starts agree\n    singles {:?}\n    weights {:?}\n    truth {:?}",
+                found.control_loop,
                 found.steps[0]
                     .parameters
                     .iter()

@@ -34,7 +34,7 @@ pub struct Replay {
     pub beside: Vec<f64>,
     /// Root mean square of the additional input \[input unit\].
     pub rms: f64,
-    /// The same without the largest hundredth of its values, one at least: before a controller begins, and in a hand's moves, the command is
+    /// The same at rows with a reading, without the largest hundredth of its values, one at least: before a controller begins, and in a hand's moves, the command is
     /// not its own.
     pub usual: f64,
     /// Standard deviation of the measured command \[input unit\].
@@ -43,14 +43,23 @@ pub struct Replay {
 
 /// Share of the additional input that may be anything.
 const UNUSUAL: f64 = 0.01;
+/// A command that differs by more than this number of usual differences is not the controller's: its row does not determine the initial
+/// states.
+const FOREIGN: f64 = 10.0;
 
-/// Root mean square of the values without the largest ones.
-fn usual(beside: &[f64]) -> f64 {
-    let mut squares: Vec<f64> = beside.iter().map(|d| d * d).collect();
+/// Root mean square of the values without the largest ones, at rows with a reading.
+fn usual(beside: &[f64], present: &[f64]) -> f64 {
+    let with_reading = beside.iter().zip(present).filter(|(_, y)| !y.is_nan());
+    let mut squares: Vec<f64> = with_reading.map(|(d, _)| d * d).collect();
     squares.sort_by(f64::total_cmp);
     let most = (UNUSUAL * squares.len() as f64).ceil() as usize;
     squares.truncate(squares.len().saturating_sub(most));
-    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    rms(squares.into_iter())
+}
+
+fn rms(squares: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = squares.len().max(1) as f64;
+    (squares.sum::<f64>() / count).sqrt()
 }
 
 /// The controller of these records: as it is given or, if that agrees better with the measured commands, with its integral updated first
@@ -107,10 +116,11 @@ pub(crate) fn replay_of(
             needed: controller.output() + 1,
         });
     };
-    let y = &read.interpolated();
+    let (y, present) = (&read.interpolated(), &read.values);
     let (r, u) = (&reference.values, &record.inputs[input].values);
     let n = controller.states();
-    let run = |states: &[f64]| {
+    // `of_controller`: the largest difference of a command that is the controller's.
+    let run = |states: &[f64], known: &[f64], of_controller: f64| {
         let duals: Vec<Dual<MAX_CONTROLLER_STATES>> = states
             .iter()
             .enumerate()
@@ -120,16 +130,20 @@ pub(crate) fn replay_of(
         let mut triangle = Triangle::new(n + 1);
         let mut row = vec![0.0; n + 1];
         let mut beside = Vec::with_capacity(r.len());
+        let mut squares = 0.0;
         for k in 0..r.len() {
             let given = regulator.command(r[k], Dual::constant(y[k]), step(record, k));
             row[..n].copy_from_slice(&given.eps[..n]);
             row[n] = u[k] - given.re;
-            triangle.push(&row);
             beside.push(row[n]);
+            let is_present = !present[k].is_nan();
+            if is_present && known.get(k).is_none_or(|d| d.abs() <= of_controller) {
+                triangle.push(&row);
+                squares += row[n] * row[n];
+            }
         }
         triangle.finish();
-        let rms = (beside.iter().map(|d| d * d).sum::<f64>() / r.len().max(1) as f64).sqrt();
-        (triangle, beside, rms)
+        (triangle, beside, squares)
     };
     let free: Vec<usize> = (0..n).collect();
     // Command at zero control error, for the state before saturation.
@@ -140,23 +154,31 @@ pub(crate) fn replay_of(
             c * (u[0] - controller.direct() * (r[0] - y[0])) / seen.iter().sum::<f64>().max(1.0)
         })
         .collect();
-    let mut best = run(&states);
-    for _ in 0..ROUNDS {
-        let step = best.0.solve(&free, &[], 0.0);
-        let moved: Vec<f64> = states.iter().zip(&step).map(|(x, d)| x + d).collect();
-        let next = run(&moved);
-        if next.2 >= best.2 || next.2.is_nan() {
-            break;
+    let mut fitted = |known: &[f64], of_controller: f64| {
+        let mut best = run(&states, known, of_controller);
+        for _ in 0..ROUNDS {
+            let step = best.0.solve(&free, &[], 0.0);
+            let moved: Vec<f64> = states.iter().zip(&step).map(|(x, d)| x + d).collect();
+            let next = run(&moved, known, of_controller);
+            if next.2 >= best.2 || next.2.is_nan() {
+                break;
+            }
+            (states, best) = (moved, next);
         }
-        (states, best) = (moved, next);
+        best.1
+    };
+    let mut beside = fitted(&[], f64::INFINITY);
+    let of_controller = FOREIGN * usual(&beside, present);
+    if beside.iter().any(|d| d.abs() > of_controller) {
+        beside = fitted(&beside, of_controller);
     }
     let mean = u.iter().sum::<f64>() / u.len() as f64;
     let moves = (u.iter().map(|u| (u - mean).powi(2)).sum::<f64>() / u.len() as f64).sqrt();
     Ok(Replay {
+        rms: rms(beside.iter().map(|d| d * d)),
+        usual: usual(&beside, present),
         states,
-        rms: best.2,
-        usual: usual(&best.1),
-        beside: best.1,
+        beside,
         moves,
     })
 }

@@ -6,7 +6,6 @@ use ct_signals::Record;
 use nalgebra::DMatrix;
 
 use super::ModelSetup;
-use crate::Error;
 use crate::feedback::{LinearResponse, Response};
 
 /// A model whose linear response grows by this number of factors e over the longest record has none.
@@ -14,8 +13,8 @@ const GROWTH: f64 = 3.0;
 
 impl ModelSetup<'_> {
     /// The linear response of the model to some inputs at the mean of its simulated states and measured inputs. Delays are left out, and so
-    /// is a direct term: the response affects the variance of estimates only. A model that grows has none.
-    pub(super) fn response(&self, x: &[f64], driven: &[usize]) -> Result<LinearResponse, Error> {
+    /// is a direct term: the response affects the variance of estimates only. A model that grows, or has no finite simulation, has none.
+    pub(super) fn response(&self, x: &[f64], driven: &[usize]) -> LinearResponse {
         let spec = self.model.spec();
         let none = || LinearResponse {
             a: Vec::new(),
@@ -24,9 +23,11 @@ impl ModelSetup<'_> {
         };
         let (n, count) = (spec.states.len(), self.parameter_count());
         if n == 0 {
-            return Ok(none());
+            return none();
         }
-        let series = self.simulate_states(x).ok_or(Error::Stopped)?;
+        let Some(series) = self.simulate_states(x) else {
+            return none();
+        };
         let rows: usize = self.records.iter().map(Record::len).sum();
         let mean = |all: &mut dyn Iterator<Item = f64>| all.sum::<f64>() / rows as f64;
         let states: Vec<f64> = (0..n)
@@ -42,7 +43,9 @@ impl ModelSetup<'_> {
         let time = time.get(time.len() / 2).copied().unwrap_or(0.0);
         let model = self.model;
         let form = model.linear_undelayed(&x[..count], &states, &inputs, time);
-        let form = form.ok_or(Error::Stopped)?;
+        let Some(form) = form else {
+            return none();
+        };
         let interval = self.sample_interval() / self.time_unit;
         // Phi and g of held inputs are blocks of one matrix exponential.
         let m = driven.len();
@@ -58,7 +61,7 @@ impl ModelSetup<'_> {
         let blocks = blocks.exp();
         let phi = blocks.view((0, 0), (n, n)).into_owned();
         if !phi.iter().all(|value| value.is_finite()) {
-            return Ok(none());
+            return none();
         }
         let eigenvalues = phi.complex_eigenvalues();
         let largest = eigenvalues
@@ -67,31 +70,29 @@ impl ModelSetup<'_> {
             .fold(0.0, f64::max);
         let longest = self.records.iter().map(Record::len).max().unwrap_or(0);
         if largest.ln() * longest as f64 > GROWTH {
-            return Ok(none());
+            return none();
         }
         let row = |c: &Vec<f64>| {
             let all = c.iter().copied().enumerate();
             all.filter(|(_, coefficient)| *coefficient != 0.0).collect()
         };
         let column = |j: usize| blocks.view((0, j), (n, 1)).iter().copied().collect();
-        Ok(LinearResponse {
+        LinearResponse {
             a: phi
                 .row_iter()
                 .map(|row| row.iter().copied().collect())
                 .collect(),
             b: (n..n + m).map(column).collect(),
             outputs: form.c.iter().map(row).collect(),
-        })
+        }
     }
 
     /// The change of each output that a step of each input has caused after `steps` sampling intervals, by input and output, of the linear
-    /// response at a fitted vector; zero for a model that grows.
-    ///
-    /// # Errors
-    /// [`Error::Stopped`] if the model has no finite simulation or no linear response.
-    pub fn step_gains(&self, x: &[f64], steps: usize) -> Result<Vec<Vec<f64>>, Error> {
+    /// response at a fitted vector; zero for a model that has none.
+    #[must_use]
+    pub fn step_gains(&self, x: &[f64], steps: usize) -> Vec<Vec<f64>> {
         let inputs: Vec<usize> = (0..self.model.spec().inputs.len()).collect();
-        let plant = Arc::new(self.response(x, &inputs)?);
+        let plant = Arc::new(self.response(x, &inputs));
         let gains = |i: usize| {
             let mut response = Response::new(plant.clone(), 1);
             let mut commands = vec![0.0; inputs.len()];
@@ -104,7 +105,7 @@ impl ModelSetup<'_> {
             };
             (0..self.outputs()).map(of_output).collect()
         };
-        Ok(inputs.iter().map(|&i| gains(i)).collect())
+        inputs.iter().map(|&i| gains(i)).collect()
     }
 
     pub(super) fn sample_interval(&self) -> f64 {

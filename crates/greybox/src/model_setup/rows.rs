@@ -146,17 +146,24 @@ impl<'a> ModelSetup<'a> {
                 commands.clear();
                 let of_simulations = simulations.iter_mut().zip(read.chunks_exact_mut(outputs));
                 for (regulators, (simulation, read)) in regulators.iter_mut().zip(of_simulations) {
+                    let controllers = || simulated_loop.iter().flat_map(|of| of.controllers());
+                    if reads_driven {
+                        // The outputs contain the present commands, which do not depend on these outputs.
+                        let mut ahead = regulators.clone();
+                        let driven = ahead.commands(record, k, read);
+                        simulation.drive(driven);
+                        for i in controllers().map(|controller| controller.input) {
+                            inputs[i] = driven[i].map_or(inputs[i], |driven| driven.value());
+                        }
+                        simulation.read(&inputs, read);
+                    }
                     let driven = regulators.commands(record, k, read);
                     simulation.drive(driven);
-                    let controllers = simulated_loop.iter().flat_map(|of| of.controllers());
-                    for i in controllers.map(|controller| controller.input) {
+                    for i in controllers().map(|controller| controller.input) {
                         if let Some(driven) = driven[i] {
                             (inputs[i], to[i]) = (driven.value(), driven.value());
                             commands.push(driven);
                         }
-                    }
-                    if reads_driven {
-                        simulation.read(&inputs, read);
                     }
                 }
                 each(Instant {

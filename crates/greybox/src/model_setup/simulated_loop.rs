@@ -41,8 +41,8 @@ impl SimulatedLoop {
     /// initial states of a fitted vector.
     ///
     /// # Errors
-    /// [`Error::DirectTerm`] if a controller reads an output that its command changes at once; if a record lacks a reference or has a constant
-    /// one, or a command is not held; [`Error::Stopped`] if the model has no finite simulation or no linear response.
+    /// [`Error::LoopSignals`]; [`Error::DirectTerm`] if a controller reads an output that its command changes at once; if a record lacks a
+    /// reference or has a constant one, or a command is not held.
     pub fn new(
         setup: &ModelSetup,
         x: &[f64],
@@ -50,8 +50,18 @@ impl SimulatedLoop {
     ) -> Result<Self, Error> {
         let spec = setup.model.spec();
         for of in controllers {
-            let read = spec.outputs[of.controller.output()].variable;
-            if spec.is_direct(read, Variable::Input(of.input)) {
+            let (input, output) = (of.input, of.controller.output());
+            let Some(read) = spec
+                .outputs
+                .get(output)
+                .filter(|_| input < spec.inputs.len())
+            else {
+                return Err(Error::LoopSignals { input, output });
+            };
+            let read = read.variable;
+            // A command that depends on earlier readings only may change its own reading at once.
+            let answers_at_once = of.controller.linear(setup.sample_interval()).d != 0.0;
+            if answers_at_once && spec.is_direct(read, Variable::Input(of.input)) {
                 return Err(Error::DirectTerm {
                     output: spec.about(read).name.clone(),
                     input: spec.about(Variable::Input(of.input)).name.clone(),
@@ -79,7 +89,7 @@ impl SimulatedLoop {
         let inputs: Vec<usize> = controllers.iter().map(|of| of.input).collect();
         Ok(Self {
             replays,
-            response: Arc::new(setup.response(x, &inputs)?),
+            response: Arc::new(setup.response(x, &inputs)),
             interval: setup.sample_interval(),
             controllers: fitted,
         })
@@ -168,6 +178,7 @@ impl SimulatedLoop {
 }
 
 /// The controllers of one simulated record.
+#[derive(Clone)]
 pub(super) struct Regulators<'a, T> {
     of: &'a SimulatedLoop,
     record: usize,

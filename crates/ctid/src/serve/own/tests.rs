@@ -223,3 +223,26 @@ fn curves_errors_and_parameters_are_those_of_compare() {
         (&false.into(), true)
     );
 }
+
+/// A controller of the model file has its reference from the record, and the page says what came of the loop.
+#[test]
+fn a_fit_says_whether_the_loop_was_simulated() {
+    let mut session = Session::new(None, None, Vec::new());
+    let name = "heated-block".to_string();
+    change(&mut session, Change::Example { name }).unwrap();
+    let file = session.own.clone().unwrap().file;
+    // The heater of this record is driven in steps.
+    let controller = "[controller.u]\ntype = \"PI\"\ngain = 1.0\nintegral_time = 100.0\nreference = \"room [degC]\"\n";
+    write(&mut session, None, Some(&format!("{file}\n{controller}")));
+    let work = Work::new(&mut session).unwrap();
+    let found = work.compute(&AtomicBool::new(false)).unwrap();
+    let body = work.body(1, &found);
+    let said = body["loop"].as_str().unwrap();
+    let expected = "The loop is not simulated: the measured command disagrees with the controller";
+    assert!(said.starts_with(expected), "{said}");
+    // A column that the record lacks.
+    let other = controller.replace("room", "set point");
+    write(&mut session, None, Some(&format!("{file}\n{other}")));
+    let refused = Work::new(&mut session).err().unwrap().to_string();
+    assert!(refused.contains("set point"), "{refused}");
+}

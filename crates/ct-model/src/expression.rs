@@ -232,6 +232,23 @@ impl Expression {
         }
     }
 
+    /// The expression with zero in place of all that a delay lets through.
+    #[must_use]
+    pub(crate) fn without_delayed(&self) -> Self {
+        let part = |a: &Self| Box::new(a.without_delayed());
+        match self {
+            Self::Delay(..) => Self::Number(0.0),
+            Self::Negative(a) => Self::Negative(part(a)),
+            Self::Binary(operator, a, b) => Self::Binary(*operator, part(a), part(b)),
+            Self::Call(function, arguments) => {
+                let arguments = arguments.iter().map(Self::without_delayed);
+                Self::Call(*function, arguments.collect())
+            }
+            Self::If(condition, a, b) => Self::If(condition.clone(), part(a), part(b)),
+            Self::Number(_) | Self::Time | Self::Variable(_) => self.clone(),
+        }
+    }
+
     /// The value for these values of the variables; functions with memory return their first argument.
     #[must_use]
     pub fn value(&self, time: f64, of: &impl Fn(Variable) -> f64) -> f64 {

@@ -8,7 +8,7 @@ use ct_signals::ArModel;
 use estimation::{Fit, Noise, moved_by_weighting};
 use greybox::{Robust, not_determined, weighted_rms};
 
-use crate::control_loop::{ControlLoop, widened};
+use crate::control_loop::{ControlLoop, NotSimulated, widened};
 use crate::node::{Context, FINE, Node};
 use crate::output_step::output_steps;
 use crate::quantisation::quantisation;
@@ -71,6 +71,10 @@ pub(crate) fn assemble(
     let white = Noise::white(outputs.len());
     let measured = Context {
         simulated_loop: None,
+        control_loop: context
+            .control_loop
+            .as_ref()
+            .map(|_| ControlLoop::measured(NotSimulated::AsRequested)),
         ..context.clone()
     };
     let weighted = Context {

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 use crate::Error;
+use crate::output_step::ResidualTests;
 use crate::residual_tests::feedback::{LAGS, feedback_p};
 
 /// Significance level of the feedback test.
@@ -20,7 +21,8 @@ const FEEDBACK: f64 = 1e-4;
 const OTHER_CONTROLLER: f64 = 0.05;
 /// Largest share of rows without a reading of a controlled output.
 const LACKING: f64 = 0.2;
-/// A loop that grows by this number of factors e over the longest record cannot have produced it.
+/// A loop that grows by this number of factors e over the longest record, beside what the model grows without its controllers, cannot have
+/// produced it.
 const GROWTH: f64 = 1.0;
 /// Sampling intervals after which the sign of an input's gain is that of its step response.
 const STEP_RESPONSE: usize = 50;
@@ -89,16 +91,19 @@ pub enum NotSimulated {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         radius: Option<f64>,
     },
-    /// In the simulated loop the fitted model has another error at an output: it lacks an effect, whose influence the loop weights otherwise.
+    /// In the simulated loop the residual depends on signals from outside, and the error at an output is another: the model lacks an effect,
+    /// whose influence the loop weights otherwise.
     ModelError {
         /// The output.
         output: String,
         /// Relative change of its error.
+        #[serde(deserialize_with = "crate::not_finite::number")]
         change: f64,
     },
     /// The measured command disagrees with the controller's output by `mismatch`.
     OtherController {
-        /// `mismatch` over the standard deviation of the command, above 0.05; not finite for a command that hardly changes.
+        /// `mismatch`, here at rows with a reading and without the largest hundredth of the rows, over the standard deviation of the command:
+        /// above 0.05; not finite for a command that hardly changes.
         #[serde(deserialize_with = "crate::not_finite::number")]
         share: f64,
     },
@@ -160,25 +165,15 @@ impl ControlLoop {
     /// The loop is not simulated where the difference is too large.
     pub fn mismatch_of<'a>(replays: impl IntoIterator<Item = &'a Replay>) -> Result<f64, Self> {
         let replays = replays.into_iter();
-        let shares = replays.map(|replay| {
-            (
-                replay.rms,
-                replay.usual / replay.moves.max(f64::MIN_POSITIVE),
-            )
-        });
-        let (mismatch, share) = shares.fold(
-            (0.0, 0.0),
-            |worst, own| {
-                if own.1 >= worst.1 { own } else { worst }
-            },
-        );
-        if share > OTHER_CONTROLLER {
-            return Err(Self {
-                mismatch: Some(mismatch),
+        let share = |replay: &Replay| replay.usual / replay.moves.max(f64::MIN_POSITIVE);
+        let worst = replays.max_by(|a, b| share(a).total_cmp(&share(b)));
+        match worst.map(|replay| (share(replay), replay)) {
+            Some((share, replay)) if share > OTHER_CONTROLLER => Err(Self {
+                mismatch: Some(replay.usual),
                 ..Self::measured(NotSimulated::OtherController { share })
-            });
+            }),
+            worst => Ok(worst.map_or(0.0, |(_, replay)| replay.rms)),
         }
-        Ok(mismatch)
     }
 
     /// Standard errors have to include the bias from feedback.
@@ -188,14 +183,38 @@ impl ControlLoop {
     }
 }
 
+/// Significance level of the dependence of the loop's residual on a signal from outside.
+const DEPENDS: f64 = 1e-4;
+
 impl Enclosed<'_> {
+    /// Whether the residual of the simulated loop depends on a reference or an input that no controller drives: then it is more than noise.
+    /// Fed-back noise alone, which a fit on the measured inputs may follow, does not make it so.
+    #[must_use]
+    pub fn depends_on_external_signals(&self) -> bool {
+        let Some(residuals) = estimation::residuals(&self.setup, &self.fit.x) else {
+            return true;
+        };
+        let records = self.setup.records().iter();
+        let records = records.flat_map(|r| std::iter::repeat_n(r, self.setup.outputs()));
+        let mut tests = records.zip(&residuals).map(|(record, residual)| {
+            ResidualTests::of(&self.setup.external_signals(record), residual).input_p
+        });
+        let level = DEPENDS / residuals.len() as f64;
+        tests.any(|p| p < level)
+    }
+
     /// The largest relative change of an output's error on the measured inputs between a fit on these and the fit in the simulated loop, and
-    /// the output. Of a model without an error the two fits differ by a part of their standard errors.
+    /// the output.
     #[must_use]
     pub fn change_of_error(&self, measured: &Fit) -> Option<(f64, &str)> {
         let outputs = &self.setup.records()[0].outputs;
         let pairs = self.fit.rmse.iter().zip(&measured.rmse);
-        let changes = pairs.map(|(looped, measured)| looped / measured - 1.0);
+        // A model without an error has no ratio.
+        let change = |(looped, measured): (&f64, &f64)| match looped / measured - 1.0 {
+            change if change.is_finite() => change,
+            _ => 0.0,
+        };
+        let changes = pairs.map(change);
         let named = changes.zip(outputs.iter().map(|output| output.name.as_str()));
         named.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
     }
@@ -257,8 +276,8 @@ pub fn enclose<'a>(
         Err(other) => return measured(setup, fit, Some(other)),
     };
     let rows = setup.records().iter().map(Record::len).max().unwrap_or(0);
-    if let Some(radius) = simulated.radius()
-        && radius.ln() * rows as f64 > GROWTH
+    if let Some((radius, alone)) = simulated.radius()
+        && (radius.ln() - alone.ln().max(0.0)) * rows as f64 > GROWTH
     {
         let radius = Some(radius);
         return measured(setup, fit, why(NotSimulated::Unstable { radius }));

@@ -182,15 +182,23 @@ impl ModelSpec {
 
     /// Whether an output contains a variable without a state in between.
     pub(super) fn is_read_directly(&self, variable: Variable) -> bool {
+        let mut seen = vec![false; self.flows.len()];
         let mut outputs = self.outputs.iter();
-        outputs.any(|output| self.is_direct(output.variable, variable))
+        outputs.any(|output| {
+            let reading = Expression::Variable(output.variable);
+            self.holds(&reading, variable, &mut seen)
+        })
     }
 
-    /// Whether a state, flow or input is a variable or contains it without a state in between.
+    /// Whether a state, flow or input is a variable or contains it without a state or a delay in between.
     #[must_use]
     pub fn is_direct(&self, read: Variable, on: Variable) -> bool {
+        let mut present = self.clone();
+        for flow in &mut present.flows {
+            flow.value = flow.value.without_delayed();
+        }
         let mut seen = vec![false; self.flows.len()];
-        self.holds(&Expression::Variable(read), on, &mut seen)
+        present.holds(&Expression::Variable(read), on, &mut seen)
     }
 
     fn holds(&self, expression: &Expression, on: Variable, seen: &mut [bool]) -> bool {

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use ct_model::{ModelSpec, Variable};
-use ct_signals::{Columns, Record, quoted};
+use ct_signals::{Channel, Columns, Heading, Record, quoted};
 use effect_search::ControlLoop;
 use greybox::LoopController;
 use toml::Spanned;
 
-use super::file::{OwnModelFile, Records};
+use super::file::{OwnModelFile, Records, convert};
 use crate::look::Look;
 use crate::model_file::{ControllerLaw, ControllerSettings, RawController, Source};
 use crate::sentences::of_the_loop;
@@ -97,11 +97,6 @@ pub(super) fn read(
 }
 
 impl OwnController {
-    /// Name of the controller's table: `controller.u`.
-    pub fn table(&self) -> &str {
-        &self.table
-    }
-
     /// Control law with times in seconds; `time_unit`: seconds in one unit of the model's time.
     pub fn in_seconds(&self, time_unit: f64) -> ControllerSettings {
         // For a polynomial in d/dt, highest power first.
@@ -135,17 +130,56 @@ impl OwnController {
 }
 
 impl OwnModelFile {
-    /// Columns to read a fitted record by: those of the model and the references of its controllers, in their order.
-    pub fn columns_of_fit(&self) -> Columns {
-        let references = self.controllers.iter();
-        let references = references.filter_map(|controller| controller.reference.clone());
-        Columns {
-            references: references.collect(),
-            ..self.columns.clone()
+    /// Columns of a record that is fitted, with the references of the controllers: those that the record has and that are no signals of the
+    /// model.
+    pub fn columns_of_fit(&self, headings: &[Heading]) -> Columns {
+        let mut columns = self.columns.clone();
+        let has = |column: &String| {
+            let name = Heading::of(column).name;
+            headings.iter().any(|heading| heading.name == name)
+        };
+        for column in self
+            .controllers
+            .iter()
+            .filter_map(|own| own.reference.as_ref())
+        {
+            let signals = columns.inputs.iter().chain(&columns.outputs);
+            let mut known = signals.chain(&columns.references);
+            if has(column) && !known.any(|own| own == column) {
+                columns.references.push(column.clone());
+            }
         }
+        columns
     }
 
-    /// Controllers with the times of the records, in seconds. The references are those of [`Self::columns_of_fit`].
+    /// The references of a record in the order of the controllers that have one, in the units of the outputs; none if the record lacks one.
+    /// The channels of the record have the names of their columns.
+    ///
+    /// # Errors
+    /// Where a column is in a unit of another dimension.
+    pub(super) fn references_of(&self, record: &Record) -> Result<Vec<Channel>, Error> {
+        let spec = self.model.spec();
+        let mut references = Vec::new();
+        for own in &self.controllers {
+            let Some(column) = &own.reference else {
+                continue;
+            };
+            let name = Heading::of(column).name;
+            let channels = record.references.iter().chain(&record.inputs);
+            let mut channels = channels.chain(&record.outputs);
+            let Some(channel) = channels.find(|channel| channel.name == name) else {
+                return Ok(Vec::new());
+            };
+            let mut channel = channel.clone();
+            let about = spec.about(spec.outputs[own.output].variable);
+            convert(&record.name, &mut channel, about)?;
+            channel.name = name;
+            references.push(channel);
+        }
+        Ok(references)
+    }
+
+    /// Controllers with the times of the records, in seconds. The references are those of [`Self::references_of`].
     ///
     /// # Errors
     /// Where a controller cannot be sampled at the interval of the records, with its line.

@@ -186,17 +186,21 @@ impl OwnModelFile {
             hold: self.hold,
             ..files.options.clone()
         };
-        let read = |(path, columns): (&PathBuf, &Columns)| -> Result<Reading, Error> {
+        let read = |path: &PathBuf, columns: &Columns| -> Result<Reading, Error> {
             let mut reading = read_csv(path, columns, &options).map_err(|e| self.named(e))?;
             reading.record.name = files.name_of(path);
             reading.summary.file.clone_from(&reading.record.name);
             Ok(reading)
         };
-        let of_fit = self.columns_of_fit();
-        let fitted = files.data.iter().map(|path| (path, &of_fit));
+        let fitted = files.data.iter().map(|path| {
+            if self.controllers.is_empty() {
+                return read(path, &self.columns);
+            }
+            read(path, &self.columns_of_fit(&headings(path)?))
+        });
         // Held-out records are simulated on their measured inputs.
-        let held_out = files.test.iter().map(|path| (path, &self.columns));
-        let all = fitted.chain(held_out).map(read);
+        let held_out = files.test.iter().map(|path| read(path, &self.columns));
+        let all = fitted.chain(held_out);
         let all = all.collect::<Result<Vec<Reading>, Error>>()?;
         self.gathered(all, files.data.len(), self.time_unit(&files.data[0])?)
     }
@@ -250,20 +254,15 @@ impl OwnModelFile {
         let outputs = spec.outputs.iter().map(|o| spec.about(o.variable));
         let columns = self.columns.inputs.iter().chain(&self.columns.outputs);
         let mut signals = columns.zip(inputs.chain(outputs));
-        let is_wanted = |column: &str| *wanted == format!("\"{}\"", quoted(column));
-        let own = signals.find(|(column, _)| is_wanted(column));
-        let mut controllers = self.controllers.iter();
-        let mend = match own {
-            Some((_, about)) => Some((about.name.as_str(), "[columns]".to_string())),
-            None => controllers
-                .find(|own| own.reference.as_deref().is_some_and(is_wanted))
-                .map(|own| ("reference", format!("[{}]", own.table()))),
-        };
-        match mend {
+        let own = signals.find(|(column, _)| *wanted == format!("\"{}\"", quoted(column)));
+        match own {
             None => error.into(),
-            Some((key, table)) => {
-                let mend = format!("set {key} = \"...\" under {table}");
-                Error::Columns(format!("{file}, row {row}{}", fault.said(&table, &mend)))
+            Some((_, about)) => {
+                let mend = format!("set {} = \"...\" under [columns]", about.name);
+                Error::Columns(format!(
+                    "{file}, row {row}{}",
+                    fault.said("[columns]", &mend)
+                ))
             }
         }
     }
@@ -274,22 +273,11 @@ impl OwnModelFile {
     /// # Errors
     /// Where a column is in a unit of another dimension.
     pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
+        record.references = self.references_of(record)?;
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
         for (channel, about) in channels.zip(self.signals()) {
             convert(&record.name, channel, about)?;
             channel.name.clone_from(&about.name);
-        }
-        let spec = self.model.spec();
-        let with_reference = self
-            .controllers
-            .iter()
-            .filter(|own| own.reference.is_some());
-        for (channel, own) in record.references.iter_mut().zip(with_reference) {
-            convert(
-                &record.name,
-                channel,
-                spec.about(spec.outputs[own.output].variable),
-            )?;
         }
         Ok(())
     }
@@ -313,9 +301,7 @@ impl OwnModelFile {
         if self.columns.time.is_some() {
             return Ok(self.columns.time_header().1);
         }
-        let content = read_file(first, ct_signals::LARGEST_RECORD)?;
-        let headings = csv_header(&first.display().to_string(), &content)?;
-        Ok(self.time_unit_of(&headings))
+        Ok(self.time_unit_of(&headings(first)?))
     }
 
     /// Unit of the time, if the header of the first record is known.
@@ -328,6 +314,12 @@ impl OwnModelFile {
         };
         columns.time_header().1
     }
+}
+
+/// The columns of a record.
+fn headings(path: &Path) -> Result<Vec<Heading>, Error> {
+    let content = read_file(path, ct_signals::LARGEST_RECORD)?;
+    Ok(csv_header(&path.display().to_string(), &content)?)
 }
 
 /// Puts a channel of a record into the unit of the model's signal.

@@ -22,8 +22,8 @@ use crate::simulate::{ReadInputs, Simulated};
 /// Share of the time for adding the effects of the file one after the other.
 const OF_EFFECTS: f64 = 0.5;
 
-/// If the error of an output changes by a larger share in the simulated loop, the fit on the measured inputs is the result: its error is the
-/// smallest that the model can have.
+/// If the residual in the simulated loop is not independent of the signals from outside, the model lacks an effect. If then the error of an
+/// output changes by a larger share than this, the fit on the measured inputs is the result: its error is the smallest that the model can have.
 const SAME_ERROR: f64 = 0.005;
 
 /// A model, the records that it is fitted to, and the fit.
@@ -142,8 +142,8 @@ impl FittedModel {
                 file.base.name
             )));
         }
-        let (fit, simulated_loop, control_loop) =
-            in_loop(file, &records, (setup, fit), (options, true))?;
+        let (_, simulated_loop, control_loop) =
+            in_loop(file, &records, (setup, fit.clone()), (options, true))?;
         Ok(Self {
             given: file.clone(),
             model,
@@ -351,11 +351,20 @@ fn in_loop(
     let controllers = file.loop_controllers(records)?;
     let mut expressions = setup.model().spec().expressions();
     let timed = expressions.any(|of| of.any(&|part| *part == Expression::Time));
+    // The loop is fitted with the output weights of the given fit.
+    let scales = (setup.outputs() > 1)
+        .then(|| setup.output_noise(&fit.x))
+        .flatten();
+    let setup = match scales {
+        Some(scales) => setup.with_scales(scales),
+        None => setup,
+    };
     let of_loop = (&controllers[..], simulate);
     let enclosed = enclose(setup, fit.clone(), of_loop, !timed, options.stopping);
     let enclosed = enclosed.map_err(|error| blame_search(&records.records, error))?;
     if let Some((change, output)) = enclosed.change_of_error(&fit)
         && change.abs() > SAME_ERROR
+        && enclosed.depends_on_external_signals()
     {
         let output = output.to_string();
         let why = NotSimulated::ModelError { output, change };

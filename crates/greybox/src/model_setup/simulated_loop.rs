@@ -10,9 +10,7 @@ use plants::controller::{Controller, Regulator};
 
 use super::ModelSetup;
 use crate::Error;
-use crate::feedback::{
-    LinearResponse, Replay, Response, fitting, replay_of, require_moving_reference, step,
-};
+use crate::feedback::{LinearResponse, Replay, Response, fitting, replay_of, step};
 
 /// A controller that drives an input of a model; it reads the output [`Controller::output`].
 #[derive(Debug, Clone, PartialEq)]
@@ -41,8 +39,8 @@ impl SimulatedLoop {
     /// initial states of a fitted vector.
     ///
     /// # Errors
-    /// [`Error::LoopSignals`]; [`Error::DirectTerm`] if a controller reads an output that its command changes at once; if a record lacks a
-    /// reference or has a constant one, or a command is not held.
+    /// [`Error::LoopSignals`]; [`Error::DirectTerm`] if a controller reads an output that a command changes at once; if a record lacks a
+    /// reference, nothing from outside moves the loop, or a command is not held.
     pub fn new(
         setup: &ModelSetup,
         x: &[f64],
@@ -61,16 +59,16 @@ impl SimulatedLoop {
             let read = read.variable;
             // A command that depends on earlier readings only may change its own reading at once.
             let answers_at_once = of.controller.linear(setup.sample_interval()).d != 0.0;
-            if answers_at_once && spec.is_direct(read, Variable::Input(of.input)) {
+            let driven = controllers.iter().map(|of| Variable::Input(of.input));
+            let mut direct = driven.filter(|input| spec.is_direct(read, *input));
+            if let Some(changed) = direct.next().filter(|_| answers_at_once) {
                 return Err(Error::DirectTerm {
                     output: spec.about(read).name.clone(),
-                    input: spec.about(Variable::Input(of.input)).name.clone(),
+                    input: spec.about(changed).name.clone(),
                 });
             }
-            for record in setup.records {
-                require_moving_reference(record, of.reference)?;
-            }
         }
+        require_excitation(setup.records, controllers)?;
         let mut fitted = Vec::new();
         let mut replays = vec![Vec::new(); setup.records.len()];
         for of in controllers {
@@ -107,10 +105,10 @@ impl SimulatedLoop {
         &self.replays
     }
 
-    /// The largest magnitude of the eigenvalues of the linear loop over one sampling interval, without limits and dead times: above one it
-    /// grows. `None` where the model has no linear response.
+    /// The largest magnitude of the eigenvalues of the linear loop over one sampling interval, without limits and dead times, and of the model
+    /// alone: above one it grows. `None` where the model has no linear response.
     #[must_use]
-    pub fn radius(&self) -> Option<f64> {
+    pub fn radius(&self) -> Option<(f64, f64)> {
         let LinearResponse { a, b, outputs } = &*self.response;
         if a.is_empty() {
             return None;
@@ -154,13 +152,15 @@ impl SimulatedLoop {
             }
             at += m;
         }
-        let eigenvalues = matrix.complex_eigenvalues();
-        Some(
+        let alone = DMatrix::from_fn(n, n, |i, j| a[i][j]);
+        let largest = |of: &DMatrix<f64>| {
+            let eigenvalues = of.complex_eigenvalues();
             eigenvalues
                 .iter()
                 .map(|value| value.norm())
-                .fold(0.0, f64::max),
-        )
+                .fold(0.0, f64::max)
+        };
+        Some((largest(&matrix), largest(&alone)))
     }
 
     /// Whether an output contains a driven input without a state in between.
@@ -174,6 +174,30 @@ impl SimulatedLoop {
 
     pub(super) fn response(&self, columns: usize) -> Response {
         Response::new(self.response.clone(), columns)
+    }
+}
+
+/// Checks that something from outside moves the loop: a reference, or an input that no controller drives.
+fn require_excitation(records: &[Record], controllers: &[LoopController]) -> Result<(), Error> {
+    let moves = |channel: &Channel| {
+        let (low, high) = channel.range();
+        high > low
+    };
+    let is_external = |input: &usize| controllers.iter().all(|of| of.input != *input);
+    let moved = records.iter().any(|record| {
+        let mut inputs = (0..record.inputs.len()).filter(is_external);
+        inputs.any(|i| moves(&record.inputs[i])) || record.references.iter().any(moves)
+    });
+    let constant = records.iter().find_map(|record| {
+        let reference = controllers.iter().find_map(|of| of.reference)?;
+        Some((record, record.references.get(reference)?))
+    });
+    match constant.filter(|_| !moved) {
+        Some((record, reference)) => Err(Error::ConstantReference {
+            record: record.name.clone(),
+            value: reference.range().0,
+        }),
+        None => Ok(()),
     }
 }
 

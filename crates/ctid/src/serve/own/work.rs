@@ -71,15 +71,14 @@ impl Work {
         let options = ReadOptions::from(model.hold);
         let (mut fitted, mut held_out): (Vec<Reading>, Vec<Reading>) = Default::default();
         let mut time_unit = None;
-        let of_fit = model.columns_of_fit();
         for upload in &mut session.records {
             // Held-out records are simulated on their measured inputs.
             let columns = if upload.held_out {
-                &model.columns
+                model.columns.clone()
             } else {
-                &of_fit
+                model.columns_of_fit(&upload.headings)
             };
-            let reading = upload.reading(columns, &options);
+            let reading = upload.reading(&columns, &options);
             let reading = reading.map_err(Refusal::input)?;
             if upload.held_out {
                 held_out.push(reading);

@@ -341,13 +341,16 @@ impl FittedModel {
     }
 }
 
-/// A fit in the loop of its records, if that can be simulated, and what is known of the loop.
+/// A fit in the loop of its records, if that can be simulated; the loop, and what is known of it.
+type InLoop = (Fit, Option<Arc<SimulatedLoop>>, Option<ControlLoop>);
+
+/// Closes the loop around a fitted model, if that can be simulated.
 fn in_loop(
     file: &OwnModelFile,
     records: &Records,
     (setup, fit): (ModelSetup, Fit),
     (options, simulate): (&FitOptions, bool),
-) -> Result<(Fit, Option<Arc<SimulatedLoop>>, Option<ControlLoop>), Error> {
+) -> Result<InLoop, Error> {
     let controllers = file.loop_controllers(records)?;
     let mut expressions = setup.model().spec().expressions();
     let timed = expressions.any(|of| of.any(&|part| *part == Expression::Time));

@@ -190,12 +190,47 @@ fn a_loop_that_is_not_simulated_says_why() {
             ["readings are missing in rig", "cannot be checked"],
         ),
         (
-            NotSimulated::UnknownController { lags: 3 },
+            NotSimulated::UnknownController {
+                lags: 3,
+                input: None,
+            },
             None,
             [
                 "the command depends on the last 3 residuals",
                 "no [controller]",
             ],
+        ),
+        (
+            NotSimulated::UnknownController {
+                lags: 7,
+                input: Some("u2".to_string()),
+            },
+            None,
+            [
+                "Feedback detected: u2 depends on the last 7 residuals",
+                "no [controller.u2]",
+            ],
+        ),
+        (
+            NotSimulated::DirectTerm {
+                output: "v".to_string(),
+                input: "i".to_string(),
+            },
+            None,
+            ["v depends on i without a state in between", "reads it"],
+        ),
+        (
+            NotSimulated::Unstable { radius: Some(1.25) },
+            None,
+            ["an eigenvalue of magnitude 1.250", "check its sign"],
+        ),
+        (
+            NotSimulated::ModelError {
+                output: "y2".to_string(),
+                change: -0.031,
+            },
+            None,
+            ["the error at y2 would change by -3.1 %", "lacks an effect"],
         ),
         (
             NotSimulated::CommandNotHeld {

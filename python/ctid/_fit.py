@@ -243,6 +243,8 @@ class Fit:
         lines.append(f"{agree} of {tried} starts ended in this minimum")
         for names in self._not_determined:
             lines.append(f"warning: these records do not determine {' and '.join(names)} one without the other")
+        if self._native.control_loop is not None:
+            lines.append(f"warning: {self._native.control_loop}")
         rows = [["", "fit %", "rmse", "whiteness p", "input p"]]
         tests = {name: p for name, p, _, _ in self._native.outputs}
         for name, rmse, percent in self._scores:

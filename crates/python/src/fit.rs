@@ -245,6 +245,13 @@ impl Fit {
         self.step().not_determined.clone()
     }
 
+    /// Whether feedback was detected in the records, in a sentence; `None` if it was not.
+    #[getter]
+    fn control_loop(&self) -> Option<String> {
+        let known = self.comparison.control_loop.as_ref()?;
+        Some(self.model.file.loop_sentence(known))
+    }
+
     /// The result as `ctid compare --json` writes it, without its mark.
     fn json(&self) -> PyResult<String> {
         crate::diagnosis::json(&self.comparison)

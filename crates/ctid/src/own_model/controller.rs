@@ -179,7 +179,7 @@ impl OwnModelFile {
         Ok(references)
     }
 
-    /// Controllers with the times of the records, in seconds. The references are those of [`Self::references_of`].
+    /// Controllers with the times of the records, in seconds. The references are in the order of the controllers that have one.
     ///
     /// # Errors
     /// Where a controller cannot be sampled at the interval of the records, with its line.

@@ -336,6 +336,8 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
     if let Some(times) = design.times_as_long.filter(|_| !design.twins()) {
         all.push(format!("Repeated {times} times it would decide."));
     }
+    let known = design.control_loop.iter();
+    all.extend(known.map(|known| file.loop_sentence(known)));
     if !file.controllers.is_empty() && !design.twins() {
         all.push("The experiment is in open loop: switch the controller to manual.".to_string());
     }

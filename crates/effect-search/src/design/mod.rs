@@ -130,6 +130,7 @@ pub fn design(
     Ok(Design {
         schema: 1,
         model: problem.spec.name.clone(),
+        control_loop: context.control_loop.clone(),
         bic_ahead: ahead[0],
         prospect: match prospect(&best.power) {
             // A power without confirmation by a refit is only a prediction.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::{Kind, Power, Prospect};
+use crate::ControlLoop;
 
 /// One of the two effects to be distinguished.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -127,6 +128,9 @@ pub struct Design {
     pub experiment: Sequences,
     /// Standard deviation of each output's innovations, the noise that its past does not predict \[its unit\].
     pub noise: BTreeMap<String, f64>,
+    /// The control loop of the records; `None` if no controller is known and no feedback was detected.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub control_loop: Option<ControlLoop>,
     /// Steps that were left out because of the time limit.
     pub left_out: Vec<String>,
     /// Computing time \[s\].

@@ -305,8 +305,8 @@ pub fn widened(std_errors: Vec<Option<f64>>, moved: &[f64]) -> Vec<Option<f64>> 
         .collect()
 }
 
-/// The first record that lacks many readings of a controlled output, or a value of a reference. At rows without a reading the controller has
-/// used one that the record does not contain; it is interpolated, and the difference of the commands there is simulated as a known input.
+/// The first record that lacks many readings of a controlled output, or a value of a reference. The controller has used
+/// readings that the record does not contain: they follow from its commands.
 fn lacking(records: &[Record], controllers: &[LoopController]) -> Option<String> {
     let lacks = |record: &&Record| {
         controllers.iter().any(|of| {

@@ -108,7 +108,6 @@ pub(crate) fn replay_of(
         });
     }
     record.validate()?;
-    // The controller used readings that the record lacks; they are interpolated linearly.
     let Some(read) = record.outputs.get(controller.output()) else {
         return Err(Error::Outputs {
             record: record.name.clone(),
@@ -132,7 +131,14 @@ pub(crate) fn replay_of(
         let mut beside = Vec::with_capacity(r.len());
         let mut squares = 0.0;
         for k in 0..r.len() {
-            let given = regulator.command(r[k], Dual::constant(y[k]), step(record, k));
+            let h = step(record, k);
+            // The controller used a reading that the record lacks: its command tells which, while it is within its limits.
+            let reading = match present[k].is_nan() {
+                true => regulator.reading_for(r[k], u[k], h),
+                false => None,
+            };
+            let reading = reading.unwrap_or(Dual::constant(y[k]));
+            let given = regulator.command(r[k], reading, h);
             row[..n].copy_from_slice(&given.eps[..n]);
             row[n] = u[k] - given.re;
             beside.push(row[n]);

@@ -83,6 +83,41 @@ impl<T: Scalar> Regulator<T> {
         }
     }
 
+    /// The reading for which the next command is this one; `None` if the command is at a limit or does not depend on the present reading.
+    #[must_use]
+    pub fn reading_for(&self, reference: f64, command: f64, h: f64) -> Option<T> {
+        let (low, high) = self.controller.limits;
+        let (direct, at_zero) = match &self.controller.kind {
+            Kind::Pi {
+                gain,
+                integral_time,
+                integral_first,
+            } => {
+                let first = if *integral_first {
+                    h / integral_time
+                } else {
+                    0.0
+                };
+                (gain * (1.0 + first), self.states[0])
+            }
+            Kind::Sampled {
+                r, operating_point, ..
+            } => {
+                let order = r.len() - 1;
+                let seen = |i: usize, there: bool| there.then(|| self.states[i]);
+                let states = [seen(0, order > 0), seen(order, *operating_point)];
+                let states = states.into_iter().flatten();
+                (
+                    r[0],
+                    states.fold(T::constant(0.0), |sum, state| sum + state),
+                )
+            }
+        };
+        let error = (-at_zero + command) * (1.0 / direct);
+        let is_free = direct != 0.0 && command > low && command < high;
+        is_free.then(|| -error + reference)
+    }
+
     /// Whether the last command was at a limit.
     #[must_use]
     pub fn limited(&self) -> bool {

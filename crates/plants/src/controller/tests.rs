@@ -108,3 +108,29 @@ fn an_integral_that_is_updated_first_is_another_controller() {
         }
     }
 }
+
+#[test]
+fn the_reading_behind_a_command_is_found() {
+    let limits = (-2.0, 8.0);
+    let pi = Controller::pi(0.7, 30.0, limits).unwrap();
+    let in_p = Controller::continuous(&[21.0, 0.7], &[30.0, 0.0], 4.0, limits).unwrap();
+    let without_integral = Controller::sampled(&[0.9, -0.5], &[1.0, -0.4], limits).unwrap();
+    let first = pi.with_integral_first().unwrap();
+    for controller in [pi, first, in_p, without_integral] {
+        let mut running = controller.start(&[1.0, 0.5]);
+        let mut found = 0;
+        for k in 0..60 {
+            let (reference, reading) = (1.0, (f64::from(k) * 0.4).sin() * 3.0);
+            let before = running.clone();
+            let command = running.command(reference, reading, 4.0);
+            if let Some(again) = before.reading_for(reference, command, 4.0) {
+                assert!((again - reading).abs() < 1e-9, "{controller:?}, {k}");
+                found += 1;
+            }
+        }
+        assert!(found > 20, "{controller:?}: {found}");
+    }
+    // A command that depends on earlier readings only says nothing of the present one.
+    let late = Controller::sampled(&[0.0, 2.0], &[1.0, -1.0], limits).unwrap();
+    assert!(late.start(&[1.0]).reading_for(1.0, 0.5, 4.0).is_none());
+}

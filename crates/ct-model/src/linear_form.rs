@@ -115,8 +115,10 @@ impl Model {
         inputs: &[f64],
         time: f64,
     ) -> Option<LinearForm> {
-        let is_delayed = !self.tape().delays.is_empty();
-        (!is_delayed).then(|| self.linear_undelayed(parameters, states, inputs, time))?
+        if !self.tape().delays.is_empty() {
+            return None;
+        }
+        self.linear_undelayed(parameters, states, inputs, time)
     }
 
     /// As [`Model::linear_about`], of the model without its dead times.

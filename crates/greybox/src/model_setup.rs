@@ -44,6 +44,8 @@ pub struct ModelSetup<'a> {
     interrupt: Option<&'a AtomicBool>,
     /// The controllers, if the loop is simulated.
     simulated_loop: Option<Arc<SimulatedLoop>>,
+    /// Outputs contain an input that a controller drives without a state in between.
+    reads_driven: bool,
 }
 
 /// ... and an initial state within this factor.

@@ -18,6 +18,7 @@ mod controller;
 mod design;
 mod diagnose;
 pub(crate) mod effects;
+mod enclosed;
 mod export;
 mod file;
 mod fitted;

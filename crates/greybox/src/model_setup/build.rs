@@ -155,6 +155,7 @@ impl<'a> ModelSetup<'a> {
             time_limit: None,
             interrupt: None,
             simulated_loop: None,
+            reads_driven: false,
         })
     }
 }

@@ -95,7 +95,6 @@ impl<'a> ModelSetup<'a> {
         let mut inputs = vec![0.0; self.model.spec().inputs.len()];
         let mut to = inputs.clone();
         let simulated_loop = self.simulated_loop.as_deref();
-        let reads_driven = simulated_loop.is_some_and(|of| of.is_read(self.model.spec()));
         for (r, record) in self.records.iter().enumerate() {
             let own = count + r * states..count + (r + 1) * states;
             let lanes: Vec<usize> = by
@@ -147,7 +146,7 @@ impl<'a> ModelSetup<'a> {
                 let of_simulations = simulations.iter_mut().zip(read.chunks_exact_mut(outputs));
                 for (regulators, (simulation, read)) in regulators.iter_mut().zip(of_simulations) {
                     let controllers = || simulated_loop.iter().flat_map(|of| of.controllers());
-                    if reads_driven {
+                    if self.reads_driven {
                         // The outputs contain the present commands, which do not depend on these outputs.
                         let mut ahead = regulators.clone();
                         let driven = ahead.commands(record, k, read);

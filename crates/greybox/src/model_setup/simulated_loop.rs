@@ -251,6 +251,7 @@ impl<'a> ModelSetup<'a> {
     #[must_use]
     pub fn in_loop(self, simulated: Arc<SimulatedLoop>) -> Self {
         Self {
+            reads_driven: simulated.is_read(self.model.spec()),
             simulated_loop: Some(simulated),
             ..self
         }

@@ -1,0 +1,51 @@
+//! A fit in the control loop of its records.
+
+use std::sync::Arc;
+
+use ct_model::Expression;
+use effect_search::{ControlLoop, NotSimulated, enclose};
+use greybox::{Fit, FitOptions, ModelSetup, SimulatedLoop};
+
+use super::file::{OwnModelFile, Records};
+use super::fitted::blame_search;
+use crate::Error;
+
+/// If the residual in the simulated loop is not independent of the signals from outside, the model lacks an effect. If then the error of an
+/// output changes by a larger share than this, the fit on the measured inputs is the result: its error is the smallest that the model can have.
+const SAME_ERROR: f64 = 0.005;
+
+/// A fit in the loop of its records, if that can be simulated; the loop, and what is known of it.
+pub(super) type InLoop = (Fit, Option<Arc<SimulatedLoop>>, Option<ControlLoop>);
+
+/// Closes the loop around a fitted model, if that can be simulated.
+pub(super) fn in_loop(
+    file: &OwnModelFile,
+    records: &Records,
+    (setup, fit): (ModelSetup, Fit),
+    (options, simulate): (&FitOptions, bool),
+) -> Result<InLoop, Error> {
+    let controllers = file.loop_controllers(records)?;
+    let mut expressions = setup.model().spec().expressions();
+    let timed = expressions.any(|of| of.any(&|part| *part == Expression::Time));
+    // The loop is fitted with the output weights of the given fit.
+    let scales = (setup.outputs() > 1)
+        .then(|| setup.output_noise(&fit.x))
+        .flatten();
+    let setup = match scales {
+        Some(scales) => setup.with_scales(scales),
+        None => setup,
+    };
+    let of_loop = (&controllers[..], simulate);
+    let enclosed = enclose(setup, fit.clone(), of_loop, !timed, options.stopping);
+    let enclosed = enclosed.map_err(|error| blame_search(&records.records, error))?;
+    if let Some((change, output)) = enclosed.change_of_error(&fit)
+        && change.abs() > SAME_ERROR
+        && enclosed.depends_on_external_signals()
+    {
+        let output = output.to_string();
+        let why = NotSimulated::ModelError { output, change };
+        return Ok((fit, None, Some(ControlLoop::measured(why))));
+    }
+    let simulated_loop = enclosed.setup.simulated_loop().cloned();
+    Ok((enclosed.fit, simulated_loop, enclosed.control_loop))
+}

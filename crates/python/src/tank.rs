@@ -230,6 +230,13 @@ impl TankFit {
         self.found.steps.last().map_or(f64::NAN, |step| step.bic)
     }
 
+    /// As of a fit of a model of the user's own.
+    #[getter]
+    fn control_loop(&self) -> Option<String> {
+        let known = self.found.control_loop.as_ref()?;
+        Some(ctid::sentences::of_the_loop(known, &self.found.input_unit))
+    }
+
     #[getter]
     fn sentences(&self) -> Vec<String> {
         ctid::sentences::of_diagnosis(&self.found)

@@ -6,7 +6,7 @@ use effect_search::{ControlLoop, NotSimulated};
 const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and values of the criterion are biased; the standard errors are enlarged to allow for this.";
 
 /// Description of the loop; `input_unit`: unit of the command.
-pub(crate) fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
+pub fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
     let mismatch = known.mismatch.unwrap_or(f64::NAN);
     if known.simulated {
         return format!(

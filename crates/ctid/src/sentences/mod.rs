@@ -25,7 +25,7 @@ use missing_effect::numbers::value_and_error;
 use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
 
 pub use self::alarm::{Told, of_alarm, of_scatter};
-pub(crate) use self::control_loop::of_the_loop;
+pub use self::control_loop::of_the_loop;
 pub use self::design::of_design;
 pub use self::failures::{FailureWords, of_failures};
 pub use self::gaps::of_gaps;

@@ -45,8 +45,7 @@ fn record() -> Option<Record> {
         time: (0..SAMPLES).map(|k| k as f64 * H).collect(),
         inputs: vec![Channel::new("u", "V", u)],
         outputs: vec![Channel::new("y", "cm", y)],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     })
 }
 

@@ -75,8 +75,7 @@ fn record(driven: &DrivenModel, seed: u64) -> Record {
         outputs: of_outputs
             .map(|(output, values)| channel(spec.about(output.variable), values))
             .collect(),
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     }
 }
 

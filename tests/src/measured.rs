@@ -381,8 +381,7 @@ fn groundwater(path: &Path) -> Result<Record, String> {
         time,
         inputs: vec![Channel::new("P - E", "m", input)],
         outputs: vec![Channel::new("h", "m", output)],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     };
     record.validate().map_err(|why| why.to_string())?;
     Ok(record)

@@ -222,7 +222,7 @@ impl Onset {
                 .then(|| Channel::new("r", "cm", wanted))
                 .into_iter()
                 .collect(),
-            calendar: None,
+            ..Record::default()
         })
     }
 

@@ -375,7 +375,7 @@ impl Rig {
                 .then(|| Channel::new("r", "cm", wanted))
                 .into_iter()
                 .collect(),
-            calendar: None,
+            ..Record::default()
         }
     }
 }

@@ -61,7 +61,6 @@ pub fn record(hidden: Option<(&str, usize, &[f64])>, samples: usize, seed: u64) 
         time: (0..samples).map(|k| k as f64 * INTERVAL).collect(),
         inputs: vec![Channel::new("u1", "V", u), Channel::new("u2", "V", v)],
         outputs: vec![Channel::new("h3", "cm", y)],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     }
 }

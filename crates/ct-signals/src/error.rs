@@ -1,7 +1,7 @@
 //! What can be wrong with a record or a setting: each message names the place, the numbers that
 //! disagree and the mend, in one line.
 
-use crate::{ColumnFault, shown};
+use crate::{ColumnFault, duration, shown};
 
 pub use read::ReadError;
 
@@ -39,6 +39,19 @@ pub enum Error {
         rows: f64,
         /// The most that it may have.
         most: f64,
+    },
+    /// No part of a record between its gaps has enough readings.
+    #[error(
+        "{record}: no stretch of {readings} readings lies between gaps through which the input can be held (at most {}); leave the record out, or fill its gaps",
+        duration(*limit)
+    )]
+    NoStretch {
+        /// The record.
+        record: String,
+        /// Readings that a part needs.
+        readings: usize,
+        /// The longest hold \[s\].
+        limit: f64,
     },
     /// A column without any sample.
     #[error(

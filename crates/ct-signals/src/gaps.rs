@@ -31,7 +31,7 @@ const OF_A_RATE: f64 = 0.5;
 /// Largest number of inserted rows.
 const MOST_PUT_IN: usize = 100_000;
 /// A part with fewer samples of an output contains less information than its initial states need.
-const SHORTEST: usize = 8;
+pub(crate) const SHORTEST: usize = 8;
 
 /// How missing rows and missing samples of inputs were handled.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -175,8 +175,8 @@ impl Record {
     }
 
     /// The record without gaps, as the head of this file says: inputs are held for at most `longest` \[s\] (from 0 on, infinite: for as
-    /// long as it takes), and the parts between longer gaps are records of their own, under one name and on one clock. A missing row that
-    /// is held through becomes a row without outputs. A reference is held for as long as it takes, as a set point is.
+    /// long as it takes), and the parts between longer gaps are records of their own, numbered, under one name and on one clock. A missing row
+    /// that is held through becomes a row without outputs. A reference is held for as long as it takes, as a set point is.
     ///
     /// A record without gaps comes back as it is. No part comes back where no row has all inputs.
     #[must_use]
@@ -197,6 +197,11 @@ impl Record {
                 parts.push(part);
             } else {
                 gaps.unused += part.len();
+            }
+        }
+        if parts.len() > 1 {
+            for (number, part) in parts.iter_mut().enumerate() {
+                part.part = number + 1;
             }
         }
         (parts, gaps)
@@ -237,6 +242,7 @@ impl Record {
             inputs: all(&self.inputs),
             outputs: all(&self.outputs),
             references: all(&self.references),
+            part: self.part,
             calendar: self.calendar.clone(),
         }
     }

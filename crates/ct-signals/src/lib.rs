@@ -65,6 +65,7 @@ pub mod excitation;
 mod gaps;
 mod limits;
 pub mod noise;
+pub mod parts;
 mod quote;
 mod record;
 mod resample;

@@ -141,9 +141,17 @@ pub struct Record {
     pub outputs: Vec<Channel>,
     /// The set points, if there is a loop.
     pub references: Vec<Channel>,
+    /// Number of this part of a record that was cut, from 1 ([`Record::without_gaps`]); 0 of a whole record.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub part: usize,
     /// Date and time at zero of the record's clock, if known.
     #[serde(skip)]
     pub calendar: Option<Calendar>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn is_zero(part: &usize) -> bool {
+    *part == 0
 }
 
 impl Record {
@@ -192,6 +200,7 @@ impl Record {
             inputs: part(&self.inputs),
             outputs: part(&self.outputs),
             references: part(&self.references),
+            part: self.part,
             calendar: self.calendar.clone(),
         }
     }

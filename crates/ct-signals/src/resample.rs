@@ -43,6 +43,7 @@ impl Record {
             inputs: self.inputs.iter().map(acting).collect(),
             outputs: self.outputs.iter().map(read).collect(),
             references: self.references.iter().map(acting).collect(),
+            part: self.part,
             calendar: self.calendar.clone(),
             time,
         })

@@ -107,7 +107,6 @@ impl From<linear_identification::Error> for Error {
             E::Estimator(error) => Self::Estimator(error),
             E::Linear(error) => Self::Linear(error),
             E::Loop(error) => Self::Loop(error),
-            E::NoStretch(error) => Self::Diagnosis(error),
             E::StabilityBorder { record }
             | E::ControllerMismatch { record, .. }
             | E::MissingReadings { record, .. }

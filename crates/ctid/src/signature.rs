@@ -70,8 +70,7 @@ fn experiment(effect: &'static EffectInfo) -> Option<(Vec<f64>, Vec<f64>)> {
             outputs: vec![Channel::new("y", "cm", readings.collect())],
             time: (0..commands.len()).map(|k| k as f64 * INTERVAL).collect(),
             inputs: vec![Channel::new("u", "V", commands.clone())],
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         })
     };
     let with_scales = |records: &[Record]| -> Option<Structure> {

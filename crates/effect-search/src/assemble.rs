@@ -158,6 +158,7 @@ pub(crate) fn assemble(
         record_numbers,
         candidates: context.candidates.len(),
         absorbed: context.absorbed.clone(),
+        gaps: problem.gaps,
         control_loop: context.control_loop.clone(),
         left_out,
         seconds: seconds + context.limit.seconds(),

@@ -1,7 +1,7 @@
 //! Results of one model at one output: its error, where it fails, and the tests of its residual.
 
 use ct_model::{Expression, Variable};
-use ct_signals::{ArModel, Channel, residual_tests};
+use ct_signals::{ArModel, Channel, parts, residual_tests};
 use estimation::Fit;
 use greybox::ModelSetup;
 use serde::{Deserialize, Serialize};
@@ -114,6 +114,7 @@ pub fn output_steps(
         .zip(simulated)
         .map(|(y, model)| y.values.iter().zip(model).map(|(y, m)| y - m).collect())
         .collect();
+    let of_parts = parts::records_of_parts(records);
     let of_output = |o: usize| {
         let series: Vec<Series> = records
             .iter()
@@ -123,6 +124,7 @@ pub fn output_steps(
                 let own = hidden.iter();
                 let own = own.map(|x| states[r * spec.states.len() + x].as_slice());
                 Series {
+                    record: of_parts[r],
                     time: &record.time,
                     signals: inputs.chain(own).collect(),
                     model: &simulated[r * count + o],

@@ -11,6 +11,7 @@ use ct_signals::Record;
 use greybox::{LoopController, ModelSetup, PriorValue, TimeLimit};
 use serde::{Deserialize, Serialize};
 
+use crate::gaps::MendedGaps;
 use crate::thresholds::Thresholds;
 
 /// A model and the records that it is compared with.
@@ -26,6 +27,8 @@ pub struct Problem {
     pub records: Vec<Record>,
     /// Held-out records: they are not used for fits or selection.
     pub test: Vec<Record>,
+    /// Handling of the gaps of the records; `None` if there were none.
+    pub gaps: Option<MendedGaps>,
     /// Parameters that are not fitted, by name \[unit of the text\].
     pub known: BTreeMap<String, f64>,
     /// Prior knowledge of parameters.

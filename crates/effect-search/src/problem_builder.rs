@@ -1,13 +1,14 @@
 //! A problem made step by step, and checked.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::mem::take;
 
 use ct_model::effects::OwnCandidate;
 use ct_model::{Model, ModelSpec};
 use ct_signals::Record;
 use greybox::{LoopController, ModelSetup, PriorValue};
 
-use crate::{Error, Kept, Problem};
+use crate::{Error, Kept, Problem, mend};
 
 /// Builds a [`Problem`]: required parts were given to [`Problem::builder`], the other parts have one method each.
 #[derive(Debug, Clone)]
@@ -53,6 +54,7 @@ impl Problem {
                 kept: BTreeMap::new(),
                 records: records.into(),
                 test: Vec::new(),
+                gaps: None,
                 known: BTreeMap::new(),
                 priors: BTreeMap::new(),
                 candidates: BTreeMap::new(),
@@ -120,19 +122,23 @@ impl ProblemBuilder {
         self
     }
 
-    /// The problem.
+    /// The problem. Short gaps of the records are filled, and the records are cut at long ones ([`mend`]).
     ///
     /// # Errors
-    /// [`Error::TimeUnit`]; [`Error::Fit`] where there is no record, a record is not sound or has not the channels of the model, or where
+    /// [`Error::TimeUnit`]; [`Error::Signals`] where nothing is left of a record with gaps; [`Error::Fit`] where there is no record, a record is not sound or has not the channels of the model, or where
     /// the model has no parameter of a name, or a prior is no number with an error. Of a model with effects the names are looked at when
     /// these are in it, by [`diagnose`](crate::diagnose).
     pub fn build(self) -> Result<Problem, Error> {
-        let problem = self.problem;
+        let mut problem = self.problem;
         let seconds = problem.time_unit;
         if !(seconds > 0.0 && seconds.is_finite()) {
             return Err(Error::TimeUnit { seconds });
         }
         let model = Model::new(problem.spec.clone());
+        let records = (take(&mut problem.records), take(&mut problem.test));
+        let whole = mend(records, (&model, &problem.known, seconds))?;
+        (problem.records, problem.test) = (whole.records, whole.test);
+        problem.gaps = whole.gaps;
         let (none, no_priors) = (BTreeMap::new(), BTreeMap::new());
         let (known, priors) = if problem.effects.is_empty() && problem.candidates.is_empty() {
             (&problem.known, &problem.priors)

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::control_loop::ControlLoop;
+use crate::gaps::MendedGaps;
 use crate::output_step::OutputStep;
 use crate::quantisation::Quantisation;
 use crate::residual_tests::NotNoise;
@@ -154,6 +155,9 @@ pub struct Diagnosis {
     /// Candidates of the model file that no search can find, because the model's own parameters absorb them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub absorbed: Vec<Absorbed>,
+    /// Handling of the gaps of the records; `None` if there were none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gaps: Option<MendedGaps>,
     /// The control loop of the records; `None` if no controller is known and no feedback was detected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub control_loop: Option<ControlLoop>,

@@ -73,7 +73,7 @@ fn in_loop(
         inputs: vec![Channel::new("u", "V", u)],
         outputs: vec![Channel::new("y", "cm", y)],
         references: vec![Channel::new("r", "cm", r)],
-        calendar: None,
+        ..Record::default()
     })
 }
 

@@ -107,8 +107,7 @@ mod tests {
             time: vec![from, to],
             inputs: vec![signal()],
             outputs: vec![signal()],
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         }
     }
 

@@ -178,8 +178,7 @@ mod tests {
                 Channel::new("y", "g/L", first),
                 Channel::new("z", "g/L", second),
             ],
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         };
         let zeros = vec![vec![0.0; ROWS]; 2];
         let found = output_noise(&[record], &zeros);

@@ -229,8 +229,7 @@ mod tests {
             time: (0..y.len()).map(|k| k as f64).collect(),
             inputs: vec![Channel::new("u", "V", vec![1.0; y.len()])],
             outputs: vec![Channel::new("y", "cm", y)],
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         }
     }
 

@@ -185,9 +185,6 @@ pub enum Error {
         /// Why.
         why: String,
     },
-    /// No part of a record between its gaps is long enough.
-    #[error(transparent)]
-    NoStretch(missing_effect::Error),
     /// A record.
     #[error(transparent)]
     Signals(#[from] ct_signals::Error),

@@ -54,7 +54,7 @@ struct TimeConstants {
 /// The fitted records, and others of the same plant, without gaps, for models of at most this order.
 ///
 /// # Errors
-/// [`Error::Signals`] and [`Error::NoSignal`] for a record that is none, [`Error::NoStretch`] where nothing is left of a record,
+/// [`Error::Signals`] for a record that is not sound, or of which nothing is left; [`Error::NoSignal`] without a signal;
 /// [`Error::FirstFit`] where its first fit fails.
 pub fn mend(
     fitted: Vec<Record>,
@@ -96,14 +96,10 @@ pub fn mend(
 
 /// A record with inputs held for at most `limit`; after longer gaps the readings within `memory` \[s\] are left out of the whole record.
 fn cut(record: &Record, limit: f64, memory: f64) -> Result<Mended, Error> {
-    let (parts, gaps) = record.without_gaps(limit);
-    let (whole, _) = record.without_gaps(f64::INFINITY);
-    let Some(mut whole) = whole.into_iter().next().filter(|_| !parts.is_empty()) else {
-        return Err(Error::NoStretch(missing_effect::Error::NoStretch {
-            record: record.name.clone(),
-            limit,
-        }));
-    };
+    let one = std::slice::from_ref(record);
+    let (parts, gaps) = ct_signals::parts::without_gaps(one, limit)?;
+    let (mut whole, _) = ct_signals::parts::without_gaps(one, f64::INFINITY)?;
+    let mut whole = whole.swap_remove(0);
     let begin = whole.time.first().copied().unwrap_or(0.0);
     let known = |t: f64| {
         parts

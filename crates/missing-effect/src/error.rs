@@ -4,17 +4,6 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// No part of a record between its gaps has enough readings.
-    #[error(
-        "{record}: no stretch of 8 readings lies between gaps through which the input can be held (at most {} s); leave the record out, or fill its gaps",
-        crate::numbers::significant(*limit, 2)
-    )]
-    NoStretch {
-        /// The record.
-        record: String,
-        /// The longest hold \[s\].
-        limit: f64,
-    },
     /// The data or the noise model.
     #[error(transparent)]
     Signals(#[from] ct_signals::Error),

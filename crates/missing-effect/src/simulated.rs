@@ -110,8 +110,7 @@ fn through(
         time,
         inputs: vec![Channel::new("u", "V", u)],
         outputs: vec![Channel::new("y", "cm", y)],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     }
 }
 

@@ -48,8 +48,7 @@ pub(crate) fn record<'a>(
         outputs: outputs
             .map(|readings| Channel::new("", "", readings))
             .collect(),
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     };
     let mut first = None;
     for row in rows {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use ct_signals::parts;
 use ctid::own_model::{Records, design, diagnosed_page};
 use effect_search::Failures;
 use effect_search::Options;
@@ -191,13 +192,18 @@ impl Diagnosis {
         )>,
     )> {
         let Records { records, test, .. } = &self.records;
-        let all = records.iter().map(|r| (r, false));
-        let all = all.chain(test.iter().map(|r| (r, true))).enumerate();
-        let all = all.map(|(i, (record, held_out))| {
-            let count = record.outputs.len();
+        let all_parts = [records.as_slice(), test].concat();
+        let count = self.model.file.columns.outputs.len();
+        let steps = self.found.steps.iter();
+        let simulated = steps.map(|step| parts::joined_series(&all_parts, count, &step.simulated));
+        let simulated: Vec<Vec<Vec<f64>>> = simulated.collect();
+        let (fitted, held_out) = (parts::joined(records), parts::joined(test));
+        let all = fitted.iter().map(|record| (record, false));
+        let all = all.chain(held_out.iter().map(|record| (record, true)));
+        let all = all.enumerate().map(|(i, (record, held_out))| {
             let outputs = record.outputs.iter().enumerate().map(|(o, output)| {
-                let steps = self.found.steps.iter();
-                let series = steps.filter_map(|step| step.simulated.get(i * count + o));
+                let series = simulated.iter();
+                let series = series.filter_map(|series| series.get(i * count + o));
                 let series = series.map(|values| PyArray1::from_slice(py, values));
                 let measured = PyArray1::from_slice(py, &output.values);
                 (output.name.clone(), measured, series.collect())

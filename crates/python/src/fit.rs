@@ -134,23 +134,22 @@ impl Fit {
         Ok(Some((names.collect(), matrix)))
     }
 
-    /// For each record, and each part of a record with gaps: its name, its times \[s\] and its outputs.
+    /// For each record: its name, its times \[s\] and its outputs.
     #[getter]
     fn series<'py>(
         &self,
         py: Python<'py>,
     ) -> Vec<(String, Bound<'py, PyArray1<f64>>, Vec<Series<'py>>)> {
-        let records = &self.fitted.records().records;
         let count = self.step().rmse_per_output.len().max(1);
         let curves = self.comparison.curves.chunks(count);
-        let all = records.iter().zip(curves).map(|(record, curves)| {
+        let all = curves.map(|curves| {
             let outputs = curves.iter().map(|curve| {
                 let measured = PyArray1::from_slice(py, &curve.measured);
                 let model = PyArray1::from_slice(py, &curve.model);
                 (curve.output.clone(), measured, model)
             });
-            let time = PyArray1::from_slice(py, &record.time);
-            (record.name.clone(), time, outputs.collect())
+            let time = PyArray1::from_slice(py, &curves[0].time);
+            (curves[0].record.clone(), time, outputs.collect())
         });
         all.collect()
     }

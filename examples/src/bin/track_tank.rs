@@ -84,8 +84,7 @@ fn simulated() -> Result<Record, Box<dyn Error>> {
         time: (0..samples).map(|k| k as f64 * interval).collect(),
         inputs: vec![Channel::new("u", "V", inputs)],
         outputs: vec![Channel::new("y", "cm", levels)],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     };
     record.validate()?;
     Ok(record)

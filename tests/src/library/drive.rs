@@ -179,7 +179,7 @@ impl Drive<'_> {
                     let about = spec.about(spec.outputs[y].variable);
                     vec![Channel::new("reference", &about.unit, reference.clone())]
                 },
-                calendar: None,
+                ..Record::default()
             }
         };
         simulated.iter().enumerate().map(one).collect()

@@ -201,6 +201,7 @@ pub fn outcome(
         kept: std::collections::BTreeMap::default(),
         effects: Vec::new(),
         records,
+        gaps: None,
         test: Vec::new(),
         known: known
             .iter()

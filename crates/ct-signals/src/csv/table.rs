@@ -202,6 +202,7 @@ impl Table {
             inputs: inputs.map(|u| u.with_hold(options.hold)).collect(),
             outputs: channels(&layout.outputs),
             references: channels(&layout.references),
+            part: 0,
             calendar: self.calendar,
         };
         for (at, header) in &layout.absent {

@@ -205,8 +205,7 @@ fn record() -> Record {
         time: vec![0.0, 1.0, 2.0, 3.5],
         inputs: vec![Channel::new("u", "V", vec![1.0, 2.0, 0.5, 1.0])],
         outputs: vec![Channel::new("y", "cm", vec![10.0, 12.0, 9.0, 9.5])],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     }
 }
 

@@ -277,8 +277,7 @@ mod tests {
             time: (0..n).map(|k| k as f64).collect(),
             inputs: vec![Channel::new("u", "V", command.to_vec())],
             outputs: vec![Channel::new("y", "cm", output)],
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         }
     }
 

@@ -10,8 +10,7 @@ fn record(name: &str, rows: usize, unit: &str) -> Record {
         time: (0..rows).map(|k| k as f64).collect(),
         inputs: vec![Channel::new("u", "V", values(1.0))],
         outputs: vec![Channel::new("y", unit, values(2.0))],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     }
 }
 

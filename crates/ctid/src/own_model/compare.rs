@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use ct_signals::{ArModel, Clock};
+use ct_signals::{ArModel, Clock, parts};
 use effect_search::{
-    ControlLoop, Estimate, NoiseFloor, Options, Step, held_out, output_steps, widened,
+    ControlLoop, Estimate, MendedGaps, NoiseFloor, Options, Step, held_out, output_steps, widened,
 };
 use greybox::{FitOptions, TimeLimit, not_determined, weighted_rms};
 use missing_effect::Effort;
@@ -29,8 +29,8 @@ pub struct Curves {
     pub output: String,
     /// Unit of the values.
     pub unit: String,
-    /// Length of the record \[s\].
-    pub length: f64,
+    /// Sampling instants \[s\].
+    pub time: Vec<f64>,
     /// Measured values, NaN if missing \[unit of the output\].
     pub measured: Vec<f64>,
     /// Output of the model \[unit of the output\].
@@ -52,6 +52,9 @@ pub struct Comparison {
     pub steps: [Step; 1],
     /// Innovation variance of each output's residual: the part that its past does not predict.
     pub noise: Vec<NoiseFloor>,
+    /// Handling of the gaps of the records; `None` if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gaps: Option<MendedGaps>,
     /// The control loop of the records; `None` if no controller is known and no feedback was detected.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub control_loop: Option<ControlLoop>,
@@ -198,17 +201,19 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
             .chain(test.into_iter().flat_map(|test| test.simulated))
             .collect(),
     };
-    let measured = records.records.iter().flat_map(|record| {
+    let whole = parts::joined(&records.records);
+    let of_whole = parts::joined_series(&records.records, outputs.len(), &simulated);
+    let measured = whole.iter().flat_map(|record| {
         let channels = record.outputs.iter().zip(&outputs);
         channels.map(move |(channel, about)| (record, channel, about))
     });
     let curves = measured
-        .zip(simulated)
+        .zip(of_whole)
         .map(|((record, channel, about), model)| Curves {
             record: record.name.clone(),
             output: about.name.clone(),
             unit: about.unit.clone(),
-            length: record.duration(),
+            time: record.time.clone(),
             measured: channel.values.clone(),
             model,
         });
@@ -221,6 +226,7 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
         curves: curves.collect(),
         steps: [step],
         noise: noise_floors,
+        gaps: records.gaps,
         control_loop: fitted.control_loop().cloned(),
         effort,
         seconds: 0.0,

@@ -11,6 +11,7 @@ use super::words::{EffectWords, shown_unit};
 use crate::Error;
 use crate::look::{Look, Side, table};
 use crate::numbers;
+use crate::sentences::of_gaps;
 use crate::sentences::remarks::{absorbed, rounding};
 use crate::terminal::without_50;
 
@@ -165,6 +166,7 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
         ));
     }
     all.extend(diagnosis.absorbed.iter().map(absorbed));
+    all.extend(diagnosis.gaps.as_ref().and_then(of_gaps));
     let known = diagnosis.control_loop.iter();
     all.extend(known.map(|known| file.loop_sentence(known)));
     let mut known = diagnosis.control_loop.iter();

@@ -11,7 +11,7 @@ use ct_signals::{
     Channel, ColumnFault, Columns, Conversion, Heading, Hold, Reading, Record, Unit, csv_header,
     quoted, read_csv, read_file,
 };
-use effect_search::{Diagnosis, Kept};
+use effect_search::{Diagnosis, Kept, MendedGaps, Whole, mend};
 use greybox::PriorValue;
 use serde::{Deserialize, Serialize};
 
@@ -77,10 +77,12 @@ pub struct OwnSettings {
 /// Records in the order and units of the model.
 #[derive(Debug, Clone)]
 pub struct Records {
-    /// Fitted.
+    /// Fitted records, or their parts if they were cut at gaps.
     pub records: Vec<Record>,
-    /// Held out.
+    /// Held-out records, or their parts.
     pub test: Vec<Record>,
+    /// Handling of the gaps; `None` if there are none.
+    pub gaps: Option<MendedGaps>,
     /// Seconds in one unit of the model's time.
     pub time_unit: f64,
     /// Summary of each record that was read, fitted ones first.
@@ -225,16 +227,15 @@ impl OwnModelFile {
         crate::input::on_one_clock(&mut all);
         crate::input::check_clocks(&all[..fitted], &summaries)?;
         let test = all.split_off(fitted);
-        // A missing input is held for one row; a longer gap splits the record.
-        let whole = |records: Vec<Record>| -> Vec<Record> {
-            let parts = records
-                .iter()
-                .map(|record| record.without_gaps(1.5 * record.sample_interval()).0);
-            parts.flatten().collect()
-        };
+        let Whole {
+            records,
+            test,
+            gaps,
+        } = mend((all, test), (&self.model, &self.known, time_unit))?;
         Ok(Records {
-            records: whole(all),
-            test: whole(test),
+            records,
+            test,
+            gaps,
             time_unit,
             summaries,
         })

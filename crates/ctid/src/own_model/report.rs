@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::{Clock, Record};
+use ct_signals::{Clock, Record, parts};
 use effect_search::{Estimate, NoiseFloor, Step, Unknown};
 use missing_effect::{
     Diagnosis, Effort, NoiseSource, Parameter, PerOutput, Rankings, Score, Shown, ShownInput,
@@ -16,6 +16,7 @@ use super::file::{OwnModelFile, Records};
 use super::words::{EffectWords, Site, shown_unit};
 use crate::output::Found;
 use crate::report::{self, ComparedPort, MissingTerm};
+use crate::sentences::of_gaps;
 
 /// A result that is written as JSON, and its page.
 #[derive(Debug, Serialize)]
@@ -112,11 +113,12 @@ pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> D
     shown.seconds = found.seconds;
     Document {
         diagnosis: shown,
-        sentences: found
-            .control_loop
-            .iter()
-            .map(|known| file.loop_sentence(known))
-            .collect(),
+        sentences: {
+            let gaps = found.gaps.as_ref().and_then(of_gaps).into_iter();
+            let known = found.control_loop.iter();
+            gaps.chain(known.map(|known| file.loop_sentence(known)))
+                .collect()
+        },
         term: None,
     }
 }
@@ -211,7 +213,9 @@ fn document(
     noise: Vec<missing_effect::NoiseFloor>,
 ) -> Diagnosis {
     let spec = &file.base;
-    let fitted = &records.records;
+    let fitted = &parts::joined(&records.records);
+    let held_out = parts::joined(&records.test);
+    let all_parts = [records.records.as_slice(), &records.test].concat();
     let units: Vec<String> = spec
         .outputs
         .iter()
@@ -235,7 +239,7 @@ fn document(
         }
     };
     let all = fitted.iter().map(|record| shown(record, false));
-    let all = all.chain(records.test.iter().map(|record| shown(record, true)));
+    let all = all.chain(held_out.iter().map(|record| shown(record, true)));
     let floors: Vec<f64> = noise.iter().map(|noise| noise.level).collect();
     let steps: Vec<missing_effect::Step> = steps
         .iter()
@@ -245,6 +249,7 @@ fn document(
                 let errors = test.0.iter().cloned().collect();
                 step.weighted_rmse_test = Some(weighted(&outputs, &errors, &floors));
             }
+            step.simulated = parts::joined_series(&all_parts, outputs.len(), &step.simulated);
             step
         })
         .collect();

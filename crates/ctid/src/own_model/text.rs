@@ -10,7 +10,7 @@ use super::fitted::cut_short;
 use crate::look::{Look, Side, table};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
-use crate::sentences::FailureWords;
+use crate::sentences::{FailureWords, of_gaps};
 use crate::terminal::{FAILURES, residual_tests, without_50};
 
 /// The complete comparison, with a plot of the first record.
@@ -85,6 +85,9 @@ pub(crate) fn said(file: &OwnModelFile, comparison: &Comparison, look: Look) -> 
     if let Some(cut) = cut_short(&comparison.effort) {
         text += &look.warning(format!("warning: {cut}"));
         text.push('\n');
+    }
+    if let Some(gaps) = comparison.gaps.as_ref().and_then(of_gaps) {
+        text += &look.paragraph("  ", &gaps);
     }
     if let Some(known) = &comparison.control_loop {
         text += &look.paragraph("  ", &file.loop_sentence(known));
@@ -181,10 +184,14 @@ fn drawn(curves: &Curves, look: Look) -> String {
         record,
         output,
         unit,
-        length,
+        time,
         measured,
         model,
     } = curves;
+    let length = match time[..] {
+        [first, .., last] => last - first,
+        _ => 0.0,
+    };
     let in_unit = if unit.is_empty() {
         String::new()
     } else {
@@ -210,8 +217,8 @@ fn drawn(curves: &Curves, look: Look) -> String {
     let title = look.heading(&format!("{record}, {output}:"));
     format!(
         "{title} measured and model{in_unit}\n{}\nMeasured minus model{in_unit}\n{}\n",
-        plot(&both, (0.0, *length), limits, 9, look),
-        plot(&one, (0.0, *length), own, 5, look)
+        plot(&both, (0.0, length), limits, 9, look),
+        plot(&one, (0.0, length), own, 5, look)
     )
 }
 

@@ -3,6 +3,20 @@
 use ct_signals::{Gaps, duration};
 use missing_effect::{LONGEST_HOLD, MendedGaps};
 
+/// The longest hold, by the fastest time constant where that sets it.
+fn longest_hold_of(mended: &MendedGaps) -> String {
+    let share = LONGEST_HOLD * mended.time_constant;
+    if (mended.limit - share).abs() <= 1e-9 * share {
+        format!(
+            "{:.0} % of the fastest time constant ({})",
+            100.0 * LONGEST_HOLD,
+            duration(mended.time_constant)
+        )
+    } else {
+        duration(mended.limit)
+    }
+}
+
 /// How gaps in the records were handled; `None` without gaps.
 #[must_use]
 pub fn of_gaps(mended: &MendedGaps) -> Option<String> {
@@ -45,9 +59,8 @@ pub fn of_gaps(mended: &MendedGaps) -> Option<String> {
     }
     if cut > 0 {
         text += &format!(
-            "; the simulation restarts after {cut}, where the input would have to be held longer than {:.0} % of the fastest time constant ({})",
-            100.0 * LONGEST_HOLD,
-            duration(mended.time_constant)
+            "; the simulation restarts after {cut}, where the input would have to be held longer than {}",
+            longest_hold_of(mended)
         );
     }
     if unused > 0 {

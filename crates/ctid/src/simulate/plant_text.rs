@@ -127,6 +127,7 @@ impl AtPorts {
         let records = Records {
             records,
             test: Vec::new(),
+            gaps: None,
             time_unit: 1.0,
             summaries: Vec::new(),
         };

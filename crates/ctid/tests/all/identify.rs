@@ -70,8 +70,7 @@ impl Plant {
                 Channel::new("u", "V", u.iter().map(|u| u + self.rest.0).collect())
                     .with_hold(self.hold),
             ],
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         }
     }
 
@@ -322,8 +321,7 @@ fn wandering(linear: bool, seed: u64) -> Record {
         time: (0..rows).map(|k| k as f64 * STEP).collect(),
         inputs: vec![Channel::new("u", "V", input)],
         outputs: vec![Channel::new("y", "cm", output)],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     }
 }
 

@@ -62,7 +62,7 @@ fn with_bits(
             .then(|| Channel::new("r", "cm", raised(r, 20.0)))
             .into_iter()
             .collect(),
-        calendar: None,
+        ..Record::default()
     }
 }
 
@@ -261,7 +261,7 @@ fn drifting(from: f64, to: f64, rows: usize) -> Record {
             "cm",
             r.iter().map(|r| 20.0 + r).collect(),
         )],
-        calendar: None,
+        ..Record::default()
     }
 }
 

@@ -18,6 +18,7 @@ mod outputs;
 mod own_candidates;
 mod own_design;
 mod own_effects;
+mod own_gaps;
 mod own_limits;
 mod own_loop;
 mod own_term;

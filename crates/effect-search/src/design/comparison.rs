@@ -159,8 +159,7 @@ impl<'s, 'a> Comparison<'s, 'a> {
                 .iter()
                 .map(|of| of.with_values(zeros.clone()))
                 .collect(),
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         };
         let series = {
             let records = std::slice::from_ref(&record);

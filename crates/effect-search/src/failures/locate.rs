@@ -27,6 +27,8 @@ pub struct Signal<'a> {
 /// One record with the signals of a model; all series are as long as `time`.
 #[derive(Debug, Clone)]
 pub struct Series<'a> {
+    /// Position of the record that it is of, or of which it is a part.
+    pub record: usize,
     /// Sampling instants, rising \[s\].
     pub time: &'a [f64],
     /// Values of the inputs and states, in the order of the signals \[their units\].
@@ -184,12 +186,12 @@ pub fn locate(series: &[Series], signals: &[Signal], noise: &ArModel) -> Failure
         .map(|one| Expected::of(noise, one.residual.len()))
         .collect();
     let mut by_time = Vec::new();
-    for (k, (one, expected)) in series.iter().zip(&expected).enumerate() {
+    for (one, expected) in series.iter().zip(&expected) {
         by_time.extend(
             by(one.time, one.residual, expected)
                 .into_iter()
                 .map(|bin| Bin {
-                    record: Some(k),
+                    record: Some(one.record),
                     ..bin
                 }),
         );

@@ -48,8 +48,7 @@ fn answer(design: &Design, of: &Record, seed: u64) -> Record {
             .map(|(of, own)| of.with_values(own.values.clone()))
             .collect(),
         outputs: vec![of.outputs[0].with_values(y)],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     }
 }
 

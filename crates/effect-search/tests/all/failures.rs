@@ -21,7 +21,9 @@ fn rig(n: u32) -> (Vec<f64>, Vec<f64>) {
 fn located(noise: &ArModel, records: &[(&[f64], &[f64], &[f64])]) -> Failures {
     let series: Vec<Series> = records
         .iter()
-        .map(|(time, model, residual)| Series {
+        .enumerate()
+        .map(|(record, (time, model, residual))| Series {
+            record,
             time,
             signals: vec![model, time],
             model,

@@ -351,8 +351,7 @@ fn one_reading_that_is_off_is_no_effect() {
                 time,
                 inputs: Vec::new(),
                 outputs: vec![Channel::new("y", "m", values)],
-                references: Vec::new(),
-                calendar: None,
+                ..Record::default()
             };
             let diagnosis = found(&problem(FALL, record));
             assert!(

@@ -5,6 +5,7 @@ mod absorbed;
 mod at_a_bound;
 mod design;
 mod failures;
+mod gaps;
 mod heat;
 mod hidden;
 mod level_shift;

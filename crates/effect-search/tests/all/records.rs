@@ -102,8 +102,7 @@ pub(crate) fn record(text: &str, correlation: f64, sigma: f64, seed: u64) -> Rec
             .zip(outputs)
             .map(channel)
             .collect(),
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     }
 }
 

@@ -160,7 +160,7 @@ fn a_file_becomes_a_record() {
         inputs: vec![Channel::new("u", "V", vec![1.0; n])],
         outputs: vec![Channel::new("y", "cm", vec![2.0; n])],
         references: vec![Channel::new("r", "cm", vec![3.0; n])],
-        calendar: None,
+        ..Record::default()
     };
     let even = record((0..n).map(|k| 0.5 * k as f64).collect());
     let found = LoopRecord::from_record(&even, Offsets::Means).unwrap();

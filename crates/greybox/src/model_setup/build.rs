@@ -103,17 +103,13 @@ impl<'a> ModelSetup<'a> {
             });
         }
         let starts = model.starts(&start);
-        for (r, record) in records.iter().enumerate() {
+        for (record, of) in records.iter().zip(ct_signals::parts::suffixes(records)) {
             for (i, state) in spec.states.iter().enumerate() {
                 let about = &state.about;
                 if !state.fixed {
                     free.push(names.len());
                 }
-                names.push(if records.len() > 1 {
-                    format!("{}(0), record {}", about.name, r + 1)
-                } else {
-                    format!("{}(0)", about.name)
-                });
+                names.push(format!("{}(0){of}", about.name));
                 // If an output measures the state, the initial value comes from the record.
                 let read = spec
                     .outputs

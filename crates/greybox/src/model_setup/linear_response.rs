@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use ct_model::LinearForm;
 use ct_signals::Record;
 use nalgebra::DMatrix;
 
@@ -21,29 +22,11 @@ impl ModelSetup<'_> {
             b: Vec::new(),
             outputs: vec![Vec::new(); spec.outputs.len()],
         };
-        let (n, count) = (spec.states.len(), self.parameter_count());
+        let n = spec.states.len();
         if n == 0 {
             return none();
         }
-        let Some(series) = self.simulate_states(x) else {
-            return none();
-        };
-        let rows: usize = self.records.iter().map(Record::len).sum();
-        let mean = |all: &mut dyn Iterator<Item = f64>| all.sum::<f64>() / rows as f64;
-        let states: Vec<f64> = (0..n)
-            .map(|i| mean(&mut series.iter().skip(i).step_by(n).flatten().copied()))
-            .collect();
-        let inputs: Vec<f64> = (0..spec.inputs.len())
-            .map(|i| {
-                let records = self.records.iter();
-                mean(&mut records.flat_map(|record| record.inputs[i].values.iter().copied()))
-            })
-            .collect();
-        let time = self.model_time(0);
-        let time = time.get(time.len() / 2).copied().unwrap_or(0.0);
-        let model = self.model;
-        let form = model.linear_undelayed(&x[..count], &states, &inputs, time);
-        let Some(form) = form else {
+        let Some(form) = self.linearised(x) else {
             return none();
         };
         let interval = self.sample_interval() / self.time_unit;
@@ -85,6 +68,47 @@ impl ModelSetup<'_> {
             b: (n..n + m).map(column).collect(),
             outputs: form.c.iter().map(row).collect(),
         }
+    }
+
+    /// The linear form of the model without its dead times at the mean of its simulated states and measured inputs, in the middle of the first
+    /// record; `None` without a finite simulation.
+    fn linearised(&self, x: &[f64]) -> Option<LinearForm> {
+        let spec = self.model.spec();
+        let (n, count) = (spec.states.len(), self.parameter_count());
+        let series = self.simulate_states(x)?;
+        let rows: usize = self.records.iter().map(Record::len).sum();
+        let mean = |all: &mut dyn Iterator<Item = f64>| all.sum::<f64>() / rows as f64;
+        let states: Vec<f64> = (0..n)
+            .map(|i| mean(&mut series.iter().skip(i).step_by(n).flatten().copied()))
+            .collect();
+        let inputs: Vec<f64> = (0..spec.inputs.len())
+            .map(|i| {
+                let records = self.records.iter();
+                mean(&mut records.flat_map(|record| record.inputs[i].values.iter().copied()))
+            })
+            .collect();
+        let time = self.model_time(0);
+        let time = time.get(time.len() / 2).copied().unwrap_or(0.0);
+        self.model
+            .linear_undelayed(&x[..count], &states, &inputs, time)
+    }
+
+    /// The fastest time constant of the model at a fitted vector, by its linear form at the mean of its states and inputs \[s\]: infinite if
+    /// it only integrates, 0 without states; `None` without a finite simulation. Dead times are left out.
+    #[must_use]
+    pub fn fastest_time_constant(&self, x: &[f64]) -> Option<f64> {
+        let n = self.model.spec().states.len();
+        if n == 0 {
+            return Some(0.0);
+        }
+        let form = self.linearised(x)?;
+        let a = DMatrix::from_fn(n, n, |i, j| form.a[i][j]);
+        if !a.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let rates = a.complex_eigenvalues();
+        let fastest = rates.iter().map(|rate| rate.norm()).fold(0.0, f64::max);
+        Some(self.time_unit / fastest)
     }
 
     /// The change of each output that a step of each input has caused after `steps` sampling intervals, by input and output, of the linear

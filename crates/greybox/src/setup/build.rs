@@ -139,12 +139,8 @@ impl<'a> Setup<'a> {
         };
         let lags = structure.lags();
         let parameters = names.len();
-        for (r, record) in records.iter().enumerate() {
-            let of = if records.len() > 1 {
-                format!(", record {}", r + 1)
-            } else {
-                String::new()
-            };
+        let suffixes = ct_signals::parts::suffixes(records);
+        for (r, (record, of)) in records.iter().zip(&suffixes).enumerate() {
             for vessel in 0..plant.vessels() {
                 free.push(names.len());
                 names.push(format!("{}(0){of}", plant.level_name(vessel)));
@@ -153,7 +149,7 @@ impl<'a> Setup<'a> {
             // The input before the record is unknown, so the initial state of a lag is a free parameter.
             for &lag in &lags {
                 let (name, range) = structure.lag_before(lag, at_rest(record)[pump_of(lag)]);
-                let name = name + &of;
+                let name = name + of;
                 if !fixed.contains_key(&name) {
                     free.push(names.len());
                 }
@@ -162,7 +158,7 @@ impl<'a> Setup<'a> {
             }
             if let Some(feedback) = &feedback {
                 for (name, range) in feedback.entries(r, structure.scales.input) {
-                    let name = name + &of;
+                    let name = name + of;
                     if feedback.released && !fixed.contains_key(&name) {
                         free.push(names.len());
                     }

@@ -247,8 +247,7 @@ mod tests {
                 "cm",
                 (0..300).map(|k| 2.0 * wave(k + 40)).collect(),
             )],
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         };
         let records = [record];
         let fixed = BTreeMap::new();

@@ -58,7 +58,7 @@ fn in_loop(rig: &Rig, controller: &Controller, r: &[f64], noise: &[f64]) -> Reco
         inputs: vec![Channel::new("u", "V", u)],
         outputs: vec![Channel::new("y", "cm", y)],
         references: vec![Channel::new("r", "cm", r.to_vec())],
-        calendar: None,
+        ..Record::default()
     }
 }
 

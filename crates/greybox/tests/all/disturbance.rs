@@ -71,8 +71,7 @@ impl Disturbed {
                 Channel::new("d", "l/min", d).with_hold(self.hold),
             ],
             outputs: vec![Channel::new("y", "cm", y)],
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         }
     }
 

@@ -147,8 +147,7 @@ impl Case {
             time: (0..u.len()).map(|k| k as f64 * INTERVAL).collect(),
             inputs: vec![Channel::new("u", "V", u.to_vec())],
             outputs: vec![Channel::new("y", "cm", y)],
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         }
     }
 }

@@ -57,8 +57,7 @@ fn record(seed: u64, samples: usize, missing: f64) -> Record {
             Channel::new("upper", "cm", upper),
             Channel::new("lower", "cm", lower),
         ],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     }
 }
 

@@ -83,8 +83,7 @@ fn whole(structure: &Structure, own: &[f64], seed: u64) -> (Record, f64) {
         time: (0..SAMPLES).map(|k| BEGIN + k as f64 * INTERVAL).collect(),
         inputs: vec![Channel::new("u", "V", u)],
         outputs: vec![Channel::new("y", "cm", y)],
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     };
     (record, at_cut)
 }

@@ -169,7 +169,7 @@ pub(crate) fn simulate_experiment(
                 (Loop::Closed(_), Some(reference)) => vec![reference.with_values(values.to_vec())],
                 _ => Vec::new(),
             },
-            calendar: None,
+            ..Record::default()
         },
         initial,
         at_limit,

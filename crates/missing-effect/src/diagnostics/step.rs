@@ -134,11 +134,14 @@ pub(crate) fn report(
         .collect();
     let of_output = |output: usize| {
         let own = simulated.iter().zip(&residuals).skip(output).step_by(count);
+        let of_parts = ct_signals::parts::records_of_parts(&setup.records);
         let series: Vec<Series> = setup
             .records
             .iter()
+            .zip(of_parts)
             .zip(own)
-            .map(|(record, (model, residual))| Series {
+            .map(|((record, of), (model, residual))| Series {
+                record: of,
                 time: &record.time,
                 signals: record.inputs.iter().map(|u| u.values.as_slice()).collect(),
                 model,

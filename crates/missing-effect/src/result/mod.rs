@@ -1,6 +1,5 @@
 //! The result of a diagnosis: plain structs, written to JSON unchanged; all printed and plotted results are derived from them.
 
-mod gaps;
 mod noise_floor;
 mod not_noise;
 mod parameter;
@@ -12,12 +11,12 @@ mod step;
 mod unknown;
 
 use ct_signals::Clock;
-pub use effect_search::{ControlLoop, NotSimulated, Verdict};
+pub use effect_search::{ControlLoop, LONGEST_HOLD, MendedGaps, NotSimulated, Verdict};
 use plants::{Domain, Plant};
 use serde::{Deserialize, Serialize};
 
+pub(crate) use self::{noise_floor::Floors, unknown::SHAPES};
 pub use self::{
-    gaps::{LONGEST_HOLD, MendedGaps},
     noise_floor::{NoiseFloor, NoiseSource},
     not_noise::NotNoise,
     parameter::Parameter,
@@ -28,7 +27,6 @@ pub use self::{
     step::Step,
     unknown::{PlaceLikelihood, Primitive, Share, Unknown, Window},
 };
-pub(crate) use self::{noise_floor::Floors, unknown::SHAPES};
 
 /// Format of times without a calendar.
 fn plain_clock() -> Clock {

@@ -158,7 +158,7 @@ impl Rig {
             inputs: vec![Channel::new("u", "V", u)],
             outputs: vec![Channel::new("y", "cm", y)],
             references: vec![Channel::new("r", "cm", r)],
-            calendar: None,
+            ..Record::default()
         })
     }
 

@@ -16,6 +16,7 @@ use crate::edit::own::Findings;
 use crate::effort::EffortLevel;
 use crate::own_model::{Comparison, OwnModelFile, Records, compare, design, diagnose, report};
 use crate::report::{min_max, rounded};
+use crate::sentences::of_gaps;
 use crate::serve::guard::Refusal;
 use crate::serve::own_design::Designed;
 use crate::serve::own_findings::Diagnosed;
@@ -229,16 +230,13 @@ impl Work {
             let (value, error) = numbers::value_and_error(one.value, one.std_error);
             json!({ "name": one.name, "unit": one.unit, "value": value, "error": error, "known": one.known })
         });
-        let times = self.records.records.iter();
-        let outputs_of_each = found.curves.len() / self.records.records.len().max(1);
-        let times = times.flat_map(|record| std::iter::repeat_n(&record.time, outputs_of_each));
-        let curves = found.curves.iter().zip(times).map(|(curves, time)| {
+        let curves = found.curves.iter().map(|curves| {
             let series = |values: &[f64]| {
                 let kept = min_max(values, DRAWN);
                 let at = |from: &[f64]| -> Vec<f64> {
                     kept.iter().map(|&k| rounded(from[k], 8)).collect()
                 };
-                json!({ "x": at(time), "y": at(values) })
+                json!({ "x": at(&curves.time), "y": at(values) })
             };
             let pairs = curves.measured.iter().zip(&curves.model);
             let residual: Vec<f64> = pairs.map(|(y, m)| y - m).collect();
@@ -261,6 +259,7 @@ impl Work {
             "starts": step.starts,
             "starts_agree": step.starts_agree,
             "not_determined": step.not_determined.iter().map(|of| of.join(", ")).collect::<Vec<_>>(),
+            "gaps": found.gaps.as_ref().and_then(of_gaps),
             "loop": found.control_loop.as_ref().map(|known| self.model.loop_sentence(known)),
             "curves": curves.collect::<Vec<_>>(),
         })

@@ -251,9 +251,9 @@ function words() {
   table($("own-parameters"), [["Parameter"], ["Estimate", true], ["± standard error", true], ["Unit"]],
     body.parameters.map((one) => [make("code", {}, one.name), one.value, one.error ?? (one.known ? "known" : "–"), units(one.unit)]));
   $("own-starts").textContent = `${body.starts_agree} of ${body.starts} starts ended in this minimum. –: the data do not determine it, or it is at a bound.`;
-  const loop = body.loop ? [make("p", {}, body.loop)] : [];
+  const known = [body.gaps, body.loop].filter(Boolean).map((said) => make("p", {}, said));
   fill($("own-untold"), body.not_determined.map((of) => make("p", { className: "warning" },
-    of.includes(",") ? `These records determine only a combination of ${of}: give one of them under [known], or a [prior].` : `${of} has no effect on the readings of these records: give it under [known], or excite the plant more.`)).concat(loop));
+    of.includes(",") ? `These records determine only a combination of ${of}: give one of them under [known], or a [prior].` : `${of} has no effect on the readings of these records: give it under [known], or excite the plant more.`)).concat(known));
 }
 
 const inUnit = (name, unit) => plots.named(plots.plain(name), plots.pretty(unit));

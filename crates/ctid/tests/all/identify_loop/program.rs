@@ -168,7 +168,7 @@ fn a_loop_that_is_not_stable_is_refused() {
         inputs: vec![Channel::new("u", "V", data.u)],
         outputs: vec![Channel::new("y", "cm", data.y)],
         references: vec![Channel::new("r", "cm", r)],
-        calendar: None,
+        ..Record::default()
     };
     for method in METHODS {
         let request = Request {

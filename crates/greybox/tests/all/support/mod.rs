@@ -212,8 +212,7 @@ impl Rig {
             .map(|input| input.with_hold(self.hold))
             .collect(),
             outputs: vec![Channel::new("y", "cm", y)],
-            references: Vec::new(),
-            calendar: None,
+            ..Record::default()
         }
     }
 

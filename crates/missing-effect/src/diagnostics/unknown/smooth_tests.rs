@@ -47,8 +47,7 @@ fn run(term: Term, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
         outputs: vec![Channel::new("y", "cm", vec![0.0; N])],
         inputs: vec![Channel::new("u", "V", u.clone())],
         time,
-        references: Vec::new(),
-        calendar: None,
+        ..Record::default()
     };
     // Any output suffices for a structure; the simulation does not depend on it.
     record.outputs[0].values = (0..N).map(|k| 10.0 + (k % 7) as f64).collect();

@@ -1,0 +1,135 @@
+//! Records with missing rows and samples of an input.
+
+use std::collections::BTreeMap;
+
+use ct_model::{Model, ModelSpec};
+use ct_signals::{Error, Record};
+use effect_search::{LONGEST_HOLD, Problem, mend};
+
+use crate::records::{STEP, found, record};
+
+/// A block that loses little heat: C/k = 1250 s, 250 rows.
+fn slow() -> String {
+    crate::records::BLOCK.replace(
+        "k(unit=\"W/K\", min=0) = 0.8",
+        "k(unit=\"W/K\", min=0) = 0.04",
+    )
+}
+
+fn without(record: &Record, rows: &[std::ops::Range<usize>]) -> Record {
+    let kept = |k: &usize| !rows.iter().any(|range| range.contains(k));
+    let kept: Vec<usize> = (0..record.len()).filter(kept).collect();
+    let of = |values: &[f64]| kept.iter().map(|&k| values[k]).collect::<Vec<f64>>();
+    let mut less = record.clone();
+    less.time = of(&record.time);
+    for channel in less.inputs.iter_mut().chain(&mut less.outputs) {
+        channel.values = of(&channel.values);
+    }
+    less
+}
+
+fn problem(records: Vec<Record>) -> Problem {
+    let spec = ModelSpec::parse(&slow()).unwrap();
+    Problem::builder(spec, records).build().unwrap()
+}
+
+#[test]
+fn the_time_constant_of_a_first_fit_decides_which_gaps_are_held_through() {
+    let whole = record(&slow(), 0.0, 0.05, 1);
+    // The input is known for 100 s before it may be held for 125 s: 10 rows are filled, 60 are not.
+    let cut = without(&whole, &[100..110, 250..310]);
+    let problem = problem(vec![cut]);
+    let gaps = problem.gaps.unwrap();
+    assert_eq!((gaps.gaps.held, gaps.gaps.cut, gaps.gaps.rows), (1, 1, 70));
+    assert!(
+        (gaps.time_constant / 1250.0 - 1.0).abs() < 0.1,
+        "{} s",
+        gaps.time_constant
+    );
+    assert!((gaps.limit - LONGEST_HOLD * gaps.time_constant).abs() < 1e-9);
+    let rows: Vec<usize> = problem.records.iter().map(Record::len).collect();
+    assert_eq!(rows, [250, 190]);
+}
+
+#[test]
+fn samples_of_an_input_that_are_missing_at_random_cut_nothing() {
+    let mut scattered = record(&slow(), 0.0, 0.05, 2);
+    let mut k = 7;
+    while k < scattered.len() {
+        scattered.inputs[0].values[k] = f64::NAN;
+        k += 3 + (k * 7919) % 11;
+    }
+    let problem = problem(vec![scattered]);
+    let gaps = problem.gaps.unwrap().gaps;
+    assert!(gaps.places > 40, "{gaps:?}");
+    assert_eq!((gaps.cut, problem.records.len()), (0, 1));
+    let diagnosis = found(&problem);
+    assert_eq!(diagnosis.gaps, problem.gaps);
+    let first = &diagnosis.steps[0].parameters;
+    let names: Vec<&str> = first.iter().map(|one| one.name.as_str()).collect();
+    assert_eq!(names, ["k", "g", "C", "T(0)"]);
+}
+
+#[test]
+fn results_name_the_parts_and_the_records() {
+    let whole = record(&slow(), 0.0, 0.05, 3);
+    let cut = without(&whole, &[250..310]);
+    let problem = problem(vec![whole, cut]);
+    let diagnosis = found(&problem);
+    let first = &diagnosis.steps[0];
+    let names: Vec<&str> = first
+        .parameters
+        .iter()
+        .map(|one| one.name.as_str())
+        .collect();
+    let states = [
+        "T(0), record 1",
+        "T(0), record 2, part 1",
+        "T(0), record 2, part 2",
+    ];
+    assert_eq!(names[3..], states);
+    let windows = &first.outputs[0].failures.by_time;
+    let of_second = windows.iter().filter(|bin| bin.record == Some(1)).count();
+    assert_eq!((windows.len(), of_second), (36, 24));
+    let text = serde_json::to_string(&diagnosis).unwrap();
+    let again: effect_search::Diagnosis = serde_json::from_str(&text).unwrap();
+    assert_eq!(again.gaps, diagnosis.gaps);
+}
+
+#[test]
+fn an_integrator_is_not_held_for_ever() {
+    let text = "model Store
+      parameter Real g(min=0) = 0.5;
+      input Real u;
+      output Real y = x;
+      Real x(start=0);
+    equation
+      der(x) = g*u;
+    end Store;";
+    let whole = record(text, 0.0, 0.05, 4);
+    let cut = without(&whole, &[100..150, 300..460]);
+    let model = Model::new(ModelSpec::parse(text).unwrap());
+    let found = mend((vec![cut], Vec::new()), (&model, &BTreeMap::new(), 1.0)).unwrap();
+    let gaps = found.gaps.unwrap();
+    assert!(gaps.time_constant.is_infinite());
+    let of_record = (whole.len() - 1) as f64 * STEP;
+    assert!((gaps.limit - LONGEST_HOLD * of_record).abs() < 1e-9);
+    assert_eq!((gaps.gaps.held, gaps.gaps.cut), (0, 2));
+}
+
+#[test]
+fn a_record_without_a_usable_part_is_refused() {
+    let mut record = record(&slow(), 0.0, 0.05, 5);
+    for (k, y) in record.outputs[0].values.iter_mut().enumerate() {
+        if k % 100 > 0 {
+            *y = f64::NAN;
+        }
+    }
+    record.inputs[0].values[40] = f64::NAN;
+    let spec = ModelSpec::parse(&slow()).unwrap();
+    let refused = Problem::builder(spec, [record]).build().unwrap_err();
+    let effect_search::Error::Signals(Error::NoStretch { readings, .. }) = refused else {
+        panic!("{refused}")
+    };
+    assert_eq!(readings, 8);
+}

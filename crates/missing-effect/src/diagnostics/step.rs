@@ -134,7 +134,7 @@ pub(crate) fn report(
         .collect();
     let of_output = |output: usize| {
         let own = simulated.iter().zip(&residuals).skip(output).step_by(count);
-        let of_parts = ct_signals::parts::records_of_parts(&setup.records);
+        let of_parts = ct_signals::parts::records_of_parts(setup.records);
         let series: Vec<Series> = setup
             .records
             .iter()

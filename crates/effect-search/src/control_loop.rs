@@ -326,7 +326,7 @@ fn detected(setup: &ModelSetup, fit: &Fit) -> Option<ControlLoop> {
     let residuals = estimation::residuals(setup, &fit.x)?;
     let gains = setup.step_gains(&fit.x, STEP_RESPONSE);
     let outputs = setup.outputs();
-    let (mut least, mut through, mut tests) = (1.0, None, 0.0);
+    let (mut least, mut tests) = (None, 0.0);
     for (i, residual) in residuals.iter().enumerate() {
         let record = &setup.records()[i / outputs];
         // A missing reading has not affected the controller.
@@ -339,10 +339,11 @@ fn detected(setup: &ModelSetup, fit: &Fit) -> Option<ControlLoop> {
             }
             tests += 1.0;
             let p = feedback_p(&input.values, &read, Some(gain));
-            if p < least {
-                (least, through) = (p, Some(input.name.clone()));
+            if least.as_ref().is_none_or(|(smallest, _)| p < *smallest) {
+                least = Some((p, input.name.clone()));
             }
         }
     }
-    ControlLoop::detected((least * tests).min(1.0), through)
+    let (p, through) = least?;
+    ControlLoop::detected((p * tests).min(1.0), Some(through))
 }

@@ -28,7 +28,10 @@ impl Context<'_> {
         for own in found {
             let mut group = vec![own];
             let position = last.added.iter().position(|i| *i == own);
-            if let Some(position) = position.filter(|_| !self.limit.leaves_out(OTHERS)) {
+            if self.limit.leaves_out(OTHERS) {
+                // Without refits: candidates whose sensitivity is collinear are known to fit as well.
+                group.extend(self.tied_to(own, &last.added));
+            } else if let Some(position) = position {
                 let others = self.stand_ins(&last, position, noise, slowness)?;
                 let is_same = |node: &&Node| {
                     let further = node.fit.parameters > last.fit.parameters;

@@ -174,6 +174,16 @@ impl Context<'_> {
         Some(matrix.column(0).into_owned())
     }
 
+    /// The candidates with the same sensitivity as one that may take its place in a set.
+    pub fn tied_to(&self, candidate: usize, added: &[usize]) -> Vec<usize> {
+        let others = added.iter().copied().filter(|&i| i != candidate);
+        let others: Vec<usize> = others.collect();
+        let all = 0..self.candidates.len();
+        all.filter(|i| !added.contains(i) && self.is_tied_to_one_of(*i, &[candidate]))
+            .filter(|i| !self.repeats_one_of(*i, &others))
+            .collect()
+    }
+
     /// Whether a set has another candidate with the same sensitivity.
     pub fn is_tied_to_one_of(&self, candidate: usize, added: &[usize]) -> bool {
         let first = |i: usize| self.ties.get(i).map_or(i, |tie| tie.first);

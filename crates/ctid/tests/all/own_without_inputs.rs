@@ -106,6 +106,7 @@ fn a_pendulum_is_checked_fitted_simulated_and_written() {
     assert!(said.contains("2 states, 0 inputs, 1 output"), "{said}");
     assert!(!said.contains("warning"), "{said}");
     let fit = place.result("compare a.csv --model p.toml");
+    assert!(fit["control_loop"].is_null(), "{}", fit["control_loop"]);
     for (name, value) in [("w2", 40.0), ("b", 0.1)] {
         is_near(&fit["steps"][0], name, value);
     }

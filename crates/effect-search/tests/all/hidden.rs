@@ -1,6 +1,7 @@
 //! Records of models with a hidden effect, and their diagnoses.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use ct_model::effects::{OwnCandidate, OwnParameter};
 use ct_signals::{Channel, Record, noise};
@@ -362,4 +363,26 @@ fn one_reading_that_is_off_is_no_effect() {
             );
         }
     }
+}
+
+#[test]
+fn an_interrupted_search_names_effects_with_the_same_sensitivity() {
+    let record = record(&BLOCK.replace("g*u", "g*(1 - 0.0001*time)*u"), 0.0, 0.1, 21);
+    let problem = problem(BLOCK, record);
+    let interrupt = AtomicBool::new(false);
+    let options = Options {
+        interrupt: Some(&interrupt),
+        ..Options::default()
+    };
+    let at_the_groups = |progress: effect_search::Progress| {
+        if progress.phase == "telling apart" {
+            interrupt.store(true, Ordering::Relaxed);
+        }
+    };
+    let found = diagnose(&problem, &options, &at_the_groups).unwrap();
+    let group = &found.groups[0];
+    for effect in ["gain_drift(u)", "drift(g)"] {
+        assert!(group.iter().any(|id| id == effect), "{group:?}");
+    }
+    assert!(!found.left_out.is_empty());
 }

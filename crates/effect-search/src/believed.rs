@@ -155,7 +155,7 @@ impl<'a> Context<'a> {
                 .expressions()
                 .any(|of| of.any(&|part| *part == Expression::Time));
             let setup = self.setup(&model)?;
-            let enclosed = enclose(setup, fit, controllers, !timed, FINE)?;
+            let enclosed = enclose(setup, fit, controllers, !timed, (FINE, &self.thresholds))?;
             let simulated = enclosed.setup.simulated_loop().cloned();
             (enclosed.fit, simulated, enclosed.control_loop)
         };

@@ -47,7 +47,7 @@ class TankFit(Fit):
     @property
     def model(self) -> Model:
         """The plant with its fitted values."""
-        return TankModel(self._parts, {e[0]: e[1] for e in self._tank.estimates}, self._tank.units)
+        return TankModel(self._parts, {e[0]: e[1] for e in self._tank.estimates}, self._tank.units, self._tank)
 
     @property
     def _not_determined(self) -> list[list[str]]:
@@ -190,7 +190,8 @@ class TankDiagnosis(Diagnosis):
             "effects": [*self._parts["effects"], *effects],
             "places": {**self._parts["places"], **places},
         }
-        return TankModel(parts, {p["name"]: p["value"] for p in steps[-1]["parameters"]}, self._kept[1])
+        content, units = self._kept
+        return TankModel(parts, {p["name"]: p["value"] for p in steps[-1]["parameters"]}, units, content)
 
     def summary(self) -> str:
         """The finding, in sentences."""

@@ -17,7 +17,7 @@ from ._linear import StateSpace, _guess
 from ._model import Model
 from ._monitor import Monitor
 from ._options import NOISE_ORDER, PRIOR, SEED, STARTS, Hold, Progress, phases
-from ._tank_plant import linearized, monitored
+from ._tank_plant import linearized, linearized_with_effects, monitored
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,15 +46,21 @@ def _toml(value: object, name: str = "") -> str:
 class TankModel(Model):
     """A plant of the program; immutable."""
 
-    __slots__ = ("_parts", "_units", "_values")
+    __slots__ = ("_parts", "_source", "_units", "_values")
 
     def __init__(
-        self, parts: dict[str, Any], values: Mapping[str, float] | None = None, units: tuple[str, str] = ("", "")
+        self,
+        parts: dict[str, Any],
+        values: Mapping[str, float] | None = None,
+        units: tuple[str, str] = ("", ""),
+        source: _ctid.TankFit | bytes | None = None,
     ) -> None:
         self._parts = parts
         self._values = dict(values or {})
         # Of the command and of the readings, as the fitted records say them.
         self._units = units
+        # A plant with effects: its fit, or that as it is pickled, whose records the effects of the plant's text are fitted to.
+        self._source = source if parts["effects"] else None
         # The program's parser checks it.
         self._native: Any = _ctid.Tank(self._text(parts))
 
@@ -157,19 +163,32 @@ class TankModel(Model):
     def to_modelica(self) -> str:
         """The plant as the text of a model in Modelica, with the fitted values where it comes from a fit, otherwise those of `start`.
 
-        Levels are in the unit of their columns, time in s. Raises `ModelError` where effects are in the model, which have no text, and where
-        parameters have no values.
+        Levels are in the unit of their columns, time in s. Effects become the effects at the ports of the text that they are, as in
+        `ctid export --modelica`; these are fitted to the records of the plant's fit at the first call. Raises `ModelError` where effects are in
+        the model without a fit, where the text has no such effect or does not fit as well as the plant, and where parameters have no values.
         """
+        fit = self._with_records()
+        if fit is not None:
+            return fit.to_modelica()
         text: str = self._native.to_modelica({**self._parts["start"], **self._values})
         return text
+
+    def _with_records(self) -> _ctid.TankFit | None:
+        """The fit of a plant with effects; None without effects, or without a fit."""
+        if isinstance(self._source, bytes):
+            self._source = _ctid.TankFit.from_bytes(self._source, self.text)
+        return self._source
 
     def linearize(self, at: Mapping[str, float] | None = None) -> StateSpace:
         """The matrices of the plant about values of its levels and its command, `at={"level": 12.0, "u": 4.0}`; a linear plant needs none.
 
         Its levels are `level`, `level_upper` and `level_lower`, or `level_1` to `level_3`; its command is `u`, of two pumps `u1` and `u2`; time
-        is in s. Slopes are exact. Raises `ModelError` where effects are in the model, as these have no matrices, and where parameters have no
-        values.
+        is in s. Slopes are exact. With effects these are the matrices of the text of `to_modelica`, whose effects may have further states and a
+        `time`. Raises `ModelError` where `to_modelica` does, and where a slope is not finite or a signal is delayed.
         """
+        fit = self._with_records()
+        if fit is not None:
+            return linearized_with_effects(fit, at)
         return linearized(self._native, {**self._parts["start"], **self._values}, at)
 
     def monitor(
@@ -189,7 +208,9 @@ class TankModel(Model):
         return monitored(self._native, (str(known[0]), str(known[1])), false_alarm_every, learn, time_unit)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return TankModel, (self._parts, self._values, self._units)
+        source = self._source
+        content = source if source is None or isinstance(source, bytes) else source.to_bytes()
+        return TankModel, (self._parts, self._values, self._units, content)
 
 
 def _priors(given: Mapping[str, tuple[float, float]] | None) -> dict[str, list[float]]:

@@ -24,6 +24,11 @@ def linearized(tank: _ctid.Tank, values: Mapping[str, float], at: Mapping[str, f
     return state_space(tank.linearize(dict(values), numbers("at", at)))
 
 
+def linearized_with_effects(fit: _ctid.TankFit, at: Mapping[str, float] | None) -> StateSpace:
+    """The matrices of the text of a plant with effects."""
+    return state_space(fit.linearize(numbers("at", at)))
+
+
 def monitored(
     tank: _ctid.Tank, units: tuple[str, str], false_alarm_every: float, learn: int, time_unit: float
 ) -> Monitor:

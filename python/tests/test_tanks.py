@@ -198,9 +198,41 @@ def test_the_text_of_a_tank(tour):
     assert "K*u - outflow + disturbance_gain*d" in text
 
 
+def test_a_tank_with_an_effect_as_text(tour):
+    fit = ctid.Model.tank("single-tank", known={"area": 154.0}, effects=["overflow"]).fit(tour, inputs=["u"], outputs=["y"])
+    text = fit.to_modelica()
+    assert "overflow is limit(level)" in text
+    assert text == fit.model.to_modelica()
+    # The text fits the record as the tank does.
+    again = ctid.Model.from_text(text).fit(tour, inputs={"u": "u"}, outputs={"level": "y"})
+    errors = [one.to_dict()["steps"][-1]["rmse_per_output"] for one in (again, fit)]
+    (of_text,), (of_tank,) = (list(error.values()) for error in errors)
+    assert of_text < 1.02 * of_tank
+    # Below the rim it is the tank; pickled, a model has its records again.
+    at = {"level": 5.0, "u": 4.0}
+    linear, values = fit.model.linearize(at), ctid.Model.from_text(text).params
+    assert linear.states == ["level"]
+    np.testing.assert_allclose(linear.A, -values["alpha"] / (2.0 * 154.0 * np.sqrt(5.0)), rtol=1e-6)
+    np.testing.assert_allclose(linear.B, values["pump_gain"] / 154.0, rtol=1e-6)
+    unpickled = pickle.loads(pickle.dumps(fit.model))
+    assert (unpickled.linearize(at).A == linear.A).all()
+
+
+def test_the_text_with_what_a_diagnosis_found(tour, tour_test):
+    fit = ctid.Model.tank("single-tank", known={"area": 154.0}).fit(tour, inputs=["u"], outputs=["y"])
+    found = fit.diagnose(test=tour_test, progress=False)
+    text = found.model.to_modelica()
+    assert found.effects and all(f"{effect} is " in text for effect in found.effects)
+
+
 def test_what_has_no_matrices(tour):
     with pytest.raises(ctid.ModelError, match="no values of pump_gain, alpha"):
         ctid.Model.tank("single-tank", known={"area": 154.0}).linearize(at={"level": 12.0, "u": 4.0})
     mended = ctid.Model.tank("single-tank", known={"area": 154.0}, effects=["overflow"], start={"pump_gain": 9.0, "alpha": 13.0})
-    with pytest.raises(ctid.ModelError, match="has no overflow"):
-        mended.linearize(at={"level": 12.0, "u": 4.0})
+    for text in (lambda: mended.linearize(at={"level": 12.0, "u": 4.0}), mended.to_modelica):
+        with pytest.raises(ctid.ModelError, match=r"other parameters for overflow .* fit it to records first"):
+            text()
+    # Both are a constant error of the reading in the text.
+    both = ctid.Model.tank("single-tank", known={"area": 154.0}, effects=["sensor_offset", "pipe_height"])
+    with pytest.raises(ctid.ModelError, match=r"pipe_height is the same effect .* write the balance"):
+        both.fit(tour, inputs=["u"], outputs=["y"]).to_modelica()

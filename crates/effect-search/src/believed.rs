@@ -47,7 +47,8 @@ pub fn believed(problem: &Problem, options: &Options) -> Result<Believed, Error>
 }
 
 /// All effects that can act in a model for the visited ranges: those of the catalogue with kept record numbers, those of the user, then
-/// smooth functions ([`Candidate::is_shape`]), which searches do not use.
+/// smooth functions ([`Candidate::is_shape`]), which searches do not use. A function that is kept under a name of the user's choice
+/// ([`Kept::function`]) has this name.
 ///
 /// # Errors
 /// As [`own_candidates`].
@@ -57,13 +58,22 @@ pub fn all_candidates(
     kept: &BTreeMap<String, Kept>,
     own: &BTreeMap<String, OwnCandidate>,
 ) -> Result<Vec<Candidate>, OwnError> {
-    let numbers = kept
-        .iter()
-        .map(|(id, kept)| (id.clone(), kept.numbers.clone()));
+    let numbers = kept.iter().map(|(id, kept)| {
+        let id = kept.function.as_ref().unwrap_or(id);
+        (id.clone(), kept.numbers.clone())
+    });
     let numbers = numbers.collect();
     let mut all = candidates_keeping(spec, visited, &numbers);
     all.extend(own_candidates(spec, own)?);
-    all.extend(shapes_keeping(spec, visited, &numbers));
+    let shapes = shapes_keeping(spec, visited, &numbers);
+    all.extend(shapes.into_iter().map(|shape| {
+        let mut named = kept.iter();
+        let named = named.find(|(_, kept)| kept.function.as_ref() == Some(&shape.id));
+        match named {
+            Some((name, _)) => shape.named(spec, name),
+            None => shape,
+        }
+    }));
     Ok(all)
 }
 
@@ -145,7 +155,7 @@ impl<'a> Context<'a> {
                 .expressions()
                 .any(|of| of.any(&|part| *part == Expression::Time));
             let setup = self.setup(&model)?;
-            let enclosed = enclose(setup, fit, controllers, !timed, FINE)?;
+            let enclosed = enclose(setup, fit, controllers, !timed, (FINE, &self.thresholds))?;
             let simulated = enclosed.setup.simulated_loop().cloned();
             (enclosed.fit, simulated, enclosed.control_loop)
         };

@@ -13,17 +13,8 @@ use std::sync::Arc;
 use crate::Error;
 use crate::output_step::ResidualTests;
 use crate::residual_tests::feedback::{LAGS, feedback_p};
+use crate::thresholds::Thresholds;
 
-/// Significance level of the feedback test.
-const FEEDBACK: f64 = 1e-4;
-/// Largest relative difference between the controller's command and the measured one. A controller with a larger difference is not used; a
-/// smaller difference is simulated as a known input of the loop.
-const OTHER_CONTROLLER: f64 = 0.05;
-/// Largest share of rows without a reading of a controlled output.
-const LACKING: f64 = 0.2;
-/// A loop that grows by this number of factors e over the longest record, beside what the model grows without its controllers, cannot have
-/// produced it.
-const GROWTH: f64 = 1.0;
 /// Sampling intervals after which the sign of an input's gain is that of its step response.
 const STEP_RESPONSE: usize = 50;
 
@@ -103,7 +94,7 @@ pub enum NotSimulated {
     /// The measured command disagrees with the controller's output by `mismatch`.
     OtherController {
         /// `mismatch`, here at rows with a reading and without the largest hundredth of the rows, over the standard deviation of the command:
-        /// above 0.05; not finite for a command that hardly changes.
+        /// above [`Thresholds::other_controller`]; not finite for a command that hardly changes.
         #[serde(deserialize_with = "crate::not_finite::number")]
         share: f64,
     },
@@ -150,10 +141,10 @@ impl ControlLoop {
         }
     }
 
-    /// Feedback through an input, if the p-value of its test is small.
+    /// Feedback through an input, if the p-value of its test is below [`Thresholds::feedback`].
     #[must_use]
-    pub fn detected(p: f64, input: Option<String>) -> Option<Self> {
-        (p < FEEDBACK).then(|| Self {
+    pub fn detected(p: f64, input: Option<String>, thresholds: &Thresholds) -> Option<Self> {
+        (p < thresholds.feedback).then(|| Self {
             feedback_p: Some(p),
             ..Self::measured(NotSimulated::UnknownController { lags: LAGS, input })
         })
@@ -162,13 +153,16 @@ impl ControlLoop {
     /// Difference between the measured commands and those of the controllers, for the worst one.
     ///
     /// # Errors
-    /// The loop is not simulated where the difference is too large.
-    pub fn mismatch_of<'a>(replays: impl IntoIterator<Item = &'a Replay>) -> Result<f64, Self> {
+    /// The loop is not simulated where the difference is above [`Thresholds::other_controller`].
+    pub fn mismatch_of<'a>(
+        replays: impl IntoIterator<Item = &'a Replay>,
+        thresholds: &Thresholds,
+    ) -> Result<f64, Self> {
         let replays = replays.into_iter();
         let share = |replay: &Replay| replay.usual / replay.moves.max(f64::MIN_POSITIVE);
         let worst = replays.max_by(|a, b| share(a).total_cmp(&share(b)));
         match worst.map(|replay| (share(replay), replay)) {
-            Some((share, replay)) if share > OTHER_CONTROLLER => Err(Self {
+            Some((share, replay)) if share > thresholds.other_controller => Err(Self {
                 mismatch: Some(replay.usual),
                 ..Self::measured(NotSimulated::OtherController { share })
             }),
@@ -183,7 +177,8 @@ impl ControlLoop {
     }
 }
 
-/// Significance level of the dependence of the loop's residual on a signal from outside.
+/// Significance level of the dependence of the loop's residual on a signal from outside, corrected for the number of outputs and records.
+/// Chosen, as [`Thresholds::not_noise`].
 const DEPENDS: f64 = 1e-4;
 
 impl Enclosed<'_> {
@@ -244,7 +239,7 @@ pub fn enclose<'a>(
     fit: Fit,
     (controllers, simulate): (&[LoopController], bool),
     may_test: bool,
-    stopping: Stopping,
+    (stopping, thresholds): (Stopping, &Thresholds),
 ) -> Result<Enclosed<'a>, Error> {
     let measured = |setup, fit, control_loop| {
         Ok(Enclosed {
@@ -254,14 +249,16 @@ pub fn enclose<'a>(
         })
     };
     if controllers.is_empty() {
-        let detected = may_test.then(|| detected(&setup, &fit)).flatten();
+        let detected = may_test
+            .then(|| detected(&setup, &fit, thresholds))
+            .flatten();
         return measured(setup, fit, detected);
     }
     let why = |why| Some(ControlLoop::measured(why));
     if !simulate {
         return measured(setup, fit, why(NotSimulated::AsRequested));
     }
-    if let Some(record) = lacking(setup.records(), controllers) {
+    if let Some(record) = lacking(setup.records(), controllers, thresholds.lacking_readings) {
         return measured(setup, fit, why(NotSimulated::MissingReadings { record }));
     }
     let simulated = match SimulatedLoop::new(&setup, &fit.x, controllers) {
@@ -271,13 +268,14 @@ pub fn enclose<'a>(
             return measured(setup, fit, why(because));
         }
     };
-    let mismatch = match ControlLoop::mismatch_of(simulated.replays().iter().flatten()) {
+    let replays = simulated.replays().iter().flatten();
+    let mismatch = match ControlLoop::mismatch_of(replays, thresholds) {
         Ok(mismatch) => mismatch,
         Err(other) => return measured(setup, fit, Some(other)),
     };
     let rows = setup.records().iter().map(Record::len).max().unwrap_or(0);
     if let Some((radius, alone)) = simulated.radius()
-        && (radius.ln() - alone.ln().max(0.0)) * rows as f64 > GROWTH
+        && (radius.ln() - alone.ln().max(0.0)) * rows as f64 > thresholds.loop_growth
     {
         let radius = Some(radius);
         return measured(setup, fit, why(NotSimulated::Unstable { radius }));
@@ -305,15 +303,15 @@ pub fn widened(std_errors: Vec<Option<f64>>, moved: &[f64]) -> Vec<Option<f64>> 
         .collect()
 }
 
-/// The first record that lacks many readings of a controlled output, or a value of a reference. The controller has used
-/// readings that the record does not contain: they follow from its commands.
-fn lacking(records: &[Record], controllers: &[LoopController]) -> Option<String> {
+/// The first record that lacks more than this share of the readings of a controlled output, or a value of a reference. The controller has
+/// used readings that the record does not contain: they follow from its commands.
+fn lacking(records: &[Record], controllers: &[LoopController], most: f64) -> Option<String> {
     let lacks = |record: &&Record| {
         controllers.iter().any(|of| {
             let read = record.outputs.get(of.controller.output());
             let reference = of.reference.and_then(|at| record.references.get(at));
             let rows = record.len() as f64;
-            read.is_some_and(|read| read.missing() as f64 > LACKING * rows)
+            read.is_some_and(|read| read.missing() as f64 > most * rows)
                 || reference.is_some_and(|reference| reference.missing() > 0)
         })
     };
@@ -322,7 +320,7 @@ fn lacking(records: &[Record], controllers: &[LoopController]) -> Option<String>
 
 /// Feedback through an input, by the test with the smallest p-value, corrected for the number of tests; `None` if there is none, or the
 /// simulation is not finite.
-fn detected(setup: &ModelSetup, fit: &Fit) -> Option<ControlLoop> {
+fn detected(setup: &ModelSetup, fit: &Fit, thresholds: &Thresholds) -> Option<ControlLoop> {
     let residuals = estimation::residuals(setup, &fit.x)?;
     let gains = setup.step_gains(&fit.x, STEP_RESPONSE);
     let outputs = setup.outputs();
@@ -345,5 +343,5 @@ fn detected(setup: &ModelSetup, fit: &Fit) -> Option<ControlLoop> {
         }
     }
     let (p, through) = least?;
-    ControlLoop::detected((p * tests).min(1.0), Some(through))
+    ControlLoop::detected((p * tests).min(1.0), Some(through), thresholds)
 }

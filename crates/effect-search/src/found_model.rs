@@ -34,12 +34,13 @@ impl Diagnosis {
     /// # Errors
     /// [`Error::UnknownEffect`], [`Error::Own`] and [`Error::Apply`], where it is another problem.
     pub fn model(&self, problem: &Problem) -> Result<ModelSpec, Error> {
-        let kept = |numbers: &BTreeMap<String, f64>| Kept {
+        let kept = |id: &String, numbers: &BTreeMap<String, f64>| Kept {
             numbers: numbers.clone(),
             start: BTreeMap::new(),
+            function: problem.kept.get(id).and_then(|kept| kept.function.clone()),
         };
         let numbers = self.record_numbers.iter();
-        let numbers = numbers.map(|(id, numbers)| (id.clone(), kept(numbers)));
+        let numbers = numbers.map(|(id, numbers)| (id.clone(), kept(id, numbers)));
         let visited = Visited {
             time_unit: problem.time_unit_name.clone(),
             ..Visited::nominal(&problem.spec)

@@ -52,6 +52,9 @@ pub struct Kept {
     pub numbers: BTreeMap<String, f64>,
     /// Starts of its parameters, by their names in the effect \[unit of the parameter\].
     pub start: BTreeMap<String, f64>,
+    /// Of a smooth function that has a name of the user's choice: its identifier as a function, `shape(T,u)`.
+    #[serde(default)]
+    pub function: Option<String>,
 }
 
 /// Options of a search.

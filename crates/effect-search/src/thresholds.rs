@@ -9,10 +9,27 @@ use serde::{Deserialize, Serialize};
 /// and doubled; `cargo run --release -p ctid-tests --example library_study` measures the error rates for the whole set of values. "Chosen,
 /// for time": the value limits the computation time.
 ///
+/// Thresholds of a comparison that no search uses are constants beside their code, as the ones for the fit in a loop whose model lacks an
+/// effect ([`crate::Enclosed::depends_on_external_signals`]).
+///
 /// The criterion is BIC; a fall of the criterion is a difference of BIC, a fall of the deviance a difference of `-2 log likelihood`. Both
 /// are dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Thresholds {
+    // The control loop of the records.
+    /// Without a known controller, feedback through an input is reported if the p-value of its test, corrected for the number of tests, is
+    /// below this (probability). Chosen, as [`Self::not_noise`].
+    pub feedback: f64,
+    /// Largest difference between the controller's commands and the measured ones, as a share of the standard deviation of the command (0
+    /// to 1): the loop of a controller with a larger difference is not simulated; a smaller difference is a known input of the loop.
+    /// Chosen.
+    pub other_controller: f64,
+    /// Largest share of rows without a reading of a controlled output with which a loop is simulated (0 to 1). Chosen.
+    pub lacking_readings: f64,
+    /// A loop cannot have produced the records, and is not simulated, if it grows by more than this number of factors e over the longest
+    /// record, in addition to the growth of the model without controllers (0 or more). Chosen.
+    pub loop_growth: f64,
+
     // The noise model.
     /// Largest order of the autoregressive noise model (1 or more). BIC selects the order up to this one. Chosen.
     pub noise_order: usize,
@@ -181,6 +198,10 @@ pub struct Thresholds {
 impl Thresholds {
     /// The default values of a diagnosis.
     pub const DEFAULT: Self = Self {
+        feedback: 1e-4,
+        other_controller: 0.05,
+        lacking_readings: 0.2,
+        loop_growth: 1.0,
         noise_order: 6,
         effects_before_noise: 2,
         longest_memory: 1.0 / 30.0,

@@ -1,15 +1,17 @@
 //! One of the plants, fitted to records, and diagnosed.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
+use ct_model::ModelSpec;
 use ct_signals::{Heading, ReadOptions, Reading};
 use ctid::effort::EffortLevel;
 use ctid::input;
 use ctid::model_file::{self, ModelFile};
 use ctid::output::Written;
-use ctid::simulate::{TimeColumn, of_plant};
+use ctid::simulate::{TimeColumn, of_plant, text_of_plant};
 use missing_effect::{Diagnosis as Found, Options, Problem, compare, diagnose};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -20,6 +22,7 @@ use crate::diagnosis::{NamedBin, bins, json};
 use crate::fit::{Covariance, check_simulation, simulation, units_of};
 use crate::frame::{Content, Frame};
 use crate::model::contents;
+use crate::tank_text::WITHOUT_TEXT;
 use crate::{bytes, error, work};
 
 /// What stands for the model file in messages.
@@ -35,6 +38,8 @@ pub struct TankFit {
     problem: Problem,
     found: Found,
     known: Known,
+    /// Its text with fitted effects, once it was asked for.
+    modelica: OnceLock<String>,
 }
 
 /// How well the parameters are known: names, covariance, degrees of freedom.
@@ -106,6 +111,7 @@ impl TankFit {
                 problem,
                 found,
                 known,
+                modelica: OnceLock::new(),
             })
         })
     }
@@ -300,6 +306,7 @@ impl TankFit {
                 problem,
                 found,
                 known,
+                modelica: OnceLock::new(),
             })
         })
     }
@@ -333,6 +340,7 @@ impl TankFit {
                 problem,
                 found,
                 known: None,
+                modelica: OnceLock::new(),
             })
         })
     }
@@ -346,10 +354,38 @@ impl TankFit {
         Ok(PyBytes::new(py, &bytes::of(&kept)?))
     }
 
+    /// `model`: the text of another model file for the same records, in the place of that of the fit.
     #[staticmethod]
-    fn from_bytes(py: Python<'_>, content: &[u8]) -> PyResult<Self> {
+    #[pyo3(signature = (content, model=None))]
+    fn from_bytes(py: Python<'_>, content: &[u8], model: Option<String>) -> PyResult<Self> {
         let KeptTank { text, frames } = bytes::read(content)?;
-        Self::of(py, text, frames, None)
+        Self::of(py, model.unwrap_or(text), frames, None)
+    }
+
+    /// The plant with its effects as the text of a model. The effects at the ports of the plant's text have parameters of their own, which
+    /// are fitted to the records here.
+    fn to_modelica(&self, py: Python<'_>) -> PyResult<String> {
+        if let Some(text) = self.modelica.get() {
+            return Ok(text.clone());
+        }
+        let text = work::run(py, None, |stop, _| {
+            let file = parsed(&self.text)?;
+            let options = options(EffortLevel::Normal.limit(), stop);
+            let read = (&file.columns, file.hold);
+            let text = text_of_plant(&self.problem, read, &options);
+            text.map_err(|what| ctid::Error::Usage(format!("{what}; {WITHOUT_TEXT}")))
+        })?;
+        Ok(self.modelica.get_or_init(|| text).clone())
+    }
+
+    /// The matrices of this text about values of its states and inputs.
+    fn linearize<'py>(
+        &self,
+        py: Python<'py>,
+        at: BTreeMap<String, f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let spec = ModelSpec::parse(&self.to_modelica(py)?).map_err(error::of_model)?;
+        crate::linear::linearize(py, spec, &at)
     }
 }
 

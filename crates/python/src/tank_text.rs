@@ -8,17 +8,32 @@ use pyo3::prelude::*;
 
 use crate::error;
 
+/// What to do with an effect that a plant's text cannot have.
+pub const WITHOUT_TEXT: &str =
+    "write the balance as a model of your own, or take the tank without this effect";
+
 /// The plant's text with what is known, these values of its parameters and initial levels, and the outputs that are read.
+///
+/// Effects at the ports of a text have other parameters than those of the catalogue: a plant with effects needs records
+/// ([`crate::tank::TankFit`]).
 pub fn spec(file: &ModelFile, values: &BTreeMap<String, f64>) -> PyResult<ModelSpec> {
     let plant = file.plant;
-    let on: Vec<&str> = file.effects.iter().map(|placed| placed.effect.id).collect();
     let terms = file.terms.iter().map(|own| own.term.name.as_str());
-    let on = on.into_iter().chain(terms).collect::<Vec<_>>();
-    if !on.is_empty() {
+    let terms: Vec<&str> = terms.collect();
+    let effects = file.effects.iter().map(|placed| placed.effect.id);
+    let effects: Vec<&str> = effects.collect();
+    if !terms.is_empty() {
         return Err(error::of_model(format!(
-            "the text of {} has no {}: an effect of a tank has neither text nor matrices; write the balance as a model of your own, or take the tank without it",
+            "the text of {} has no place for the term {}; {WITHOUT_TEXT}",
             plant.id(),
-            on.join(", ")
+            terms.join(", ")
+        )));
+    }
+    if !effects.is_empty() {
+        return Err(error::of_model(format!(
+            "the text of {} has other parameters for {} than the tank, which have to be fitted: fit it to records first, fit(...).model",
+            plant.id(),
+            effects.join(", ")
         )));
     }
     let mut spec = plant.spec(&file.known).map_err(error::of_model)?;

@@ -1,10 +1,12 @@
 //! All effects at all ports of a model.
 
 mod at_port;
+mod naming;
 
 use std::collections::BTreeMap;
 
 use self::at_port::candidate;
+pub use self::naming::check_term_name;
 use super::balance::limit;
 use super::effect::{Effect, EffectText, Place, Role};
 use super::fragment::{Action, Fragment};
@@ -14,7 +16,6 @@ use super::visited::Visited;
 use super::{all_effects, domain, level_shift, shape};
 use crate::expression::{Expression, Operator, Variable};
 use crate::spec::{About, Given, ModelSpec, Parameter};
-use crate::text::is_reserved;
 
 /// A parameter of an effect at a port.
 #[derive(Debug, Clone, PartialEq)]
@@ -185,47 +186,6 @@ impl Candidate {
             all = longer.collect();
         }
         all
-    }
-
-    /// Gives the variables the names that they have in the model.
-    pub(super) fn name_variables(&mut self, spec: &ModelSpec) {
-        let stem = identifier(&self.id);
-        let free = |name: String| {
-            let mut name = name;
-            while spec.find(&name).is_some() || is_reserved(&name) {
-                name.push('_');
-            }
-            name
-        };
-        let named = |name: &str| match name {
-            "v" => free(stem.clone()),
-            name => free(format!("{stem}_{name}")),
-        };
-        let fragment = &mut self.fragment;
-        for parameter in &mut fragment.parameters {
-            parameter.about.name = named(&parameter.about.name);
-        }
-        // Constants of the effect follow its parameters.
-        for (own, parameter) in self.parameters.iter_mut().zip(&fragment.parameters) {
-            own.name.clone_from(&parameter.about.name);
-        }
-        let states = fragment.states.iter_mut().map(|state| &mut state.about);
-        let flows = fragment.flows.iter_mut().map(|flow| &mut flow.about);
-        for about in states.chain(flows) {
-            about.name = named(&about.name);
-        }
-        self.stem = stem;
-    }
-}
-
-/// A name of Modelica from an identifier: `varies_with(k,T)` is `varies_with_k_T`.
-fn identifier(id: &str) -> String {
-    let clean = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-    let name: String = id.trim_end_matches(')').chars().map(clean).collect();
-    if name.starts_with(|c: char| c.is_ascii_alphabetic()) {
-        name
-    } else {
-        format!("own_{name}")
     }
 }
 

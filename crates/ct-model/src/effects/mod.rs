@@ -51,8 +51,8 @@ mod visited;
 
 pub use apply::{ApplyError, apply};
 pub use candidate::{
-    Candidate, EffectParameter, best_of_each_choice, candidates, candidates_keeping, level_shifts,
-    shapes_keeping,
+    Candidate, EffectParameter, best_of_each_choice, candidates, candidates_keeping,
+    check_term_name, level_shifts, shapes_keeping,
 };
 pub use description::DescribedParameter;
 pub use effect::{Effect, EffectText, Place, Role, Starts};

@@ -17,6 +17,7 @@ mod shared;
 mod simulated;
 mod sliding;
 mod support;
+mod terms;
 mod threads;
 mod tolerance;
 mod units;

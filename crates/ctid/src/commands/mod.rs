@@ -78,13 +78,13 @@ struct Results {
 
 #[derive(Debug, Args)]
 struct Add {
-    /// The effect, as listed by `ctid effects`; for a plant with --from, a name of your choice
+    /// The effect, as listed by `ctid effects`; with --from, also a name of your choice for the missing term
     effect: String,
     /// Model file
     #[arg(long, value_name = "M.toml")]
     model: PathBuf,
     /// Of a plant the shape of a term of your own, as `ctid diagnose --unknown` writes it; of a model of your own the result that `ctid
-    /// diagnose --json` wrote, of which the effect's sizes and the numbers of its record are kept
+    /// diagnose --json` wrote, of which the sizes of the effect or of the missing term and the numbers of its record are kept
     #[arg(long, value_name = "F", conflicts_with = "place")]
     from: Option<PathBuf>,
     /// The vessel it acts in, or the pump, where the plant has several

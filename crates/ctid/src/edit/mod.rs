@@ -1,6 +1,7 @@
 //! `ctid add` and `ctid remove`: they edit the `effects = [...]` line of a model file and do not change anything else, including comments
 //! and layout.
 
+mod kept;
 mod layout;
 pub(crate) mod own;
 mod term;
@@ -38,7 +39,7 @@ pub fn add(path: &Path, effect: &str, place: Option<&str>) -> Result<String, Err
 }
 
 /// Adds a user's own term to a plant, with its shape read from a CSV file; to a user's own model an effect, with its values from a result
-/// in JSON. Returns a description of the change, in one line.
+/// in JSON, or the missing term of the result under this name. Returns a description of the change, in one line.
 ///
 /// # Errors
 /// Where the name is taken or the shape cannot act on this plant, or the result is not one of this model and effect; the file is then as it

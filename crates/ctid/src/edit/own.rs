@@ -14,8 +14,8 @@ use super::Edited;
 use super::layout::{document, push, take_out};
 use crate::model_file::read_text;
 use crate::own_model::effects::{RECORD, every_candidate, find, plain};
+use crate::own_model::term::FUNCTION;
 use crate::own_model::{OwnModelFile, read_model};
-use crate::report::rounded;
 use crate::{Error, term_file};
 
 /// Reads the text that a model file names.
@@ -24,19 +24,19 @@ pub(crate) type ReadText<'r> = &'r dyn Fn(&Path) -> Result<ModelSpec, Error>;
 /// The parts of the JSON results of `ctid diagnose` and `ctid compare`, for a user's own model, that a model file can keep.
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct Findings {
-    model: String,
+    pub(super) model: String,
     steps: Vec<FoundStep>,
-    unknown: Option<FoundStep>,
+    pub(super) unknown: Option<FoundStep>,
     #[serde(default)]
     singles: Vec<FoundSingle>,
-    record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
+    pub(super) record_numbers: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
-struct FoundStep {
+pub(super) struct FoundStep {
     /// The effect, of the unexplained function.
     #[serde(default)]
-    effect: Option<String>,
+    pub(super) effect: Option<String>,
     parameters: Vec<FoundParameter>,
 }
 
@@ -70,7 +70,7 @@ impl Findings {
             // The effect is in quotes, as a comma separates the names of its port.
             let effect = text.lines().nth(1).and_then(|row| row.split('"').nth(1));
             return Err(format!(
-                "this is the table that `ctid diagnose --unknown` wrote, without the numbers that a model of your own keeps: write the result with `ctid diagnose --json RESULT.json`, then `ctid add '{}' --from RESULT.json`",
+                "this is the table of {} that `ctid diagnose --unknown` wrote, without the numbers that a model of your own keeps: write the result with `ctid diagnose --json RESULT.json`, then `ctid add NAME --from RESULT.json`",
                 quoted(effect.unwrap_or("shape(x,u)"))
             ));
         }
@@ -81,14 +81,6 @@ impl Findings {
         })
     }
 
-    /// The name of the unexplained function, for a message.
-    fn unexplained(&self) -> String {
-        let effect = self.unknown.as_ref().and_then(|step| step.effect.as_ref());
-        effect.map_or(String::new(), |effect| {
-            format!("; the missing term of the result is {effect}: `ctid add '{effect}'` keeps it")
-        })
-    }
-
     /// Whether the result contains an effect.
     pub fn has(&self, id: &str) -> bool {
         self.record_numbers.contains_key(id)
@@ -96,7 +88,7 @@ impl Findings {
 
     /// The value of a parameter in the last model with this parameter, of the unexplained function, or, for an effect that is in no model,
     /// from its single fit.
-    fn value(&self, name: &str) -> Option<f64> {
+    pub(super) fn value(&self, name: &str) -> Option<f64> {
         let steps = self.steps.iter().rev().chain(&self.unknown);
         let steps = steps.flat_map(|step| &step.parameters);
         let singles = self.singles.iter().flat_map(|single| &single.sizes);
@@ -104,31 +96,6 @@ impl Findings {
             .chain(singles)
             .filter(|parameter| parameter.name == name);
         named.find_map(|parameter| parameter.value)
-    }
-}
-
-impl Findings {
-    /// Values to keep for an effect: start values of its parameters, and the numbers of its records.
-    ///
-    /// # Errors
-    /// Where the result contains no information about it.
-    pub fn kept(&self, candidate: &Candidate) -> Result<Kept, String> {
-        let id = &candidate.id;
-        let Some(numbers) = self.record_numbers.get(id) else {
-            let known: Vec<&str> = self.record_numbers.keys().map(String::as_str).collect();
-            return Err(format!(
-                "the result does not contain {id}: it has {}; without --from the effect is fitted anew",
-                known.join(", ")
-            ));
-        };
-        let start = candidate.parameters.iter().filter_map(|parameter| {
-            let size = self.value(&parameter.name)?;
-            Some((parameter.short.clone(), rounded(size, 7)))
-        });
-        Ok(Kept {
-            numbers: numbers.clone(),
-            start: start.collect(),
-        })
     }
 }
 
@@ -191,11 +158,18 @@ pub(crate) fn with_effect(
         what,
     };
     let model = OwnModelFile::parse_with(path, text, read)?;
-    let all = every_candidate(&model.base, &model.candidates)?;
-    let candidate = find(&model.base, &all, effect).map_err(|what| {
-        let unexplained = from.map_or(String::new(), Findings::unexplained);
-        Error::UnknownEffect(what + &unexplained)
-    })?;
+    let (candidate, values) = match from {
+        Some(found) => {
+            let (candidate, values) = found.kept(&model, effect)?;
+            (candidate, Some(values))
+        }
+        None => {
+            let functions = &model.effects.functions;
+            let all = every_candidate(&model.base, &model.candidates, functions)?;
+            let candidate = find(&model.base, &all, effect).map_err(Error::UnknownEffect)?;
+            (candidate.clone(), None)
+        }
+    };
     let id = &candidate.id;
     let is_on = model.effects.on.contains(id);
     if is_on && from.is_none() {
@@ -208,14 +182,8 @@ pub(crate) fn with_effect(
         push(&mut document, id);
     }
     let mut kept = String::new();
-    if let Some(found) = from {
-        if found.model != model.base.name {
-            return Err(refuse(format!(
-                "the result is of the model {}, and this file has {}: give a result of this model",
-                found.model, model.base.name
-            )));
-        }
-        kept = keep(&mut document, candidate, found).map_err(&refuse)?;
+    if let Some(values) = &values {
+        kept = keep(&mut document, &candidate, values).map_err(&refuse)?;
     }
     let text = document.to_string();
     let model = OwnModelFile::parse_with(path, &text, read)?;
@@ -228,14 +196,9 @@ pub(crate) fn with_effect(
 }
 
 /// Writes a result's values of an effect into its table. Returns a description of them.
-fn keep(
-    document: &mut DocumentMut,
-    candidate: &Candidate,
-    found: &Findings,
-) -> Result<String, String> {
+fn keep(document: &mut DocumentMut, candidate: &Candidate, kept: &Kept) -> Result<String, String> {
     let id = &candidate.id;
-    let kept = found.kept(candidate)?;
-    if kept.start.is_empty() && kept.numbers.is_empty() {
+    if kept.start.is_empty() && kept.numbers.is_empty() && kept.function.is_none() {
         return Ok(", of which the result has no size".to_string());
     }
     let no_table = || format!("[effect.\"{id}\"] is not a table; make it one");
@@ -252,6 +215,9 @@ fn keep(
         .or_insert(Item::Table(own))
         .as_table_like_mut()
         .ok_or_else(no_table)?;
+    if let Some(function) = &kept.function {
+        set(table, FUNCTION, value(function));
+    }
     let mut said = Vec::new();
     for parameter in &candidate.parameters {
         let Some(&size) = kept.start.get(&parameter.short) else {
@@ -267,9 +233,11 @@ fn keep(
         }
         set(table, RECORD, value(inline));
     }
+    let of = kept.function.as_ref();
+    let of = of.map_or(String::new(), |function| format!(", {function},"));
     Ok(match said.as_slice() {
-        [] => " with the numbers of its record".to_string(),
-        said => format!(" with {}", said.join(", ")),
+        [] => format!("{of} with the numbers of its record"),
+        said => format!("{of} with {}", said.join(", ")),
     })
 }
 

@@ -34,7 +34,7 @@ pub fn design(
     options: &Options,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Design, Error> {
-    let all = every_candidate(&file.base, &file.candidates)?;
+    let all = every_candidate(&file.base, &file.candidates, &file.effects.functions)?;
     let mut ids = Vec::with_capacity(2);
     for name in between {
         let found = find(&file.base, &all, name).map_err(Error::UnknownEffect)?;
@@ -272,7 +272,7 @@ fn sequence_words(design: &Design, applied: &InputSequenceKind) -> String {
 
 /// Sentences: the experiment to apply, and the expected result.
 pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) -> Vec<String> {
-    let words = EffectWords::of(&file.base, &file.candidates);
+    let words = EffectWords::of(file);
     let [a, b] = design
         .between
         .each_ref()

@@ -39,7 +39,7 @@ pub(crate) fn said(
     diagnosis: &Diagnosis,
     look: Look,
 ) -> String {
-    let words = EffectWords::of(&file.base, &file.candidates);
+    let words = EffectWords::of(file);
     let mut text = format!("{}\n\n", look.heading(&diagnosis.model));
     let fails = |name: &str, step: &Step| {
         let clock = Clock::of(&records.records);

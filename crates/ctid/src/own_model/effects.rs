@@ -9,6 +9,7 @@ use effect_search::{Kept, all_candidates};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::term::{self, FUNCTION};
 use crate::model_file::Source;
 use crate::{Error, names};
 
@@ -23,12 +24,13 @@ const FIXED: &str = "fixed";
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(
     untagged,
-    expecting = "a number, `fixed = [\"a parameter\"]`, or `record = { duration = 600.0 }`"
+    expecting = "a number, `fixed = [\"a parameter\"]`, `record = { duration = 600.0 }`, or `function = \"shape(x,u)\"`"
 )]
 pub(super) enum Setting {
     Start(f64),
     Fixed(Vec<String>),
     Record(BTreeMap<String, f64>),
+    Function(String),
 }
 
 /// The effects of a model file.
@@ -44,6 +46,8 @@ pub struct OwnEffects {
     pub parameters: BTreeMap<String, String>,
     /// Tables of effects that are not in the model.
     pub waiting: Vec<String>,
+    /// Smooth functions that have names of the user's choice, in the model or not, by these names: `shape(T,u)`.
+    pub functions: BTreeMap<String, String>,
 }
 
 /// An identifier without the blanks that the user typed.
@@ -65,16 +69,15 @@ pub(super) fn read(
     if listed.is_empty() && tables.is_empty() {
         return Ok(effects);
     }
-    let all = every_candidate(spec, own)?;
+    let mut all = every_candidate(spec, own, &BTreeMap::new())?;
+    effects.functions = term::functions(spec, &all, tables, source)?;
+    term::append(spec, &mut all, &effects.functions);
     let mut on: Vec<&Candidate> = Vec::new();
     for written in listed {
         let at = written.span().start;
         let candidate = find(spec, &all, written.as_ref()).map_err(|what| source.at(at, what))?;
-        if on.iter().any(|other| other.id == candidate.id) {
-            return Err(source.at(
-                at,
-                format!("{} is listed twice: once is enough", candidate.id),
-            ));
+        if let Some(what) = term::listed_already(&on, candidate) {
+            return Err(source.at(at, what));
         }
         on.push(candidate);
     }
@@ -84,7 +87,8 @@ pub(super) fn read(
     for (written, table) in tables {
         let at = written.span().start;
         let candidate = find(spec, &all, written.as_ref()).map_err(|what| source.at(at, what))?;
-        let (kept, fixed) = settings(candidate, table, source)?;
+        let (mut kept, fixed) = settings(candidate, table, source)?;
+        kept.function = effects.functions.get(&candidate.id).cloned();
         if !on.iter().any(|other| other.id == candidate.id) {
             effects.waiting.push(candidate.id.clone());
             continue;
@@ -110,12 +114,16 @@ pub(super) fn of_ids(
     if ids.is_empty() {
         return Ok(effects);
     }
-    let all = every_candidate(spec, own)?;
+    let named = kept.iter().filter_map(|(name, kept)| {
+        let function = kept.function.clone()?;
+        Some((name.clone(), function))
+    });
+    effects.functions = named.collect();
+    let all = every_candidate(spec, own, &effects.functions)?;
     let mut on: Vec<&Candidate> = Vec::new();
     for written in ids {
         let candidate = find(spec, &all, written).map_err(Error::UnknownEffect)?;
-        if on.iter().any(|other| other.id == candidate.id) {
-            let what = format!("{} is listed twice: once is enough", candidate.id);
+        if let Some(what) = term::listed_already(&on, candidate) {
             return Err(Error::Usage(what));
         }
         on.push(candidate);
@@ -136,16 +144,20 @@ fn parameters_of(on: &[&Candidate]) -> BTreeMap<String, String> {
     parameters.collect()
 }
 
-/// All effects that can act in a model, from the catalogue and from the model file.
+/// All effects that can act in a model, from the catalogue and from the model file; then the terms of `functions`
+/// ([`OwnEffects::functions`]).
 ///
 /// # Errors
 /// As [`all_candidates`], which a model file passes first.
 pub(crate) fn every_candidate(
     spec: &ModelSpec,
     own: &BTreeMap<String, OwnCandidate>,
+    functions: &BTreeMap<String, String>,
 ) -> Result<Vec<Candidate>, Error> {
-    all_candidates(spec, &Visited::nominal(spec), &BTreeMap::new(), own)
-        .map_err(|error| Error::Columns(error.to_string()))
+    let mut all = all_candidates(spec, &Visited::nominal(spec), &BTreeMap::new(), own)
+        .map_err(|error| Error::Columns(error.to_string()))?;
+    term::append(spec, &mut all, functions);
+    Ok(all)
 }
 
 /// The candidate with this identifier.
@@ -229,6 +241,8 @@ fn settings(
             (FIXED, Setting::Fixed(names)) => {
                 fixed_names.extend(names.iter().map(|name| (at, name.clone())));
             }
+            // The terms of the file have been read before.
+            (FUNCTION, Setting::Function(_)) => {}
             (RECORD | FIXED, _) => {
                 let form = "write record = { duration = 600.0 }, fixed = [\"tau\"], and numbers for parameters";
                 return Err(source.at(at, format!("{name} of {id}: {form}")));

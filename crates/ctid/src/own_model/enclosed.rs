@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use ct_model::Expression;
-use effect_search::{ControlLoop, NotSimulated, enclose};
+use effect_search::{ControlLoop, NotSimulated, Thresholds, enclose};
 use greybox::{Fit, FitOptions, ModelSetup, SimulatedLoop};
 
 use super::file::{OwnModelFile, Records};
@@ -11,7 +11,7 @@ use super::fitted::blame_search;
 use crate::Error;
 
 /// If the residual in the simulated loop is not independent of the signals from outside, the model lacks an effect. If then the error of an
-/// output changes by a larger share than this, the fit on the measured inputs is the result: its error is the smallest that the model can have.
+/// output changes by a larger share than this, the fit on the measured inputs is the result: its error is the smallest that the model can have. Chosen.
 const SAME_ERROR: f64 = 0.005;
 
 /// A fit in the loop of its records, if that can be simulated; the loop, and what is known of it.
@@ -36,7 +36,8 @@ pub(super) fn in_loop(
         None => setup,
     };
     let of_loop = (&controllers[..], simulate);
-    let enclosed = enclose(setup, fit.clone(), of_loop, !timed, options.stopping);
+    let how = (options.stopping, &Thresholds::DEFAULT);
+    let enclosed = enclose(setup, fit.clone(), of_loop, !timed, how);
     let enclosed = enclosed.map_err(|error| blame_search(&records.records, error))?;
     if let Some((change, output)) = enclosed.change_of_error(&fit)
         && change.abs() > SAME_ERROR

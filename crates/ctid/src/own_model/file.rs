@@ -150,18 +150,12 @@ impl OwnModelFile {
     }
 
     /// The model file with one more effect, or with updated values of an effect that it has: sizes, start values, and the numbers of its
-    /// records.
+    /// records. A name that no effect has becomes that of the missing term of the diagnosis.
     ///
     /// # Errors
     /// Where it cannot act in the model, or the diagnosis contains no information about it.
     pub fn with_effect(&self, effect: &str, found: &Diagnosis) -> Result<Self, Error> {
-        let all = effects::every_candidate(&self.base, &self.candidates)?;
-        let candidate = effects::find(&self.base, &all, effect).map_err(Error::UnknownEffect)?;
-        let kept = Findings::from(found).kept(candidate);
-        let kept = kept.map_err(|what| Error::File {
-            file: self.name.clone(),
-            what,
-        })?;
+        let (candidate, kept) = Findings::from(found).kept(self, effect)?;
         let mut ids = self.effects.on.clone();
         if !ids.contains(&candidate.id) {
             ids.push(candidate.id.clone());

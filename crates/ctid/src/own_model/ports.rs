@@ -37,7 +37,7 @@ fn group(candidate: &Candidate) -> usize {
 
 /// All candidates of a search: from the catalogue and from the model file.
 fn searched(file: &OwnModelFile) -> Result<Vec<Candidate>, Error> {
-    let mut all = every_candidate(&file.base, &file.candidates)?;
+    let mut all = every_candidate(&file.base, &file.candidates, &file.effects.functions)?;
     all.retain(|candidate| !candidate.is_shape());
     Ok(all)
 }
@@ -48,7 +48,7 @@ fn searched(file: &OwnModelFile) -> Result<Vec<Candidate>, Error> {
 /// As [`own_candidates`], which the model file has passed.
 pub(crate) fn listed(file: &OwnModelFile, look: Look) -> Result<String, Error> {
     let all = searched(file)?;
-    let words = EffectWords::of(&file.base, &file.candidates);
+    let words = EffectWords::of(file);
     let mut text = String::new();
     for (i, heading) in HEADINGS.into_iter().enumerate() {
         let here: Vec<&Candidate> = all.iter().filter(|c| group(c) == i).collect();
@@ -94,7 +94,7 @@ pub(crate) fn like(file: &OwnModelFile, sought: &Sought, look: Look) -> Result<S
     if found.is_empty() {
         return Err(sought.nothing());
     }
-    let words = EffectWords::of(&file.base, &file.candidates);
+    let words = EffectWords::of(file);
     Ok(by_effect(&found, &words, look))
 }
 
@@ -111,7 +111,7 @@ pub(crate) fn described(file: &OwnModelFile, written: &str, look: Look) -> Resul
     if found.is_empty() {
         found.push(find(&file.base, &all, written).map_err(Error::UnknownEffect)?);
     }
-    let words = EffectWords::of(&file.base, &file.candidates);
+    let words = EffectWords::of(file);
     let sheets = alike(&found, &words).map(|here| sheet(file, here, &words, look));
     Ok(sheets.collect::<Vec<String>>().join("\n"))
 }

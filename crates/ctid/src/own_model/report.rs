@@ -97,10 +97,7 @@ pub(crate) fn missing_term(words: &EffectWords, unknown: &Unknown) -> MissingTer
         knots: unknown.at.clone(),
         ordinates: unknown.value.clone(),
         ordinate_errors: unknown.std_error.clone(),
-        command: format!(
-            "ctid add '{}' --model M.toml --from RESULT.json",
-            unknown.effect
-        ),
+        command: "ctid add NAME --model M.toml --from RESULT.json".to_string(),
         places: places.collect(),
     }
 }
@@ -129,7 +126,7 @@ pub fn diagnosed(
     records: &Records,
     found: &effect_search::Diagnosis,
 ) -> Document {
-    let words = EffectWords::of(&file.base, &file.candidates);
+    let words = EffectWords::of(file);
     let noise = with_source(&found.noise, NoiseSource::LastModel, false);
     let mut shown = document(file, records, &found.steps, noise);
     shown.verdict = found.verdict;

@@ -20,11 +20,10 @@ pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
         }
     });
     format!(
-        "A function of every state, input and time was fitted at every port: the best is a function of {}. {} explains {:.0} % of the squared error above the noise{left_out}; `ctid add '{}' --from RESULT.json` keeps it until its physics is known.",
+        "A function of every state, input and time was fitted at every port: the best is a function of {}. {} explains {:.0} % of the squared error above the noise{left_out}; `ctid add NAME --from RESULT.json` keeps it under a name of your choice until its physics is known.",
         unknown.variable,
         words.placed(&unknown.effect),
-        100.0 * unknown.share,
-        unknown.effect
+        100.0 * unknown.share
     )
 }
 

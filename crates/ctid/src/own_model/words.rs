@@ -7,6 +7,7 @@ use ct_model::{About, ModelSpec, Variable};
 use ct_signals::escaped;
 
 use super::effects::every_candidate;
+use super::file::OwnModelFile;
 
 /// Descriptions of the effects of a model.
 pub(crate) struct EffectWords(BTreeMap<String, Words>);
@@ -43,9 +44,18 @@ struct Words {
 
 impl EffectWords {
     /// Descriptions of all effects that can act in a model.
-    pub fn of(spec: &ModelSpec, own: &BTreeMap<String, OwnCandidate>) -> Self {
+    pub fn of(file: &OwnModelFile) -> Self {
+        Self::among(&file.base, &file.candidates, &file.effects.functions)
+    }
+
+    /// As [`EffectWords::of`], for a model with candidates of the user's own and the terms of `functions`.
+    pub fn among(
+        spec: &ModelSpec,
+        own: &BTreeMap<String, OwnCandidate>,
+        functions: &BTreeMap<String, String>,
+    ) -> Self {
         // The candidates were checked when the model file was read.
-        let all = every_candidate(spec, own).unwrap_or_default();
+        let all = every_candidate(spec, own, functions).unwrap_or_default();
         let words = |candidate: &Candidate| match own.get(&candidate.id) {
             Some(own) => of_own(spec, own),
             None => Words {
@@ -196,7 +206,7 @@ mod tests {
     #[test]
     fn ports_are_named_with_what_the_text_says_of_them() {
         let spec = ModelSpec::parse(include_str!("../../models/heated-block.mo"));
-        let words = EffectWords::of(&spec.unwrap(), &BTreeMap::new());
+        let words = EffectWords::among(&spec.unwrap(), &BTreeMap::new(), &BTreeMap::new());
         let said = [
             ("lag(u)", "lag(u) at the input u (power of the heater)"),
             ("lag(y)", "lag(y) at the output y, which reads T (block)"),
@@ -233,7 +243,7 @@ mod tests {
             ..OwnCandidate::default()
         };
         let all = BTreeMap::from([("vent".to_string(), own)]);
-        let words = EffectWords::of(&spec.unwrap(), &all);
+        let words = EffectWords::among(&spec.unwrap(), &all, &BTreeMap::new());
         assert_eq!(
             words.placed("vent"),
             "vent in the equation of T (block) and at the flow loss and at the output y, which reads T (block)"

@@ -231,6 +231,7 @@ impl Own {
             "signals": signals,
             "unused": unused,
             "effects": model.as_ref().ok().map(|model| model.effects.on.clone()),
+            "functions": model.as_ref().ok().map(|model| model.effects.functions.clone()),
             "ports": ports,
             "diagnosis": diagnosis,
             "design": self.design.as_ref().map(|design| &design.body),
@@ -301,8 +302,9 @@ pub(super) fn change(session: &mut Session, change: Change) -> Result<(), Refusa
         }
         Change::Add { effect } => {
             let own = session.own.as_mut().ok_or_else(no_model)?;
+            let model = own.model()?;
             let found = own.diagnosis.as_ref().map(|found| &found.findings);
-            let found = found.filter(|found| found.has(&effect));
+            let found = found.filter(|found| found.keeps(&model, &effect));
             let path = Path::new(FILE);
             let edited =
                 edit::own::with_effect(path, &own.file, &effect, found, &own.named_text())?;

@@ -29,7 +29,7 @@ pub(super) struct Diagnosed {
 
 /// JSON of a diagnosis for the page.
 pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
-    let words = EffectWords::of(&model.base, &model.candidates);
+    let words = EffectWords::of(model);
     let one = |id: &String| json!({ "effect": id, "placed": words.placed(id), "physics": words.physics(id) });
     let groups = found.groups.iter().filter_map(|group| {
         let (first, others) = group.split_first()?;
@@ -79,7 +79,7 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
 /// The ports of a model, each with the effects that are in the model and those that were found.
 pub(super) fn ports(model: &OwnModelFile, found: &[String]) -> Value {
     let spec = &model.base;
-    let words = EffectWords::of(spec, &model.candidates);
+    let words = EffectWords::of(model);
     let ports = listed(spec);
     let ports = ports.iter().map(|(site, about)| {
         let here = |ids: &[String]| -> Vec<String> {

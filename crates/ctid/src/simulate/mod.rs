@@ -27,6 +27,7 @@ pub(crate) use self::inputs::{
 pub use self::plant::of_plant;
 pub(crate) use self::plant::simulate as simulate_plant;
 pub(crate) use self::plant_export::export as export_plant;
+pub use self::plant_export::text_of_plant;
 pub(crate) use self::text::said;
 pub use self::time_column::TimeColumn;
 use crate::output::Found;

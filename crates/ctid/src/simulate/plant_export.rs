@@ -1,8 +1,8 @@
 //! The curves of a plant's fit, and its text.
 
 use ct_model::Expression;
-use ct_signals::{Heading, ReadSummary};
-use missing_effect::{Options, Problem};
+use ct_signals::{Columns, Heading, Hold, ReadSummary};
+use missing_effect::{Fitted, Options, Problem};
 
 use super::plant_text::AtPorts;
 use super::{Curves, FittedRecord, TimeColumn};
@@ -55,6 +55,35 @@ fn errors_on_command(
     missing_effect::fitted(problem, &options, |fitted| fitted.fit.rmse.clone())
 }
 
+/// The text of a plant with effects, which are fitted to the plant's records. `columns`, `hold`: of the model file.
+///
+/// # Errors
+/// Why there is none: an effect is none of the text's, a fit fails, or the text does not fit as well as the plant.
+pub fn text_of_plant(
+    problem: &Problem,
+    (columns, hold): (&Columns, Hold),
+    options: &Options,
+) -> Result<String, String> {
+    let at_ports = AtPorts::of(problem)?;
+    let of_fit = |fitted: &Fitted| (fitted.setup.records.to_vec(), fitted.fit.rmse.clone());
+    let fitted = missing_effect::fitted(problem, options, |fitted| of_fit(&fitted));
+    let (records, rmse) = fitted.map_err(|error| error.to_string())?;
+    let errors = errors_of_text(problem, rmse, options).map_err(|error| error.to_string())?;
+    at_ports.fitted(problem, &records, (columns, hold), &errors, options)
+}
+
+/// The errors that the text has to reach: it is simulated on the measured command. `rmse`: of the plant's fit.
+fn errors_of_text(
+    problem: &Problem,
+    rmse: Vec<f64>,
+    options: &Options,
+) -> Result<Vec<f64>, missing_effect::Error> {
+    match problem.controller {
+        None => Ok(rmse),
+        Some(_) => errors_on_command(problem, options),
+    }
+}
+
 /// Fits a plant with its effects to records, and returns the curves and, if wanted, its Modelica text.
 ///
 /// # Errors
@@ -69,8 +98,12 @@ pub(crate) fn export(
     let hold = model.hold;
     let Input { problem, summaries } = files.read_with(model)?;
     let plain = problem.effects.is_empty() && problem.terms.is_empty();
+    let refused = |why: String| {
+        let what = format!("--modelica: {why}; write its curves with --csv");
+        Error::file(&files.model, &what)
+    };
     let at_ports = match with_text && !plain {
-        true => Some(AtPorts::of(&problem, files)?),
+        true => Some(AtPorts::of(&problem).map_err(refused)?),
         false => None,
     };
     let first = &problem.records[0];
@@ -112,13 +145,10 @@ pub(crate) fn export(
     let text = match at_ports {
         None => text,
         Some(at_ports) => {
-            let errors = match problem.controller {
-                None => rmse,
-                // The text is simulated on the measured command.
-                Some(_) => errors_on_command(&problem, options).map_err(|e| files.blame(e))?,
-            };
+            let errors = errors_of_text(&problem, rmse, options).map_err(|e| files.blame(e))?;
             let read = (&columns, hold);
-            Some(at_ports.fitted(&problem, &records, read, &errors, (files, options))?)
+            let text = at_ports.fitted(&problem, &records, read, &errors, options);
+            Some(text.map_err(refused)?)
         }
     };
     let mut all = Vec::new();

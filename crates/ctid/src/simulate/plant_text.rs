@@ -10,7 +10,6 @@ use greybox::FitOptions;
 use missing_effect::{Options, Problem};
 use rayon::prelude::*;
 
-use crate::input::Files;
 use crate::own_model::{FitLimit, FittedModel, OwnModelFile, OwnSettings, Records};
 use crate::{Error, numbers};
 
@@ -27,21 +26,15 @@ pub(super) struct AtPorts {
     sets: Vec<Vec<String>>,
 }
 
-fn refused(files: &Files, why: &str) -> Error {
-    let what = format!("--modelica: {why}; write its curves with --csv");
-    Error::file(&files.model, &what)
-}
-
 impl AtPorts {
     /// The effects of a plant at the ports of its text; looked for before anything is fitted.
     ///
     /// # Errors
     /// Where an effect is none of the text's, or the model file holds what the text has no parameter for.
-    pub(super) fn of(problem: &Problem, files: &Files) -> Result<Self, Error> {
-        let refuse = |why: String| Err(refused(files, &why));
+    pub(super) fn of(problem: &Problem) -> Result<Self, String> {
         let plant = problem.plant;
         if let Some(term) = problem.terms.first() {
-            return refuse(format!(
+            return Err(format!(
                 "the term {} of your own has no place in the text of {}",
                 term.name,
                 plant.id()
@@ -49,9 +42,9 @@ impl AtPorts {
         }
         let mut first = problem.records[0].clone();
         let spec = plant.spec_of(&problem.known, &mut first);
-        let spec = spec.map_err(|error| refused(files, &error.to_string()))?;
+        let spec = spec.map_err(|error| error.to_string())?;
         if spec.inputs.len() != first.inputs.len() {
-            return refuse(format!(
+            return Err(format!(
                 "the text of {} has {} inputs, and the records have {}",
                 plant.id(),
                 spec.inputs.len(),
@@ -61,7 +54,7 @@ impl AtPorts {
         let is_parameter = |name: &str| spec.parameters.iter().any(|p| p.about.name == name);
         let mut given = problem.priors.keys().chain(&problem.fixed);
         if let Some(name) = given.find(|name| !is_parameter(name)) {
-            return refuse(format!(
+            return Err(format!(
                 "{name} is given (a prior, or fixed), and the text of {} has no such parameter",
                 plant.id()
             ));
@@ -70,7 +63,7 @@ impl AtPorts {
         for placed in &problem.effects {
             let ports = plant.at_ports(&spec, placed);
             if ports.is_empty() {
-                return refuse(format!(
+                return Err(format!(
                     "the text of {} has no effect that is {}",
                     plant.id(),
                     placed.effect.id
@@ -84,7 +77,7 @@ impl AtPorts {
             });
             sets = with_each.take(MOST_FITS).collect();
             if sets.is_empty() {
-                return refuse(format!(
+                return Err(format!(
                     "{} is the same effect in the text of {} as another one of the model file",
                     placed.effect.id,
                     plant.id()
@@ -105,14 +98,14 @@ impl AtPorts {
         records: &[Record],
         (columns, hold): (&Columns, Hold),
         errors: &[f64],
-        (files, options): (&Files, &Options),
-    ) -> Result<String, Error> {
+        options: &Options,
+    ) -> Result<String, String> {
         let plant = problem.plant;
         let mut records = records.to_vec();
         for record in &mut records {
             plant
                 .spec_of(&problem.known, record)
-                .map_err(|error| refused(files, &error.to_string()))?;
+                .map_err(|error| error.to_string())?;
             record.references.clear();
         }
         let levels = records.iter().flat_map(|record| &record.outputs);
@@ -161,11 +154,12 @@ impl AtPorts {
         let Some(best) = fitted.min_by(|a, b| ratio(a).total_cmp(&ratio(b))) else {
             let why = failed.into_iter().find_map(Result::err);
             let why = why.map_or_else(String::new, |error| error.to_string());
-            return Err(refused(files, &format!("no fit of the text: {why}")));
+            return Err(format!("no fit of the text: {why}"));
         };
         let ratio = ratio(&best);
         if ratio <= 1.0 + SAME_ERROR {
-            let text = best.text(&format!("plant {}", plant.id()))?;
+            let text = best.text(&format!("plant {}", plant.id()));
+            let text = text.map_err(|error| error.to_string())?;
             let effects = problem.effects.iter().zip(&best.given().effects.on);
             let named: Vec<String> = effects
                 .map(|(placed, port)| format!("{} is {port}", placed.effect.id))
@@ -174,17 +168,14 @@ impl AtPorts {
             return Ok(text.replacen('\n', &said, 1));
         }
         let cut = best.effort().left_out.first();
-        Err(refused(
-            files,
-            &format!(
-                "with {}, the simulation error of the text of {} is {} times that of the plant{}",
-                best.given().effects.on.join(", "),
-                plant.id(),
-                numbers::significant(ratio, 3),
-                cut.map_or_else(String::new, |_| {
-                    ", and its fit reached the time limit: give it more with --effort".to_string()
-                })
-            ),
+        Err(format!(
+            "with {}, the simulation error of the text of {} is {} times that of the plant{}",
+            best.given().effects.on.join(", "),
+            plant.id(),
+            numbers::significant(ratio, 3),
+            cut.map_or_else(String::new, |_| {
+                ", and its fit reached the time limit (--effort)".to_string()
+            })
         ))
     }
 }

@@ -291,6 +291,7 @@ fn effects_of_the_model_file_are_fitted_with_it_and_keep_their_record() {
             ("interval".to_string(), 2.0),
         ]),
         start: BTreeMap::from([("tau".to_string(), 24.0)]),
+        function: None,
     };
     problem.kept.insert("lag(y)".to_string(), kept);
     let found = believed(&problem, &Options::default()).unwrap();

@@ -1,6 +1,7 @@
 //! The thresholds of a search.
 
-use effect_search::{Options, Thresholds, Verdict, diagnose};
+use effect_search::{ControlLoop, NotSimulated, Options, Thresholds, Verdict, diagnose};
+use greybox::Replay;
 
 use crate::records::{BLOCK, problem, record};
 
@@ -43,6 +44,29 @@ fn the_thresholds_of_the_options_decide() {
             Verdict::Adequate | Verdict::Unexplained
         ));
     }
+}
+
+#[test]
+fn the_thresholds_of_a_loop_decide() {
+    let wide = Thresholds {
+        feedback: 0.01,
+        other_controller: 0.2,
+        ..Thresholds::DEFAULT
+    };
+    let detected = |thresholds| ControlLoop::detected(1e-3, None, thresholds);
+    assert_eq!(detected(&Thresholds::DEFAULT), None);
+    assert_eq!(detected(&wide).unwrap().feedback_p, Some(1e-3));
+    let replay = Replay {
+        states: Vec::new(),
+        beside: Vec::new(),
+        rms: 0.3,
+        usual: 0.2,
+        moves: 2.0,
+    };
+    let other = ControlLoop::mismatch_of([&replay], &Thresholds::DEFAULT).unwrap_err();
+    let share = NotSimulated::OtherController { share: 0.1 };
+    assert_eq!(other.not_simulated, Some(share));
+    assert_eq!(ControlLoop::mismatch_of([&replay], &wide), Ok(0.3));
 }
 
 #[test]

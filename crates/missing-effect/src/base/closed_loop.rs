@@ -3,7 +3,7 @@
 //! The noise is fed back through the command. A model that is simulated with the measured command is then biased, depending on the spectrum
 //! of the noise (`greybox`, `feedback.rs`); a model whose loop is simulated from the reference is not.
 
-use effect_search::residual_tests::feedback;
+use effect_search::{Thresholds, residual_tests::feedback};
 use greybox::{Fit, Setup, fit_from};
 use plants::Variable;
 
@@ -33,7 +33,7 @@ pub(crate) fn enclose<'a>(
             return Ok((node, None));
         }
         let p = feedback_p(&node)?;
-        return Ok((node, ControlLoop::detected(p, None)));
+        return Ok((node, ControlLoop::detected(p, None, &Thresholds::DEFAULT)));
     };
     check_stable(&node, controller)?;
     if !options.simulate_loop {
@@ -55,7 +55,7 @@ pub(crate) fn enclose<'a>(
             return Ok((node, Some(ControlLoop::measured(why))));
         }
     };
-    let mismatch = match ControlLoop::mismatch_of(setup.replays()) {
+    let mismatch = match ControlLoop::mismatch_of(setup.replays(), &Thresholds::DEFAULT) {
         Ok(mismatch) => mismatch,
         Err(other) => return Ok((node, Some(other))),
     };

@@ -33,7 +33,7 @@ fn unknown(effect: &str, variable: [&str; 2], unit: &str) -> Unknown {
 fn what_nothing_explains_is_shown_with_its_port_and_units() {
     let text = include_str!("../../../models/heated-block.mo");
     let spec = ct_model::ModelSpec::parse(text).unwrap();
-    let words = EffectWords::of(&spec, &BTreeMap::new());
+    let words = EffectWords::among(&spec, &BTreeMap::new(), &BTreeMap::new());
     let term = missing_term(&words, &unknown("shape(T,u)", ["u", "%"], "W"));
     assert_eq!(term.shown_term, "added to the equation of T");
     assert_eq!(
@@ -55,7 +55,7 @@ fn what_nothing_explains_is_shown_with_its_port_and_units() {
         "The unexplained error",
         "id=\"plot-unknown-shape\"",
         "added to the equation of T, in W",
-        "<code>ctid add &#39;shape(T,u)&#39; --model M.toml --from RESULT.json</code>",
+        "<code>ctid add NAME --model M.toml --from RESULT.json</code>",
         "Ports and variables that were compared",
         "\"variable_unit\":\"%\"",
         "\"ordinate_errors\":[null,0.1,0.2]",

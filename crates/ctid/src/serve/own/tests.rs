@@ -129,6 +129,44 @@ fn late() -> String {
     text
 }
 
+/// A name that no effect has is given to the missing term of the diagnosis; the term can be taken out and added again.
+#[test]
+fn the_missing_term_gets_a_name() {
+    let mut session = Session::new(None, None, Vec::new());
+    let name = "heated-block".to_string();
+    change(&mut session, Change::Example { name }).unwrap();
+    let data = session.data;
+    let own = session.own.as_mut().unwrap();
+    let found = r#"{ "model": "HeatedBlock", "steps": [], "record_numbers": { "shape(T,u)": { "low": 0.0, "width": 50.0 } },
+        "unknown": { "effect": "shape(T,u)", "parameters": [{ "name": "shape_T_u_h1", "value": 1.5 }] } }"#;
+    own.diagnosis = Some(Diagnosed {
+        id: 1,
+        text: own.text.clone(),
+        file: own.file.clone(),
+        data,
+        findings: Findings::of_text(found).unwrap(),
+        effects: Vec::new(),
+        body: json!({}),
+    });
+    let add = |session: &mut Session, effect: &str| {
+        let effect = effect.to_string();
+        change(session, Change::Add { effect }).map_err(|refused| refused.to_string())
+    };
+    let refused = add(&mut session, "k").unwrap_err();
+    assert!(refused.contains("`k` is a variable"), "{refused}");
+    add(&mut session, "heat_loss").unwrap();
+    let shown = state(&mut session)["own"].clone();
+    assert_eq!(shown["effects"], json!(["heat_loss"]), "{shown}");
+    assert_eq!(shown["functions"], json!({ "heat_loss": "shape(T,u)" }));
+    let file = shown["file"].as_str().unwrap();
+    assert!(file.contains("h1 = 1.5"), "{file}");
+    let effect = "heat_loss".to_string();
+    change(&mut session, Change::Remove { effect }).unwrap();
+    assert_eq!(state(&mut session)["own"]["effects"], json!([]));
+    add(&mut session, "heat_loss").unwrap();
+    assert_eq!(state(&mut session)["own"]["effects"], json!(["heat_loss"]));
+}
+
 /// The accepted effects outside a group are in the model of its experiment, and the experiment has the inputs' units.
 #[test]
 fn the_experiment_between_two_effects_of_a_group() {

@@ -120,20 +120,37 @@ function columns(state) {
   if (state.records.some((one) => one.error)) $("own-columns").open = true;
 }
 
+/** Adds an effect to the model file, or removes it, and fits the model again. */
+async function edit(doing, effect) {
+  try {
+    await flush();
+    forget();
+    await change({ do: doing, effect });
+    await server.run("compare");
+  } catch (error) {
+    complain(error);
+  }
+}
+
 const toggle = (own, effect, id) => {
   const on = own.effects.includes(effect);
-  const press = async () => {
-    try {
-      await flush();
-      forget();
-      await change({ do: on ? "remove" : "add", effect });
-      await server.run("compare");
-    } catch (error) {
-      complain(error);
-    }
-  };
+  const press = () => edit(on ? "remove" : "add", effect);
   return button(on ? "Remove" : "Add", { id, className: on ? "added" : "primary", ariaLabel: `${on ? "Remove" : "Add"} ${effect}` }, press);
 };
+
+// The field stays while the page is drawn again, with what was typed.
+const termName = make("input", { id: "own-keep-name", size: 12, autocomplete: "off", placeholder: "its name", spellcheck: false });
+termName.setAttribute("aria-label", "Name of the term; without one, the name of the function");
+termName.addEventListener("keydown", (event) => { if (event.key === "Enter") $("own-keep").click(); });
+
+/** The unexplained function becomes a term under a name of the user's choice; without a name it keeps its own. */
+function keep(own, effect) {
+  const kept = Object.entries(own.functions || {}).find(([name, one]) => one === effect && own.effects.includes(name))?.[0];
+  if (kept) return ["In the model as ", make("code", {}, kept), ". ", toggle(own, kept, "own-keep")];
+  if (own.effects.includes(effect)) return [toggle(own, effect, "own-keep")];
+  const press = () => edit("add", termName.value.trim() || effect);
+  return [termName, " ", button("Add", { id: "own-keep", className: "primary", ariaLabel: `Add ${effect} under this name` }, press)];
+}
 
 /** What a diagnosis found: the effects, each with its port in words, and the effects that cannot be distinguished from it. */
 function findings(own) {
@@ -214,7 +231,7 @@ export async function show(state) {
   if (!own.file_error && !own.text_error) {
     findings(own);
     ports(own);
-    unknown.show(own, (effect, id) => toggle(own, effect, id));
+    unknown.show(own, (effect) => keep(own, effect));
     experiment.show(state);
   } else {
     for (const part of ["own-ports-part", "own-unknown-part", "own-experiment-part"]) $(part).hidden = true;

@@ -4,14 +4,14 @@ import { $, fill, figure, make, plot, table, units } from "./dom.js";
 let shown = null;
 let drawing = null;
 
-/** `keep`: the button that puts the function into the model file, or takes it out. */
+/** `keep`: the field for a name and the button that put the function into the model file, or take it out. */
 export function show({ diagnosis: found }, keep) {
   const term = found?.unknown;
   $("own-unknown-part").hidden = !term;
   if (!term) { shown = drawing = null; return; }
   fill($("own-unknown-lead"),
     "The best function is ", make("code", {}, term.placed), ", of ", make("code", {}, term.variable), `. It is ${term.shown_term}`,
-    term.unit ? [", in ", ...units(term.unit)] : null, ". Keep it in the model until its physics is known: ", keep(term.effect, "own-keep"),
+    term.unit ? [", in ", ...units(term.unit)] : null, ". Keep it in the model until its physics is known: ", ...keep(term.effect),
     " or, on the command line, ", units(`\`${term.command}\``), ".");
   if (shown === found.id) return;
   shown = found.id;

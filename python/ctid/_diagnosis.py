@@ -61,7 +61,7 @@ class Diagnosis:
             ", ".join(f"{p['name']} = {p['value']:.4g} {p['unit']}".rstrip() for p in s["sizes"]) for s in singles
         ]
         for key in ("visibility", "smallest_visible"):
-            columns[key] = [s.get(key) for s in singles]
+            columns[key] = [float("nan") if s.get(key) is None else s[key] for s in singles]
         result: pd.DataFrame = table(columns)
         return result
 

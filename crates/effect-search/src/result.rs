@@ -97,7 +97,8 @@ pub struct Single {
     /// no such derivative (thresholds, quantisation), or if the size is not fitted.
     #[serde(default)]
     pub visibility: Option<f64>,
-    /// Minimum detectable size \[unit of the leading size\], with a false alarm rate of 1 % and a power of 90 % in a test of this size alone:
+    /// Minimum detectable size \[unit of the leading size\], with a false alarm rate of 1 % and a power of 90 % in a test of this size alone,
+    /// where other sizes are absent and shape parameters (an instant, a period) are known to have their fitted values:
     /// `(2.576 + 1.282)/|p|`, where `p` is the part of the signature that is not compensated, in standard deviations of the innovations.
     /// `None` also if the believed parameters compensate for all of the signature.
     #[serde(default)]

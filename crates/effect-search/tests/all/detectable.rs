@@ -3,12 +3,15 @@
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
+use ct_model::effects::{Visited, candidates};
 use ct_model::{Model, ModelSpec};
-use ct_signals::Record;
-use effect_search::{Diagnosis, Single, Verdict};
+use ct_signals::{Record, noise};
+use effect_search::{Diagnosis, Problem, Single, Verdict};
 use greybox::{FitOptions, ModelSetup};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
-use crate::records::{BLOCK, found, problem, record};
+use crate::records::{BLOCK, PAIR, ROWS, found, problem, record};
 
 /// Linear in its size: a drift of the reading over the record.
 const EFFECT: &str = "drift(y)";
@@ -79,6 +82,42 @@ fn effects_that_are_missing_do_not_raise_the_minimum_detectable_size() {
     let [bare, drifted] =
         [&*ADEQUATE, &drifting].map(|found| single(found, EFFECT).smallest_visible.unwrap());
     assert!((drifted / bare - 1.0).abs() < 0.1, "{bare} {drifted}");
+}
+
+/// Outputs are weighted by their noise, which has a memory.
+#[test]
+fn of_two_outputs_it_is_that_of_the_standard_error_in_coloured_noise() {
+    let mut record = record(PAIR, 0.6, 0.1, 5);
+    let noise = noise::ar1(ROWS, 0.5, 0.6, &mut ChaCha8Rng::seed_from_u64(6));
+    let values = record.outputs[1].values.iter_mut();
+    values.zip(noise).for_each(|(y, e)| *y += e);
+    let drifts = ["drift(y1)", "drift(y2)"];
+    let spec = ModelSpec::parse(PAIR).unwrap();
+    let others = candidates(&spec, &Visited::nominal(&spec)).into_iter();
+    let others = others.map(|candidate| candidate.id);
+    let problem = Problem::builder(spec, [record])
+        .left_out(others.filter(|id| !drifts.contains(&id.as_str())))
+        .build()
+        .unwrap();
+    let found = found(&problem);
+    assert_eq!(found.verdict, Verdict::Adequate);
+    assert!(
+        found
+            .noise
+            .iter()
+            .all(|noise| !noise.coefficients.is_empty())
+    );
+    let [first, second] = drifts.map(|effect| {
+        let single = single(&found, effect);
+        let smallest = single.smallest_visible.unwrap();
+        let by_error = 3.858 * single.sizes[0].std_error.unwrap();
+        assert!(
+            (smallest / by_error - 1.0).abs() < 0.15,
+            "{smallest} {by_error}"
+        );
+        smallest
+    });
+    assert!(second > 3.0 * first, "{first} {second}");
 }
 
 #[test]

@@ -47,7 +47,9 @@ class Diagnosis:
 
     @property
     def ranking(self) -> pd.DataFrame:
-        """The single effects that were fitted, the best first: `bic_gain` (larger is better), the error at each output, and the sizes in words."""
+        """The single effects that were fitted, the best first: `bic_gain` (larger is better), the error at each output, the sizes in words, the share
+        `visibility` of the effect that the fitted parameters do not compensate for, and the minimum detectable size `smallest_visible`, in the unit
+        of the first of the sizes."""
         singles = self._found["singles"]
         columns: dict[Any, list[Any]] = {
             "effect": [s["effect"] for s in singles],
@@ -58,6 +60,8 @@ class Diagnosis:
         columns["sizes"] = [
             ", ".join(f"{p['name']} = {p['value']:.4g} {p['unit']}".rstrip() for p in s["sizes"]) for s in singles
         ]
+        for key in ("visibility", "smallest_visible"):
+            columns[key] = [float("nan") if s.get(key) is None else s[key] for s in singles]
         result: pd.DataFrame = table(columns)
         return result
 

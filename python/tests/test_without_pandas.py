@@ -56,7 +56,7 @@ assert several["record"].tolist() == ["data 1"] * 200 + ["data 2"] * (len(time) 
 d = fit.diagnose(effort="quick", progress=False)
 assert "k" in names(d.params, "parameter", "value", "std_error")["parameter"]
 names(d.ladder, "added")
-names(d.ranking, "effect", "bic_gain")
+assert names(d.ranking, "effect", "bic_gain")["smallest_visible"].dtype == float
 plan = d.design(("lag(u)", "delay(u)"), {"u": (0.0, 100.0)}, effort="quick", progress=False)
 assert (np.diff(names(plan.experiment, "t [s]", "u")["t [s]"]) > 0.0).all()
 names(plan.experiments, "inputs", "decides")

@@ -9,6 +9,7 @@ use estimation::{Fit, Noise, moved_by_weighting};
 use greybox::{Robust, not_determined, weighted_rms};
 
 use crate::control_loop::{ControlLoop, NotSimulated, widened};
+use crate::detectable::leading;
 use crate::node::{Context, FINE, Node};
 use crate::output_step::output_steps;
 use crate::quantisation::quantisation;
@@ -100,13 +101,18 @@ pub(crate) fn assemble(
     let singles: Vec<Single> = grown
         .singles
         .iter()
-        .filter_map(|node| {
+        .zip(context.detectable(&grown.base, &grown.singles, &own.noise))
+        .filter_map(|(node, detectable)| {
             let candidate = &context.candidates[*node.added.last()?];
+            let mut sizes = sizes(node, candidate);
+            sizes.sort_by_key(|size| leading(candidate).is_none_or(|own| own.name != size.name));
             Some(Single {
                 effect: candidate.id.clone(),
-                sizes: sizes(node, candidate),
+                sizes,
                 bic_gain: node.gain_over(&grown.base),
                 rmse_per_output: named(&node.fit.rmse),
+                visibility: detectable.visibility,
+                smallest_visible: detectable.smallest,
             })
         })
         .collect();

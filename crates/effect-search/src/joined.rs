@@ -22,6 +22,15 @@ pub(crate) struct Columns {
     own: Vec<usize>,
 }
 
+impl Columns {
+    /// Positions of the columns that belong to the set.
+    pub fn known(&self) -> Vec<usize> {
+        let all = self.all.iter().enumerate();
+        all.filter_map(|(at, column)| matches!(column, Column::Known(_)).then_some(at))
+            .collect()
+    }
+}
+
 /// Rows of the candidate's model at a point.
 pub(crate) struct Joined<'a> {
     setup: &'a ModelSetup<'a>,

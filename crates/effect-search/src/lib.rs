@@ -9,6 +9,7 @@ mod assemble;
 mod believed;
 mod control_loop;
 pub mod design;
+mod detectable;
 mod diagnose;
 mod error;
 mod factor_score;

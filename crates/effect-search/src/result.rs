@@ -86,12 +86,23 @@ pub struct Step {
 pub struct Single {
     /// The effect.
     pub effect: String,
-    /// Parameters of the effect from a first fit.
+    /// Parameters of the effect from a first fit, the leading size first.
     pub sizes: Vec<Estimate>,
     /// Fall of the criterion; larger is better.
     pub bic_gain: f64,
     /// Simulation error by output \[unit of the output\].
     pub rmse_per_output: BTreeMap<String, f64>,
+    /// Share of the effect's signature that the believed parameters and initial states do not compensate for, 0 to 1. The signature is the
+    /// derivative of the outputs, whitened by [`Diagnosis::noise`], with respect to the leading size at its absent value. `None` if there is
+    /// no such derivative (thresholds, quantisation), or if the size is not fitted.
+    #[serde(default)]
+    pub visibility: Option<f64>,
+    /// Minimum detectable size \[unit of the leading size\], with a false alarm rate of 1 % and a power of 90 % in a test of this size alone,
+    /// where other sizes are absent and shape parameters (an instant, a period) are known to have their fitted values:
+    /// `(2.576 + 1.282)/|p|`, where `p` is the part of the signature that is not compensated, in standard deviations of the innovations.
+    /// `None` also if the believed parameters compensate for all of the signature.
+    #[serde(default)]
+    pub smallest_visible: Option<f64>,
 }
 
 /// A candidate of the model file that changes the outputs only as the model's own parameters do: its term is in the model already.

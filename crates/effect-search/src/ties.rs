@@ -40,7 +40,7 @@ enum Direction {
 /// Two columns are collinear if the sine of the angle between them is below this: derivatives are exact up to the tolerance of the simulation.
 const SAME_DIRECTION: f64 = 1e-4;
 /// A column of which the believed parameters explain all but this share has no direction of its own.
-const DEPENDENT: f64 = 1e-3;
+pub(crate) const DEPENDENT: f64 = 1e-3;
 
 impl Context<'_> {
     /// For each candidate, the first one with a collinear sensitivity; and the candidates of the model file that the model's own parameters

@@ -79,7 +79,7 @@ pub use residuals::{
 };
 pub use rows::Rows;
 pub use sandwich::{Robust, robust, robust_with_memory};
-pub use triangle::Triangle;
+pub use triangle::{Signature, Triangle};
 pub use weights::Squares;
 
 #[cfg(doctest)]

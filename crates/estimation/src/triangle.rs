@@ -2,10 +2,12 @@
 
 mod determined;
 mod outputs;
+mod signature;
 
 use serde::{Deserialize, Serialize};
 
 use self::outputs::{Outputs, ROUNDS, SAME_WEIGHTS};
+pub use self::signature::Signature;
 use crate::Squares;
 
 /// Rows are collected in blocks and processed by Householder reflections.

@@ -22,7 +22,8 @@ mod time_limit;
 pub use clock::common_clock;
 pub use error::Error;
 pub use estimation::{
-    Error as NoFit, Fit, Noise, Robust, Rows, Start, Stop, Stopping, Triangle, moved_by_weighting,
+    Error as NoFit, Fit, Noise, Robust, Rows, Signature, Start, Stop, Stopping, Triangle,
+    moved_by_weighting,
 };
 pub use feedback::{LinearPlant, Replay, replay};
 pub use fit::{

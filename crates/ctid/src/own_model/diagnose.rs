@@ -5,6 +5,7 @@ use effect_search::{Diagnosis, NotNoise, Options, Step, Thresholds, Verdict};
 
 use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
+use super::singles;
 use super::text::{failures, undetermined};
 use super::unknown;
 use super::words::{EffectWords, shown_unit};
@@ -14,9 +15,6 @@ use crate::numbers;
 use crate::sentences::of_gaps;
 use crate::sentences::remarks::{absorbed, rounding};
 use crate::terminal::without_50;
-
-/// Single effects that are listed.
-const LISTED: usize = 8;
 
 /// Searches the candidates.
 ///
@@ -54,7 +52,7 @@ pub(crate) fn said(
         text += &undetermined(not_determined, look);
         text += &fails(&diagnosis.model, first);
     }
-    text += &singles(diagnosis, look);
+    text += &singles::table(diagnosis, look);
     text += &errors(file, diagnosis, look);
     if let Some(last) = diagnosis.steps.last() {
         text += &estimates(last, look);
@@ -146,7 +144,8 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
             said_of(left)
         )),
         (None, Verdict::Adequate) => {
-            all.push("The residual of the model looks like noise.".to_string())
+            all.push("The residual of the model looks like noise.".to_string());
+            all.extend(singles::would_have_shown(diagnosis));
         }
         (None, _) => {
             all.push("The residual of the model with these effects looks like noise.".to_string())
@@ -254,28 +253,6 @@ fn said_of(left: &NotNoise) -> String {
             "the residual of {output} drifts: its correlation time is too long for the records to show whether it is noise"
         ),
     }
-}
-
-fn singles(diagnosis: &Diagnosis, look: Look) -> String {
-    let mut text = format!(
-        "{}\n",
-        look.heading(&format!(
-            "The best single effects of {} candidates, refitted",
-            diagnosis.candidates
-        ))
-    );
-    let mut rows = vec![vec!["effect".to_string(), "fall of BIC".to_string()]];
-    for single in diagnosis.singles.iter().take(LISTED) {
-        rows.push(vec![
-            single.effect.clone(),
-            numbers::significant(single.bic_gain, 3),
-        ]);
-    }
-    for line in table(&[Side::Left, Side::Right], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
-    text.push('\n');
-    text
 }
 
 /// Unit of an output.

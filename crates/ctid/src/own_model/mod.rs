@@ -27,6 +27,7 @@ pub(crate) mod ports;
 mod problem;
 pub(crate) mod report;
 mod simulate;
+mod singles;
 pub(crate) mod term;
 mod text;
 pub(crate) mod units;

@@ -145,9 +145,9 @@ pub fn diagnosed(
             bic_gain: single.bic_gain,
             rmse: only(&errors),
             weighted_rmse: weighted(&shown.outputs, &single.rmse_per_output, &floors),
-            visibility: f64::NAN,
+            visibility: single.visibility.unwrap_or(f64::NAN),
             size: single.sizes.first().map(parameter),
-            smallest_visible: None,
+            smallest_visible: single.smallest_visible,
         }
     });
     shown.scores = singles.collect();

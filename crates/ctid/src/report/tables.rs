@@ -200,7 +200,6 @@ pub(super) fn scores(diagnosis: &Diagnosis) -> String {
     } else {
         unit(&diagnosis.output_unit)
     };
-    // A user's own model has scores without signatures of the effects.
     let visible = diagnosis.scores.iter().any(|s| s.visibility.is_finite());
     let of_signature = |cell: String| if visible { cell } else { String::new() };
     let rows: String = diagnosis

@@ -112,6 +112,27 @@ fn a_comparison_says_where_the_model_fails() {
     );
 }
 
+/// The sentence of an adequate model names the four most likely effects with their minimum detectable sizes, with units.
+fn detectable_sizes_are_said(found: &Value, said: &str) {
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    let (_, sizes) = said.split_once("These records would have shown ").unwrap();
+    let singles = found["singles"].as_array().unwrap().iter();
+    let detectable = singles.filter(|single| single["smallest_visible"].is_number());
+    let mut count = 0;
+    for single in detectable.take(4) {
+        let effect = single["effect"].as_str().unwrap();
+        let (_, size) = sizes.split_once(&format!("{effect} of ")).unwrap();
+        let (number, rest) = size.split_once([' ', ',']).unwrap();
+        let shown: f64 = number.trim_end_matches('.').parse().unwrap();
+        let smallest = single["smallest_visible"].as_f64().unwrap();
+        assert!((shown / smallest - 1.0).abs() < 0.051, "{effect} {size}");
+        let unit = single["sizes"][0]["unit"].as_str().unwrap();
+        assert!(unit == "1" || rest.starts_with(unit), "{effect} {size}");
+        count += 1;
+    }
+    assert_eq!(count, 4);
+}
+
 #[test]
 fn what_a_diagnosis_finds_is_added_and_the_error_falls() {
     let place = place();
@@ -151,8 +172,12 @@ fn what_a_diagnosis_finds_is_added_and_the_error_falls() {
         );
     }
     // The effect belongs to the believed model now: nothing more is missing.
-    let again = place.result("diagnose a.csv --model m.toml");
+    let said =
+        place.succeeds("diagnose a.csv --model m.toml --json again.json --report again.html");
+    let again = place.json("again.json");
     assert_eq!(again["verdict"], "adequate");
+    detectable_sizes_are_said(&again, &said);
+    assert!(place.read("again.html").contains("Visible part"));
     let rmse = again["steps"][0]["rmse"].as_f64().unwrap();
     assert!((rmse / after - 1.0).abs() < 0.01, "{rmse} {after}");
 

@@ -4,6 +4,7 @@
 mod absorbed;
 mod at_a_bound;
 mod design;
+mod detectable;
 mod failures;
 mod gaps;
 mod heat;

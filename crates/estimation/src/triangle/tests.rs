@@ -249,3 +249,39 @@ fn combinations_are_groups() {
     });
     assert_eq!(joined, (4, vec![vec![0, 1, 2, 4]]));
 }
+
+#[test]
+fn a_signature_is_the_part_of_a_column_that_the_others_do_not_compensate_for() {
+    let (n, p, sigma) = (60, 3, 0.5);
+    // Two of four columns are the same, and the last one is that of the residual.
+    let rows = rows(n, p);
+    let mut triangle = Triangle::new(p + 2);
+    for row in &rows {
+        triangle.push(&[row[0], row[0], row[1], row[2], row[3]]);
+    }
+    triangle.finish();
+    let column = |k: usize| DVector::from_fn(n, |i, _| rows[i][k]);
+    let others = DMatrix::from_columns(&[column(0), column(1)]);
+    let fitted = others
+        .clone()
+        .svd(true, true)
+        .solve(&column(2), 1e-14)
+        .unwrap();
+    let own = (column(2) - others * fitted).norm() / sigma;
+    let signature = triangle.signature(3, &[0, 1, 2], sigma);
+    assert_relative_eq!(signature.own, own, max_relative = 1e-10);
+    assert_relative_eq!(
+        signature.whole,
+        column(2).norm() / sigma,
+        max_relative = 1e-10
+    );
+    let share = own * sigma / column(2).norm();
+    assert_relative_eq!(signature.visibility(), share, max_relative = 1e-10);
+    // 3.858 standard errors.
+    let error = (triangle.covariance(&[0, 2, 3]).unwrap()[2][2]).sqrt() * sigma;
+    let smallest = signature.smallest_detectable(1e-6).unwrap();
+    assert_relative_eq!(smallest, 3.858 * error, max_relative = 1e-10);
+    let absorbed = triangle.signature(0, &[1, 2], sigma);
+    assert_eq!(absorbed.smallest_detectable(1e-6), None);
+    assert!(absorbed.visibility() < 1e-6);
+}

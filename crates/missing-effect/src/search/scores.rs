@@ -1,7 +1,7 @@
 //! Results of adding each single effect of the catalogue to the believed model, and minimum detectable sizes.
 
 use ct_signals::ArModel;
-use greybox::Noise;
+use greybox::{Noise, Signature};
 use rayon::prelude::*;
 
 use crate::{
@@ -10,8 +10,6 @@ use crate::{
     fit::node::Node,
 };
 
-/// Minimum detectable size with a false alarm rate of 1 % and a power of 90 %, in standard errors.
-const VISIBLE: f64 = 2.576 + 1.282;
 /// An effect is not detectable if less than this share of its signature is independent of the fitted parameters.
 const ABSORBED: f64 = 1e-6;
 
@@ -24,7 +22,7 @@ pub(crate) fn scores(base: &Node, single: &[Node], noise: &Noise, floors: &[f64]
             let placed = *node.added.last()?;
             let (_, at) = node.size_of(placed)?;
             let parameters = step::parameters(&node.setup, &node.fit, &node.fit.std_errors());
-            let projected = signature(base, node, noise, &node.fit.scales());
+            let signature = signature(base, node, noise, &node.fit.scales());
             Some(Score {
                 effect: placed.effect.id.to_string(),
                 place: step::place_name(node, placed),
@@ -33,11 +31,9 @@ pub(crate) fn scores(base: &Node, single: &[Node], noise: &Noise, floors: &[f64]
                 weighted_rmse: node
                     .setup
                     .weighted_rms(&node.setup.residuals(&node.fit.x).ok()?, floors),
-                visibility: projected.map_or(f64::NAN, |(p, j)| if j > 0.0 { p / j } else { 0.0 }),
+                visibility: signature.map_or(f64::NAN, Signature::visibility),
                 size: parameters.get(at).cloned(),
-                smallest_visible: projected
-                    .filter(|(p, j)| *p > ABSORBED * j)
-                    .map(|(p, _)| VISIBLE / p),
+                smallest_visible: signature.and_then(|one| one.smallest_detectable(ABSORBED)),
             })
         })
         .collect()
@@ -55,20 +51,20 @@ pub(crate) fn detectable_size_ratio(base: &Node, single: &[Node], noise: &Noise)
     let mut ratios: Vec<f64> = single
         .par_iter()
         .filter_map(|node| {
-            let (own, all) = signature(base, node, noise, &innovations)?;
-            let (in_white, _) = signature(base, node, &white, &whole)?;
-            (own > ABSORBED * all).then(|| in_white / own)
+            let own = signature(base, node, noise, &innovations)?;
+            let in_white = signature(base, node, &white, &whole)?;
+            (own.visibility() > ABSORBED).then(|| in_white.own / own.own)
         })
         .collect();
     ratios.sort_by(f64::total_cmp);
     ratios.get(ratios.len() / 2).copied()
 }
 
-/// Length of the signature of an effect at its absent value, with and without the part that the base's own parameters compensate for, in
-/// standard deviations of the innovations (`scales`, of each output); `None` if there is no derivative.
+/// Signature of an effect at its absent value beside the base's own parameters, in standard deviations of the innovations (`scales`, of each
+/// output); `None` if there is no derivative.
 ///
 /// The scales are those of the fit: at the absent value the residuals hold the effect, and would make an output that it acts on count less.
-fn signature(base: &Node, node: &Node, noise: &Noise, scales: &[f64]) -> Option<(f64, f64)> {
+fn signature(base: &Node, node: &Node, noise: &Noise, scales: &[f64]) -> Option<Signature> {
     let (leading, at) = node.size_of(*node.added.last()?)?;
     if !leading.absent.is_finite() {
         return None;
@@ -84,7 +80,7 @@ fn signature(base: &Node, node: &Node, noise: &Noise, scales: &[f64]) -> Option<
     setup.known_scales = Some(scales.to_vec());
     let triangle = setup.linearise(&x, noise)?;
     let column = node.setup.free().iter().position(|&i| i == at)?;
-    let mut order: Vec<usize> = (0..node.setup.free().len())
+    let others: Vec<usize> = (0..node.setup.free().len())
         .filter(|&j| {
             j != column
                 && base
@@ -93,13 +89,8 @@ fn signature(base: &Node, node: &Node, noise: &Noise, scales: &[f64]) -> Option<
                     .contains(&node.setup.names()[node.setup.free()[j]])
         })
         .collect();
-    order.push(column);
-    let chosen = triangle.select(&order);
-    let last = order.len() - 1;
     // Outputs are weighted relative to the first one's noise.
-    let lengths = [chosen.at(last, last).abs(), chosen.column_norm(last)];
-    let [own, all] = lengths.map(|length| length / scales[0]);
-    Some((own, all))
+    Some(triangle.signature(column, &others, scales[0]))
 }
 
 #[cfg(test)]
@@ -135,9 +126,9 @@ mod tests {
         let error = scored[0].size.as_ref().unwrap().std_error.unwrap();
         let visible = scored[0].smallest_visible.unwrap();
         assert!(
-            (visible / (VISIBLE * error) - 1.0).abs() < 0.15,
+            (visible / (3.858 * error) - 1.0).abs() < 0.15,
             "{visible} beside {}",
-            VISIBLE * error
+            3.858 * error
         );
     }
 }

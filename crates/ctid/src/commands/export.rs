@@ -94,12 +94,7 @@ impl Export {
             records => format!("{} fitted to {}", exported.model, records.join(", ")),
         };
         let warnings = exported.warnings.iter();
-        let warned: String = warnings
-            .map(|warning| {
-                let words = look.paragraph("", &format!("warning: {warning}"));
-                look.warning(words.trim_end()) + "\n"
-            })
-            .collect();
+        let warned: String = warnings.map(|it| look.warning_paragraph(it)).collect();
         let text = input::notes(&summaries, look) + &look.paragraph("", &said) + &warned;
         finish(&exported, &text, &outputs, out, look)
     }

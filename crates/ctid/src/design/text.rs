@@ -3,14 +3,14 @@
 use missing_effect::design::{Alternative, Candidate, Design, Power};
 
 use crate::findings::{self, Reader};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::sentences::{self, with_unit};
 
 /// Number of experiments in the table.
 pub(crate) const SHOWN: usize = 10;
 /// Meaning of the table's columns.
-pub(crate) const NOTE: &str = "(power: the expected rise of the criterion of the wrong model; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; among experiments with ample power the first stays closest to the range of the records)";
+const NOTE: &str = "(power: the expected rise of the criterion of the wrong model; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; among experiments with ample power the first stays closest to the range of the records)";
 
 fn named(alternative: &Alternative) -> String {
     match &alternative.place {
@@ -96,14 +96,7 @@ fn experiments(design: &Design, look: Look) -> String {
         Side::Right,
         Side::Right,
     ];
-    let mut text = lines(&look.heading(&title), &sides, &rows);
-    text.pop();
-    let more = design.candidates.len().saturating_sub(SHOWN);
-    if more > 0 {
-        text += &format!("  {}\n", look.faint(format!("and {more} more")));
-    }
-    text += &look.faint(look.paragraph("  ", NOTE).trim_end());
-    text + "\n\n"
+    listed(&title, (&sides, &rows), design.candidates.len(), look)
 }
 
 fn row(number: &str, candidate: &Candidate, design: &Design) -> Vec<String> {
@@ -152,10 +145,23 @@ fn findings(design: &Design, look: Look) -> String {
     text
 }
 
-fn lines(heading: &str, sides: &[Side], rows: &[Vec<String>]) -> String {
-    let mut text = format!("{heading}\n");
-    for line in table(sides, rows) {
-        text += &format!("  {line}\n");
+/// A table under a heading.
+pub(crate) fn lines(heading: &str, sides: &[Side], rows: &[Vec<String>]) -> String {
+    format!("{heading}\n{}\n", table_text(sides, rows))
+}
+
+/// The table of the experiments, of which the first [`SHOWN`] of `count` are in the rows, and the meaning of its columns.
+pub(crate) fn listed(
+    title: &str,
+    (sides, rows): (&[Side], &[Vec<String>]),
+    count: usize,
+    look: Look,
+) -> String {
+    let mut text = format!("{}\n{}", look.heading(title), table_text(sides, rows));
+    let more = count.saturating_sub(SHOWN);
+    if more > 0 {
+        text += &format!("  {}\n", look.faint(format!("and {more} more")));
     }
-    text + "\n"
+    text += &look.faint(look.paragraph("  ", NOTE).trim_end());
+    text + "\n\n"
 }

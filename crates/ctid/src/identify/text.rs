@@ -5,7 +5,7 @@ mod facts;
 use linear_identification::{Identification, Order, deviation};
 
 pub(crate) use self::facts::{condition, facts, refined_facts};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
 use crate::sentences;
@@ -133,9 +133,7 @@ fn parameters(found: &Identification, look: Look) -> String {
     }
     let sides = [Side::Left, Side::Right, Side::Right, Side::Left, Side::Left];
     let mut text = format!("{}\n", look.heading(title));
-    for line in table(&sides, &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&sides, &rows);
     let note = match (&found.settings, &found.trajectory) {
         (Some(settings), _) => format!(
             "(memory {}, filters of {} 1/s, started from a time constant of {}; the last column is of the second half)",
@@ -222,9 +220,7 @@ fn drift(found: &Identification, look: Look) -> String {
     }
     let sides = [Side::Left, Side::Right, Side::Right, Side::Left, Side::Left];
     let mut text = format!("{}\n", look.heading("Drift with the level"));
-    for line in table(&sides, &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&sides, &rows);
     text += &look.paragraph("  ", &drift_verdict(found));
     text.push('\n');
     text

@@ -12,9 +12,9 @@ use super::effects::{every_candidate, find};
 use super::file::{OwnModelFile, Records};
 use super::problem::{blamed, problem};
 use super::words::{EffectWords, shown_unit};
-use crate::design::text::{NOTE, SHOWN, power};
+use crate::design::text::{self, SHOWN, lines, power};
 use crate::findings::Reader;
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side};
 use crate::output::Found;
 use crate::simulate::{cell, csv_text, header};
 use crate::{Error, numbers};
@@ -237,14 +237,7 @@ fn listed(file: &OwnModelFile, design: &Design, look: Look) -> String {
         Side::Right,
         Side::Right,
     ];
-    let mut text = lines(&look.heading(&title), &sides, &rows);
-    text.pop();
-    let more = design.experiments.len().saturating_sub(SHOWN);
-    if more > 0 {
-        text += &format!("  {}\n", look.faint(format!("and {more} more")));
-    }
-    text += &look.faint(look.paragraph("  ", NOTE).trim_end());
-    text + "\n\n"
+    text::listed(&title, (&sides, &rows), design.experiments.len(), look)
 }
 
 /// Course of the inputs that change.
@@ -348,12 +341,4 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         ));
     }
     all
-}
-
-fn lines(heading: &str, sides: &[Side], rows: &[Vec<String>]) -> String {
-    let mut text = format!("{heading}\n");
-    for line in table(sides, rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
-    text + "\n"
 }

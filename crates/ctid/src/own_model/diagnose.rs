@@ -9,7 +9,7 @@ use super::text::{failures, undetermined};
 use super::unknown;
 use super::words::{EffectWords, shown_unit};
 use crate::Error;
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::sentences::of_gaps;
 use crate::sentences::remarks::{absorbed, rounding};
@@ -271,9 +271,7 @@ fn singles(diagnosis: &Diagnosis, look: Look) -> String {
             numbers::significant(single.bic_gain, 3),
         ]);
     }
-    for line in table(&[Side::Left, Side::Right], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&[Side::Left, Side::Right], &rows);
     text.push('\n');
     text
 }
@@ -333,9 +331,7 @@ fn errors(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
     let sides: Vec<Side> = (0..rows[0].len())
         .map(|i| if i == 0 { Side::Left } else { Side::Right })
         .collect();
-    for line in table(&sides, &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&sides, &rows);
     let outputs = diagnosis.steps.iter().map(|step| step.outputs.as_slice());
     text + &state_rows(first) + &without_50(outputs, |name| unit_of(file, name), look)
 }
@@ -373,8 +369,6 @@ fn estimates(step: &Step, look: Look) -> String {
             vec![parameter.name.clone(), value, error, unit]
         })
         .collect();
-    for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows);
     text
 }

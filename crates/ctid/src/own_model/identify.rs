@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::controller::OwnController;
 use super::file::OwnModelFile;
 use crate::Error;
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::model_file::ControllerSettings;
 use crate::numbers;
 use crate::output::Found;
@@ -310,9 +310,7 @@ impl OwnTransferFunction {
             rows.push(vec![name, numbers::significant(value, 5), found, unit]);
         }
         let sides = [Side::Left, Side::Right, Side::Left, Side::Left];
-        for line in table(&sides, &rows) {
-            text += &format!("  {}\n", line.trim_end());
-        }
+        text += &table_text(&sides, &rows);
         let mut notes = Vec::new();
         if let Some((order, _)) = found
             && (order.n, order.m) != (n, m)

@@ -7,7 +7,7 @@ use super::compare::{Comparison, Curves};
 use super::diagnose::state_rows;
 use super::file::OwnModelFile;
 use super::fitted::cut_short;
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
 use crate::sentences::{FailureWords, of_gaps};
@@ -53,9 +53,7 @@ pub(crate) fn said(file: &OwnModelFile, comparison: &Comparison, look: Look) -> 
         rows.push(row);
     }
     text += &format!("{}\n", look.heading("Simulation error, root mean square"));
-    for line in table(&[Side::Left, Side::Right, Side::Right], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&[Side::Left, Side::Right, Side::Right], &rows);
     text += &state_rows(step);
     let outputs = std::iter::once(step.outputs.as_slice());
     text += &without_50(outputs, |name| comparison.unit_of(name), look);
@@ -79,9 +77,7 @@ pub(crate) fn said(file: &OwnModelFile, comparison: &Comparison, look: Look) -> 
         vec![parameter.name.clone(), value, error, parameter.unit.clone()]
     });
     let rows: Vec<Vec<String>> = rows.collect();
-    for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows);
     if let Some(cut) = cut_short(&comparison.effort) {
         text += &look.warning(format!("warning: {cut}"));
         text.push('\n');
@@ -173,8 +169,7 @@ pub(super) fn undetermined(found: &[Vec<String>], look: Look) -> String {
                 all.join(", ")
             ),
         };
-        text += &look.warning(look.paragraph("", &format!("warning: {what}")).trim_end());
-        text.push('\n');
+        text += &look.warning_paragraph(what);
     }
     text
 }

@@ -3,7 +3,7 @@
 use effect_search::Unknown;
 
 use super::words::{EffectWords, shown_unit};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::term_file::of_curve;
 
@@ -53,9 +53,7 @@ pub(super) fn values(unknown: &Unknown, look: Look) -> String {
         ]);
     }
     let mut text = format!("\n{}\n", look.heading(&unknown.effect));
-    for line in table(&[Side::Right; 3], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&[Side::Right; 3], &rows);
     text
 }
 

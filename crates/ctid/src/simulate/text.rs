@@ -1,7 +1,7 @@
 //! Text output of a simulation.
 
 use super::{Simulated, SimulatedOutput, StateSource, header};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
 
@@ -62,19 +62,14 @@ pub(crate) fn said(simulated: &Simulated, look: Look) -> String {
         Side::Right,
         Side::Left,
     ];
-    for line in table(&sides, &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&sides, &rows);
     if !simulated.fitted_to.is_empty() {
         text += &format!("\n{}\n", look.heading("Parameters, with standard errors"));
         let rows: Vec<Vec<String>> = simulated.parameters.iter().map(parameter).collect();
-        for line in table(&[Side::Left, Side::Right, Side::Left], &rows) {
-            text += &format!("  {}\n", line.trim_end());
-        }
+        text += &table_text(&[Side::Left, Side::Right, Side::Left], &rows);
     }
     for warning in &simulated.warnings {
-        let words = format!("warning: {warning}");
-        text += &(look.warning(look.paragraph("", &words).trim_end()) + "\n");
+        text += &look.warning_paragraph(warning);
     }
     text
 }

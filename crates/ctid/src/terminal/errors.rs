@@ -4,7 +4,7 @@ use effect_search::OutputStep;
 use missing_effect::Diagnosis;
 
 use super::{BAR, compared, model_name, step_name, with_unit};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::sentences::of_noise_source;
 use crate::{findings, numbers};
 
@@ -150,9 +150,7 @@ impl Errors<'_> {
             rows.push(row);
         }
         let mut text = format!("{}\n", look.heading(self.title));
-        for line in table(&sides, &rows) {
-            text += &format!("  {line}\n");
-        }
+        text += &table_text(&sides, &rows);
         text
     }
 }

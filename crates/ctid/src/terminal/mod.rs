@@ -11,7 +11,7 @@ pub(crate) use self::curves::{overlay, residuals};
 pub(crate) use self::errors::{trail, without_50};
 pub(crate) use self::ranking::ranking;
 use crate::findings::{self, Reader};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot;
 use crate::sentences::{self, with_unit};
@@ -102,9 +102,7 @@ pub(crate) fn header(diagnosis: &Diagnosis, look: Look) -> String {
         Side::Left,
     ];
     let mut text = format!("{}\n", look.heading(&base_name(diagnosis)));
-    for line in table(&sides, &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&sides, &rows);
     text.push('\n');
     text
 }
@@ -248,9 +246,7 @@ pub(crate) fn parameters(diagnosis: &Diagnosis, step: &Step, look: Look) -> Stri
         "{}\n",
         look.heading(&format!("Parameters of {model}, with standard errors"))
     );
-    for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows);
     if step.starts > 1 {
         text += &format!(
             "  {}\n",
@@ -311,9 +307,7 @@ fn rankings(diagnosis: &Diagnosis, look: Look) -> String {
     rows.extend(ranked.into_iter().map(|(rank, a, b)| vec![rank, a, b]));
     let mut text = format!("{}\n", look.heading("Two rankings"));
     text += &look.paragraph("  ", findings::RANKINGS_DISAGREE);
-    for line in table(&[Side::Right, Side::Left, Side::Left], &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&[Side::Right, Side::Left, Side::Left], &rows);
     text.push('\n');
     text
 }

@@ -257,8 +257,8 @@ impl Arguments {
                 limits.ranges.insert(name.clone(), *range);
             }
         }
-        let inputs = model.base.inputs.iter();
-        let all: Vec<String> = inputs.map(|input| input.about.name.clone()).collect();
+        let inputs = model.base.about_inputs();
+        let all: Vec<String> = inputs.map(|about| about.name.clone()).collect();
         let alone = match (&limits.inputs[..], &all[..]) {
             ([one], _) | ([], [one]) => Some(one.clone()),
             _ => None,

@@ -135,11 +135,7 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
     let noise = setup
         .output_noise(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
-    let outputs: Vec<&ct_model::About> = spec
-        .outputs
-        .iter()
-        .map(|output| spec.about(output.variable))
-        .collect();
+    let outputs: Vec<&ct_model::About> = spec.about_outputs().collect();
     let named = |rms: &[f64]| -> BTreeMap<String, f64> {
         let pairs = outputs.iter().zip(rms);
         pairs

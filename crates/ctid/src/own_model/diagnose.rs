@@ -278,9 +278,7 @@ fn singles(diagnosis: &Diagnosis, look: Look) -> String {
 
 /// Unit of an output.
 fn unit_of<'a>(file: &'a OwnModelFile, output: &str) -> &'a str {
-    let outputs = file.base.outputs.iter();
-    let mut outputs = outputs.map(|output| file.base.about(output.variable));
-    let own = outputs.find(|about| about.name == output);
+    let own = file.base.about_outputs().find(|about| about.name == output);
     own.map_or("", |about| about.unit.as_str())
 }
 

@@ -169,9 +169,8 @@ pub(crate) fn export(
         .outputs
         .iter()
         .map(|name| Heading::of(name).name);
-    let input_units = spec.inputs.iter().map(|input| input.about.unit.clone());
-    let output_units = spec.outputs.iter();
-    let output_units = output_units.map(|output| spec.about(output.variable).unit.clone());
+    let input_units = spec.about_inputs().map(|u| u.unit.clone());
+    let output_units = spec.about_outputs().map(|y| y.unit.clone());
     let path = |name: &str| {
         let own = paths.iter().find(|path| {
             path.file_name()

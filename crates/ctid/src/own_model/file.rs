@@ -250,11 +250,8 @@ impl OwnModelFile {
         let ColumnFault::Missing { wanted, .. } = &**fault else {
             return error.into();
         };
-        let spec = self.model.spec();
-        let inputs = spec.inputs.iter().map(|input| &input.about);
-        let outputs = spec.outputs.iter().map(|o| spec.about(o.variable));
         let columns = self.columns.inputs.iter().chain(&self.columns.outputs);
-        let mut signals = columns.zip(inputs.chain(outputs));
+        let mut signals = columns.zip(self.signals());
         let own = signals.find(|(column, _)| *wanted == format!("\"{}\"", quoted(column)));
         match own {
             None => error.into(),
@@ -286,12 +283,7 @@ impl OwnModelFile {
     /// Inputs and outputs in the order of the model.
     pub fn signals(&self) -> impl Iterator<Item = &About> {
         let spec = self.model.spec();
-        let inputs = spec.inputs.iter().map(|input| &input.about);
-        inputs.chain(
-            spec.outputs
-                .iter()
-                .map(|output| spec.about(output.variable)),
-        )
+        spec.about_inputs().chain(spec.about_outputs())
     }
 
     /// Seconds in one unit of the time column, as the model file declares it or, where it does not, the header of the first record.

@@ -321,14 +321,13 @@ impl FittedModel {
 
     /// Scores of each output, from its error and the scored readings.
     fn scores(&self, errors: impl Iterator<Item = (f64, Vec<f64>)>) -> Vec<OutputScore> {
-        let spec = self.model.model.spec();
-        let outputs = spec.outputs.iter().zip(errors);
-        let outputs = outputs.map(|(output, (rmse, values))| {
+        let outputs = self.model.model.spec().about_outputs().zip(errors);
+        let outputs = outputs.map(|(about, (rmse, values))| {
             let count = values.len() as f64;
             let mean = values.iter().sum::<f64>() / count;
             let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
             OutputScore {
-                output: spec.about(output.variable).name.clone(),
+                output: about.name.clone(),
                 rmse,
                 fit_percent: 100.0 * (1.0 - rmse / (squares / count).sqrt()),
             }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ct_model::{Linearity, TransferFunction, Variable};
+use ct_model::{Linearity, TransferFunction};
 use ct_signals::{Columns, Hold, Record, quoted};
 use serde::Serialize;
 
@@ -83,14 +83,8 @@ impl<'f> OneByOne<'f> {
                 ),
             ));
         }
-        let inputs: Vec<&str> = (0..spec.inputs.len())
-            .map(|i| spec.about(Variable::Input(i)).name.as_str())
-            .collect();
-        let outputs: Vec<&str> = spec
-            .outputs
-            .iter()
-            .map(|output| spec.about(output.variable).name.as_str())
-            .collect();
+        let inputs: Vec<&str> = spec.about_inputs().map(|u| u.name.as_str()).collect();
+        let outputs: Vec<&str> = spec.about_outputs().map(|y| y.name.as_str()).collect();
         let chosen = |what: &str, names: &[&str], wanted: Option<&str>| match (wanted, names) {
             (_, []) => Err(Error::file(
                 path,

@@ -139,12 +139,12 @@ pub(super) fn simulated(
         .outputs
         .iter()
         .map(|name| Heading::of(name).name);
-    let outputs = spec.outputs.iter().zip(names).zip(mean).enumerate();
-    let outputs = outputs.map(|(o, ((output, name), mean))| {
+    let outputs = spec.about_outputs().zip(names).zip(mean).enumerate();
+    let outputs = outputs.map(|(o, ((about, name), mean))| {
         let band = errors.as_ref().zip(known.as_ref());
         SimulatedOutput {
             name,
-            unit: spec.about(output.variable).unit.clone(),
+            unit: about.unit.clone(),
             band: band.map(|(errors, known)| Band::of(&errors[o], known, o, level)),
             mean,
             measured: record.outputs[o].values.clone(),

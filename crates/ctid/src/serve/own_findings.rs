@@ -1,6 +1,6 @@
 //! Diagnosis of a user's own model for the page: the effects, their ports in the model, and the fall of the error.
 
-use ct_model::{About, ModelSpec, Variable};
+use ct_model::{About, ModelSpec};
 use effect_search::{Diagnosis, Step};
 use serde_json::{Value, json};
 
@@ -43,11 +43,7 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
         values.map(|rmse| numbers::significant(*rmse, 3)).collect()
     };
     let units = |name: &String| {
-        let spec = &model.base;
-        let mut outputs = spec
-            .outputs
-            .iter()
-            .map(|output| spec.about(output.variable));
+        let mut outputs = model.base.about_outputs();
         outputs
             .find(|about| about.name == *name)
             .map_or(String::new(), |about| about.unit.clone())
@@ -99,12 +95,9 @@ pub(super) fn ports(model: &OwnModelFile, found: &[String]) -> Value {
 }
 
 fn listed(spec: &ModelSpec) -> Vec<(Site, &About)> {
-    let inputs = (0..spec.inputs.len()).map(Variable::Input);
-    let inputs = inputs.map(|v| (Site::Input(spec.about(v).name.clone()), spec.about(v)));
-    let outputs = spec
-        .outputs
-        .iter()
-        .map(|output| spec.about(output.variable));
+    let inputs = spec.about_inputs();
+    let inputs = inputs.map(|about| (Site::Input(about.name.clone()), about));
+    let outputs = spec.about_outputs();
     let outputs = outputs.map(|about| (Site::Output(about.name.clone()), about));
     let states = spec.states.iter().map(|state| &state.about);
     let states = states.map(|about| (Site::Equation(about.name.clone()), about));

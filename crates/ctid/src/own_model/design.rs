@@ -10,7 +10,8 @@ use serde::Serialize;
 
 use super::effects::{every_candidate, find};
 use super::file::{OwnModelFile, Records};
-use super::problem::{blamed, problem};
+use super::fitted::blame;
+use super::problem::problem;
 use super::words::{EffectWords, shown_unit};
 use crate::design::text::{self, SHOWN, lines, power};
 use crate::findings::Reader;
@@ -47,7 +48,7 @@ pub fn design(
         effect_search::Error::Design(refused) if refused != NoExperiment::OutOfTime => {
             Error::Usage(refused.to_string())
         }
-        error => blamed(&problem, &error),
+        error => blame(&problem.records, &error),
     })
 }
 

@@ -1,10 +1,11 @@
 //! Diagnosis of a user's own model.
 
-use ct_signals::Clock;
+use ct_signals::{Clock, record_names};
 use effect_search::{Diagnosis, NotNoise, Options, Step, Thresholds, Verdict};
 
 use super::file::{OwnModelFile, Records};
-use super::problem::{blamed, problem};
+use super::fitted::blame;
+use super::problem::problem;
 use super::text::{failures, undetermined};
 use super::unknown;
 use super::words::{EffectWords, shown_unit};
@@ -29,7 +30,8 @@ pub fn diagnose(
     progress: &(dyn Fn(effect_search::Progress) + Sync),
 ) -> Result<Diagnosis, Error> {
     let problem = problem(file, records)?;
-    effect_search::diagnose(&problem, options, progress).map_err(|error| blamed(&problem, &error))
+    effect_search::diagnose(&problem, options, progress)
+        .map_err(|error| blame(&problem.records, &error))
 }
 
 /// Text output of a diagnosis.
@@ -43,8 +45,7 @@ pub(crate) fn said(
     let mut text = format!("{}\n\n", look.heading(&diagnosis.model));
     let fails = |name: &str, step: &Step| {
         let clock = Clock::of(&records.records);
-        let mut fitted: Vec<&str> = records.records.iter().map(|r| r.name.as_str()).collect();
-        fitted.dedup();
+        let fitted = record_names(&records.records);
         failures(name, step, (&clock, &fitted), |y| unit_of(file, y), look)
     };
     let mut not_determined: &[Vec<String>] = &[];

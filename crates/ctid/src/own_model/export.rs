@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use ct_model::{Expression, Given, ModelSpec};
-use ct_signals::{Heading, ReadSummary, Record};
+use ct_signals::{Heading, ReadSummary, record_names};
 use greybox::FitOptions;
 use serde::Serialize;
 
@@ -91,15 +91,12 @@ impl FittedModel {
         }
         let mut head = vec![format!(
             "Written by ctid export from {source}, fitted to {}.",
-            names_of(own).join(", ")
+            record_names(own).join(", ")
         )];
         head.push("Standard errors (fitted values are below):".to_string());
         for (i, parameter) in spec.parameters.iter().enumerate() {
             let (name, unit) = (&parameter.about.name, &parameter.about.unit);
-            let error = known.as_ref().and_then(|known| {
-                let at = known.entries.iter().position(|entry| *entry == i)?;
-                Some(known.covariance[at][at].sqrt())
-            });
+            let error = known.as_ref().and_then(|known| known.std_error(i));
             let said = match error {
                 Some(error) => format!("{} {unit}", numbers::significant(error, 3)),
                 None if parameter.given != Given::Fitted || file.known.contains_key(name) => {
@@ -114,13 +111,6 @@ impl FittedModel {
         }
         Ok(commented(&head, &spec))
     }
-}
-
-/// The names of records; parts of one file once.
-fn names_of(records: &[Record]) -> Vec<String> {
-    let mut names: Vec<String> = records.iter().map(|record| record.name.clone()).collect();
-    names.dedup();
-    names
 }
 
 /// The model with the values of its text and of `[known]` or, with records, those of a fit to them.
@@ -159,16 +149,9 @@ pub(crate) fn export(
         return Err(blame(own, &greybox::Error::Stopped));
     };
     let outputs = spec.outputs.len();
-    let input_names = file
-        .columns
-        .inputs
-        .iter()
-        .map(|name| Heading::of(name).name);
-    let output_names = file
-        .columns
-        .outputs
-        .iter()
-        .map(|name| Heading::of(name).name);
+    let name = |column: &String| Heading::of(column).name;
+    let input_names = file.columns.inputs.iter().map(name);
+    let output_names = file.columns.outputs.iter().map(name);
     let input_units = spec.about_inputs().map(|u| u.unit.clone());
     let output_units = spec.about_outputs().map(|y| y.unit.clone());
     let path = |name: &str| {
@@ -187,7 +170,7 @@ pub(crate) fn export(
             model: model.to_vec(),
         });
     }
-    exported.fitted_to = names_of(own);
+    exported.fitted_to = record_names(own).into_iter().map(String::from).collect();
     exported.curves = Some(Curves {
         inputs: input_names.zip(input_units).collect(),
         outputs: output_names.zip(output_units).collect(),

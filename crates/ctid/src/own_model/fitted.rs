@@ -1,10 +1,11 @@
 //! A user's own model fitted to records: the basis of comparisons, simulations and exports.
 
+use std::fmt::Display;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use ct_signals::{Columns, Reading, Record};
+use ct_signals::{Columns, Reading, Record, record_names};
 use effect_search::{ControlLoop, Options, held_out, widened};
 use greybox::{
     Fit, FitOptions, FitUncertainty, ModelSetup, Robust, SimulatedLoop, TimeLimit,
@@ -255,7 +256,8 @@ impl FittedModel {
             return Ok(None);
         }
         let moved = moved_by_weighting(setup, &self.fit, noise_order, stopping);
-        let moved = moved.map_err(|error| blame(&self.records.records, &error.into()))?;
+        let moved =
+            moved.map_err(|error| blame(&self.records.records, &greybox::Error::from(error)))?;
         Ok(Some(moved))
     }
 
@@ -348,12 +350,10 @@ fn setup_of<'a>(model: &'a OwnModelFile, records: &'a Records) -> Result<ModelSe
     setup.map_err(|error| blame(&records.records, &error))
 }
 
-/// An error of the computation, with its records.
-pub(super) fn blame(records: &[Record], error: &greybox::Error) -> Error {
-    let mut names: Vec<&str> = records.iter().map(|r| r.name.as_str()).collect();
-    names.dedup();
+/// An error of a computation or of a search, with its records.
+pub(super) fn blame(records: &[Record], error: &impl Display) -> Error {
     Error::File {
-        file: names.join(", "),
+        file: record_names(records).join(", "),
         what: error.to_string(),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ct_signals::{Heading, ReadSummary, Record};
+use ct_signals::{Heading, ReadSummary, Record, record_names};
 use greybox::{FitOptions, FitUncertainty, InitialStates, ModelSetup, output_errors};
 
 use super::file::{OwnModelFile, Records};
@@ -150,26 +150,18 @@ pub(super) fn simulated(
             measured: record.outputs[o].values.clone(),
         }
     });
-    let std_errors = |i: usize| {
-        let known = known.as_ref()?;
-        let at = known.entries.iter().position(|entry| *entry == i)?;
-        Some(known.covariance[at][at].sqrt())
-    };
-    let mut fitted_to: Vec<String> = fitted.map_or_else(Vec::new, |fitted| {
-        let records = fitted.records().records.iter();
-        records.map(|record| record.name.clone()).collect()
-    });
-    fitted_to.dedup();
+    let std_error = |i: usize| known.as_ref()?.std_error(i);
+    let fitted_to = fitted.map_or_else(Vec::new, |fitted| record_names(&fitted.records().records));
     let names = spec.parameters.iter().map(|p| p.about.name.clone());
     Ok(Simulated {
         schema: 1,
         model: spec.name.clone(),
         inputs: record.name.clone(),
-        fitted_to,
+        fitted_to: fitted_to.into_iter().map(String::from).collect(),
         parameters: names
             .zip(parameters)
             .enumerate()
-            .map(|(i, (name, value))| (name, value, std_errors(i)))
+            .map(|(i, (name, value))| (name, value, std_error(i)))
             .collect(),
         states: spec
             .states

@@ -223,11 +223,7 @@ fn simulated(
             )
         }
     };
-    let std_error = |i: usize| {
-        let known = uncertainty?;
-        let at = known.entries.iter().position(|entry| *entry == i)?;
-        Some(known.covariance[at][at].sqrt())
-    };
+    let std_error = |i: usize| uncertainty?.std_error(i);
     let names = setup.names();
     let mut warnings = Vec::new();
     if lacking {

@@ -91,11 +91,8 @@ pub(crate) fn export(
         let model = fitted.setup.simulate(&fitted.fit.x)?.output;
         let names = fitted.setup.names().iter().cloned();
         let values: Vec<_> = names.zip(fitted.fit.x.iter().copied()).collect();
-        let errors = (0..fitted.setup.parameter_count()).map(|i| {
-            let known = fitted.uncertainty?;
-            let at = known.entries.iter().position(|entry| *entry == i)?;
-            Some(known.covariance[at][at].sqrt())
-        });
+        let std_error = |i: usize| fitted.uncertainty?.std_error(i);
+        let errors = (0..fitted.setup.parameter_count()).map(std_error);
         let errors: Vec<Option<f64>> = errors.collect();
         Ok((
             fitted.setup.records.to_vec(),

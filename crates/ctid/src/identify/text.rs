@@ -203,10 +203,7 @@ fn drift(found: &Identification, look: Look) -> String {
         let Some(ends) = over_level.ends() else {
             continue;
         };
-        let [low, high] = ends.map(|(value, error)| {
-            let (value, error) = numbers::value_and_error(value, Some(error));
-            error.map_or(value.clone(), |error| format!("{value} ± {error}"))
-        });
+        let [low, high] = ends.map(|(value, error)| numbers::with_error(value, Some(error)));
         let apart = format!(
             "{} std. errors",
             numbers::decimals(over_level.difference.abs(), 1)

@@ -17,6 +17,7 @@ use crate::design::text::{self, SHOWN, lines, power};
 use crate::findings::Reader;
 use crate::look::{Look, Side};
 use crate::output::Found;
+use crate::sentences::{interval, with_unit};
 use crate::simulate::{cell, csv_text, header};
 use crate::{Error, numbers};
 
@@ -145,9 +146,7 @@ fn alternatives(design: &Design, look: Look) -> String {
 }
 
 fn range(low: f64, high: f64, unit: &str) -> String {
-    let unit = shown_unit(unit);
-    let (low, high) = (numbers::significant(low, 3), numbers::significant(high, 3));
-    format!("{low} .. {high} {unit}").trim_end().to_string()
+    interval((low, high), " .. ", shown_unit(unit))
 }
 
 /// Length and inputs with their permitted changes: `33 min, u 0 .. 36 % (visited)`.
@@ -155,9 +154,8 @@ pub(crate) fn limits(design: &Design) -> String {
     let of = |limits: &InputRange| {
         let from = if limits.visited { " (visited)" } else { "" };
         let slew = limits.slew.map_or(String::new(), |slew| {
-            let unit = shown_unit(&limits.unit);
-            let slew = format!("{} {unit}", numbers::significant(slew, 3));
-            format!(", at most {} a second", slew.trim_end())
+            let slew = with_unit(&numbers::significant(slew, 3), shown_unit(&limits.unit));
+            format!(", at most {slew} a second")
         });
         format!(
             "{} {}{from}{slew}",
@@ -317,11 +315,8 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         })
         .filter_map(|input| {
             let value = numbers::significant(*input.values.first()?, 3);
-            Some(
-                format!("{} = {value} {}", input.input, shown_unit(&input.unit))
-                    .trim_end()
-                    .to_string(),
-            )
+            let value = format!("{} = {value}", input.input);
+            Some(with_unit(&value, shown_unit(&input.unit)))
         })
         .collect();
     if !design.twins() && !held.is_empty() {

@@ -14,6 +14,7 @@ use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::sentences::of_gaps;
 use crate::sentences::remarks::{absorbed, rounding};
+use crate::sentences::with_unit;
 use crate::terminal::without_50;
 
 /// Single effects that are listed.
@@ -190,11 +191,8 @@ pub(crate) fn sizes(diagnosis: &Diagnosis, effect: &str) -> Vec<String> {
         .flat_map(|last| &last.parameters)
         .filter(|p| p.effect.as_deref() == Some(effect));
     own.map(|p| {
-        let (value, error) = numbers::value_and_error(p.value, p.std_error);
-        let error = error.map_or(String::new(), |error| format!(" ± {error}"));
-        format!("{} = {value}{error} {}", p.name, shown_unit(&p.unit))
-            .trim_end()
-            .to_string()
+        let value = numbers::with_error(p.value, p.std_error);
+        with_unit(&format!("{} = {value}", p.name), shown_unit(&p.unit))
     })
     .collect()
 }
@@ -349,7 +347,8 @@ pub(super) fn state_rows(step: &Step) -> String {
     format!("  held out: without {whose} that the initial states are fitted to\n")
 }
 
-fn estimates(step: &Step, look: Look) -> String {
+/// Table of the parameters and initial states of a model.
+pub(super) fn estimates(step: &Step, look: Look) -> String {
     let mut text = format!(
         "\n{}\n",
         look.heading("Parameters and initial states, with standard errors")

@@ -295,10 +295,8 @@ impl OwnTransferFunction {
             let (found, unit) = match identified {
                 None => ("-".to_string(), String::new()),
                 Some(parameter) => {
-                    let (value, error) =
-                        numbers::value_and_error(parameter.value, parameter.std_error);
-                    let error = error.map_or(String::new(), |error| format!(" ± {error}"));
-                    (value + &error, parameter.unit.clone())
+                    let value = numbers::with_error(parameter.value, parameter.std_error);
+                    (value, parameter.unit.clone())
                 }
             };
             rows.push(vec![name, numbers::significant(value, 5), found, unit]);

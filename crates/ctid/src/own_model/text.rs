@@ -4,7 +4,7 @@ use ct_signals::Clock;
 use effect_search::Step;
 
 use super::compare::{Comparison, Curves};
-use super::diagnose::state_rows;
+use super::diagnose::{estimates, state_rows};
 use super::file::OwnModelFile;
 use super::fitted::cut_short;
 use crate::look::{Look, Side, table_text};
@@ -63,21 +63,7 @@ pub(crate) fn said(file: &OwnModelFile, comparison: &Comparison, look: Look) -> 
             numbers::significant(step.weighted_rmse, 3)
         );
     }
-    text += &format!(
-        "\n{}\n",
-        look.heading("Parameters and initial states, with standard errors")
-    );
-    let rows = step.parameters.iter().map(|parameter| {
-        let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
-        let error = match error {
-            Some(error) => format!("± {error}"),
-            None if parameter.known => "(known)".to_string(),
-            None => "(at a bound, or not determined)".to_string(),
-        };
-        vec![parameter.name.clone(), value, error, parameter.unit.clone()]
-    });
-    let rows: Vec<Vec<String>> = rows.collect();
-    text += &table_text(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows);
+    text += &estimates(step, look);
     if let Some(cut) = cut_short(&comparison.effort) {
         text += &look.warning(format!("warning: {cut}"));
         text.push('\n');

@@ -14,7 +14,7 @@ use crate::findings::{self, Reader};
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot;
-use crate::sentences::{self, with_unit};
+use crate::sentences::{self, interval, placed, with_unit};
 
 /// Number of findings about where a model fails.
 pub(crate) const FAILURES: usize = 5;
@@ -115,13 +115,7 @@ fn length(record: &Shown) -> f64 {
 }
 
 fn range(values: &[f64], unit: &str) -> String {
-    let (low, high) = plot::limits([values]);
-    let text = format!(
-        "{} .. {} {unit}",
-        numbers::significant(low, 3),
-        numbers::significant(high, 3)
-    );
-    text.trim_end().to_string()
+    interval(plot::limits([values]), " .. ", unit)
 }
 
 /// The plant with the effects that the model file already has.
@@ -150,13 +144,6 @@ fn model_name(diagnosis: &Diagnosis, step: &Step) -> String {
     }
 }
 
-fn placed(effect: &str, place: Option<&str>) -> String {
-    match place {
-        Some(place) => format!("{effect} ({place})"),
-        None => effect.to_string(),
-    }
-}
-
 /// Sentences about where a model fails, output by output.
 pub(crate) fn failures(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
     let outputs = step.outputs.iter();
@@ -174,7 +161,7 @@ fn failures_of(
 ) -> String {
     let name = step_name(diagnosis, step);
     let title = match diagnosis.verdict {
-        Verdict::Adequate if !compared(diagnosis) => {
+        Verdict::Adequate if !findings::is_comparison(diagnosis) => {
             format!("Tests of the residual of {name}")
         }
         _ => format!("Where {name} fails"),
@@ -312,15 +299,10 @@ fn rankings(diagnosis: &Diagnosis, look: Look) -> String {
     text
 }
 
-/// Whether no effect was scored: a comparison.
-fn compared(diagnosis: &Diagnosis) -> bool {
-    diagnosis.scores.is_empty() && diagnosis.steps.len() < 2
-}
-
 /// The verdict and its sentences.
 pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
     let headline = match diagnosis.verdict {
-        _ if compared(diagnosis) => {
+        _ if findings::is_comparison(diagnosis) => {
             look.strong("`ctid diagnose` says whether anything is missing, and what")
         }
         Verdict::Adequate => look.good("The model is adequate"),

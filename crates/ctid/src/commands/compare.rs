@@ -7,11 +7,10 @@ use clap::{Args, ValueEnum};
 use greybox::FitOptions;
 use missing_effect::Options;
 
-use super::{Results, finish};
+use super::{Results, finish, plant_options};
 use crate::effort::EffortLevel;
 use crate::input::excitation;
 use crate::input::{self, Files, Input, ReadArguments};
-use crate::interrupt;
 use crate::look::Look;
 use crate::output::Kind;
 use crate::own_model::report::{self, Paged};
@@ -98,9 +97,7 @@ impl Compare {
     fn options(&self) -> Options<'static> {
         Options {
             simulate_loop: self.way != Some(LoopWay::Measured),
-            time_limit: Some(self.effort.limit()),
-            interrupt: Some(interrupt::flag()),
-            ..Options::default()
+            ..plant_options(self.effort)
         }
     }
 

@@ -114,6 +114,32 @@ impl AnyModelFile {
 }
 
 impl AnyModelFile {
+    /// The path of the model text that the file names.
+    pub(crate) fn text(&self) -> Option<&Path> {
+        match self {
+            Self::Plant(_) => None,
+            Self::Own(file) => Some(&file.text),
+        }
+    }
+
+    /// Checks that there are records for a plant, whose file holds no values; `path`: its name, `option`: how records are given.
+    pub(crate) fn require_records(
+        &self,
+        path: &Path,
+        records: &[PathBuf],
+        option: &str,
+    ) -> Result<(), Error> {
+        match (self, records) {
+            (Self::Plant(_), []) => Err(Error::file(
+                path,
+                format!(
+                    "a model file of a plant holds first guesses, no values: give the records that it is fitted to, {option}"
+                ),
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// Warning about a loop that the file declares and that is not simulated; empty if there is none.
     pub fn loop_said(&self, look: Look) -> String {
         match self {

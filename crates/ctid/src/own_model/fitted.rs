@@ -45,6 +45,16 @@ pub struct FitLimit<'a> {
     pub interrupt: Option<&'a AtomicBool>,
 }
 
+impl<'a> FitLimit<'a> {
+    /// The limit of a search of a plant.
+    pub(crate) fn of(options: &missing_effect::Options<'a>) -> Self {
+        Self {
+            time: options.time_limit,
+            interrupt: options.interrupt,
+        }
+    }
+}
+
 /// Agreement of a simulation with a measured output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutputScore {

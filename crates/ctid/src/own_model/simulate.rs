@@ -10,7 +10,7 @@ use super::fitted::{FitLimit, FittedModel};
 use crate::Error;
 use crate::simulate::{
     Band, Inputs, LEVEL, ReadInputs, Simulated, SimulatedOutput, StateSource, begins_with_readings,
-    first_readings, read_inputs,
+    of_first_readings, read_inputs,
 };
 
 /// Simulates the model on the inputs of a record, after a fit to other records if there are any.
@@ -134,11 +134,8 @@ pub(super) fn simulated(
             Some(errors.ok_or_else(|| runs_away(&setup, record, path, &x, &spec.name))?)
         }
     };
-    let names = file
-        .columns
-        .outputs
-        .iter()
-        .map(|name| Heading::of(name).name);
+    let names = file.columns.outputs.iter();
+    let names = names.map(|name| Heading::of(name).name);
     let outputs = spec.about_outputs().zip(names).zip(mean).enumerate();
     let outputs = outputs.map(|(o, ((about, name), mean))| {
         let band = errors.as_ref().zip(known.as_ref());
@@ -189,36 +186,18 @@ fn states(
 ) -> Result<(InitialStates, StateSource), greybox::Error> {
     let count = parameters.len();
     let entries: &[usize] = known.map_or(&[], |known| &known.entries);
-    let mut rows = first;
-    while begins_with_readings(record) {
-        let begun = [first_readings(record, rows)];
-        let frozen = setup.held_out(&begun, parameters)?;
-        match known {
-            None => {
-                let x = frozen.fit_states(options)?;
-                let states = InitialStates::known(x[count..].to_vec(), 0);
-                return Ok((states, StateSource::Readings));
-            }
-            Some(known) => {
-                let model = setup.with_records(&begun)?;
-                let x: Vec<f64> = [parameters, &frozen.start()[count..]].concat();
-                let states = InitialStates::of_readings(
-                    &frozen,
-                    &model,
-                    &x,
-                    count,
-                    known,
-                    options.stopping,
-                )?;
-                if let Some(states) = states {
-                    return Ok((states, StateSource::Readings));
-                }
-            }
-        }
-        if begun[0].len() >= record.len() {
-            break;
-        }
-        rows *= 2;
+    let fitted = of_first_readings((record, first), |begun| {
+        let frozen = setup.held_out(begun, parameters)?;
+        let Some(known) = known else {
+            let x = frozen.fit_states(options)?;
+            return Ok(Some(InitialStates::known(x[count..].to_vec(), 0)));
+        };
+        let model = setup.with_records(begun)?;
+        let x: Vec<f64> = [parameters, &frozen.start()[count..]].concat();
+        InitialStates::of_readings(&frozen, &model, &x, count, known, options.stopping)
+    })?;
+    if let Some(states) = fitted {
+        return Ok((states, StateSource::Readings));
     }
     let states = InitialStates::of_text(setup.model(), parameters, entries);
     Ok((states, StateSource::Text))

@@ -84,6 +84,13 @@ pub(crate) fn plot(
     text + &look.faint(ticks) + "\n"
 }
 
+/// A plot of measured values, if there are any, and of the model's output over a record of a length in seconds.
+pub(crate) fn overlay(measured: &[f64], model: &[f64], length: f64, look: Look) -> String {
+    let curves = [(measured, MEASURED), (model, MODEL)];
+    let curves = curves.map(|(values, colour)| Curve { values, colour });
+    plot(&curves, (0.0, length), limits([measured, model]), 9, look)
+}
+
 /// A curve in braille, its corner at the lower left.
 fn drawn(points: &[(f32, f32)], width: usize, height: usize) -> String {
     let shape = Shape::Lines(points);

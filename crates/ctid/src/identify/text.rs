@@ -7,8 +7,9 @@ use linear_identification::{Identification, Order, deviation};
 pub(crate) use self::facts::{condition, facts, refined_facts};
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
-use crate::plot::{self, Curve, plot};
+use crate::plot;
 use crate::sentences;
+use crate::simulate::header;
 
 /// The whole of it.
 #[must_use]
@@ -78,34 +79,14 @@ pub(crate) fn model(found: &Identification) -> String {
 
 fn overlay(found: &Identification, look: Look) -> String {
     let shown = &found.shown;
-    let curves = [
-        Curve {
-            values: &shown.output.values,
-            colour: plot::MEASURED,
-        },
-        Curve {
-            values: &shown.simulated,
-            colour: plot::MODEL,
-        },
-    ];
-    let limits = plot::limits([shown.output.values.as_slice(), &shown.simulated]);
     let (Some(first), Some(last)) = (shown.time.first(), shown.time.last()) else {
         return String::new();
     };
     format!(
-        "{}{}\n{}\n",
-        look.heading("Measured and simulated"),
-        bracketed(&shown.output.unit),
-        plot(&curves, (0.0, last - first), limits, 9, look)
+        "{}\n{}\n",
+        header(&look.heading("Measured and simulated"), &shown.output.unit),
+        plot::overlay(&shown.output.values, &shown.simulated, last - first, look)
     )
-}
-
-fn bracketed(unit: &str) -> String {
-    if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" [{unit}]")
-    }
 }
 
 fn parameters(found: &Identification, look: Look) -> String {

@@ -11,6 +11,7 @@ use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
 use crate::sentences::{FailureWords, of_gaps};
+use crate::simulate::header;
 use crate::terminal::{FAILURES, residual_tests, without_50};
 
 /// The complete comparison, with a plot of the first record.
@@ -173,32 +174,18 @@ fn drawn(curves: &Curves, look: Look) -> String {
         [first, .., last] => last - first,
         _ => 0.0,
     };
-    let in_unit = if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" [{unit}]")
-    };
     let residual: Vec<f64> = measured.iter().zip(model).map(|(y, m)| y - m).collect();
-    let both = [
-        Curve {
-            values: measured,
-            colour: plot::MEASURED,
-        },
-        Curve {
-            values: model,
-            colour: plot::MODEL,
-        },
-    ];
     let one = [Curve {
         values: &residual,
         colour: plot::RESIDUAL,
     }];
-    let limits = plot::limits([measured.as_slice(), model]);
     let own = plot::limits([residual.as_slice()]);
     let title = look.heading(&format!("{record}, {output}:"));
     format!(
-        "{title} measured and model{in_unit}\n{}\nMeasured minus model{in_unit}\n{}\n",
-        plot(&both, (0.0, length), limits, 9, look),
+        "{title} {}\n{}\n{}\n{}\n",
+        header("measured and model", unit),
+        plot::overlay(measured, model, length, look),
+        header("Measured minus model", unit),
         plot(&one, (0.0, length), own, 5, look)
     )
 }

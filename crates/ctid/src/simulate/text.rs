@@ -3,7 +3,7 @@
 use super::{Simulated, SimulatedOutput, StateSource, header};
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
-use crate::plot::{self, Curve, plot};
+use crate::plot;
 
 /// The whole of it.
 pub(crate) fn said(simulated: &Simulated, look: Look) -> String {
@@ -100,31 +100,14 @@ fn states(simulated: &Simulated) -> String {
 }
 
 fn drawn(output: &SimulatedOutput, length: f64, look: Look) -> String {
-    let mut curves = Vec::new();
-    let measured = output.measured.iter().any(|y| !y.is_nan());
-    if measured {
-        curves.push(Curve {
-            values: &output.measured,
-            colour: plot::MEASURED,
-        });
-    }
-    curves.push(Curve {
-        values: &output.mean,
-        colour: plot::MODEL,
-    });
-    let limits = if measured {
-        plot::limits([output.mean.as_slice(), &output.measured])
-    } else {
-        plot::limits([output.mean.as_slice()])
-    };
-    let what = if measured {
-        "measured and model"
-    } else {
-        "model"
+    let is_measured = output.measured.iter().any(|y| !y.is_nan());
+    let (what, measured) = match is_measured {
+        true => ("measured and model", output.measured.as_slice()),
+        false => ("model", &[][..]),
     };
     format!(
         "{} {what}\n{}\n",
         look.heading(&format!("{}:", header(&output.name, &output.unit))),
-        plot(&curves, (0.0, length), limits, 9, look)
+        plot::overlay(measured, &output.mean, length, look)
     )
 }

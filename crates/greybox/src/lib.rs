@@ -24,7 +24,7 @@ pub use error::Error;
 pub use estimation::{
     Error as NoFit, Fit, Noise, Robust, Rows, Start, Stop, Stopping, Triangle, moved_by_weighting,
 };
-pub use feedback::{LinearPlant, Replay, replay};
+pub use feedback::{LinearPlant, Replay, replay, spectral_radius};
 pub use fit::{
     FitOptions, coloured, fit, fit_from, fit_initial_levels, fit_onward, noise_of, prewhitened,
     robust,

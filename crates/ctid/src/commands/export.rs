@@ -66,7 +66,7 @@ impl Export {
             AnyModelFile::Own(model) => {
                 let records = match self.data.is_empty() {
                     true => None,
-                    false => Some((model.records(&files)?, &self.data[..])),
+                    false => Some((model.records(&files)?, &files)),
                 };
                 own_model::export(&model, records, &FitOptions::default(), limit)
             }

@@ -5,7 +5,7 @@ use ct_signals::{Heading, ReadSummary};
 use missing_effect::{Options, Problem};
 
 use super::plant_text::AtPorts;
-use super::{Curves, FittedRecord, TimeColumn};
+use super::{Curves, FittedRecord};
 use crate::Error;
 use crate::input::{Files, Input};
 use crate::model_file::ModelFile;
@@ -118,19 +118,6 @@ pub(crate) fn export(
             Some(at_ports.fitted(&problem, &records, read, &errors, (files, options))?)
         }
     };
-    let mut all = Vec::new();
-    for (record, model) in records.into_iter().zip(model.chunks(outputs.len())) {
-        let path = files
-            .data
-            .iter()
-            .find(|path| files.name_of(path) == record.name);
-        let path = path.unwrap_or(&files.data[0]);
-        all.push(FittedRecord {
-            time: TimeColumn::of(path, &columns, &record)?,
-            record,
-            model: model.to_vec(),
-        });
-    }
     let exported = Exported {
         schema: 1,
         model: name,
@@ -140,7 +127,7 @@ pub(crate) fn export(
         curves: Some(Curves {
             inputs,
             outputs,
-            records: all,
+            records: FittedRecord::all(&records, &model, (files, &columns))?,
         }),
     };
     Ok((exported, summaries))

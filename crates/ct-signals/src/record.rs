@@ -314,6 +314,14 @@ impl Record {
     }
 }
 
+/// Smallest and largest of some values, NaN aside; infinite, and in the wrong order, if there are none.
+#[must_use]
+pub fn range_of<'a>(values: impl IntoIterator<Item = &'a f64>) -> (f64, f64) {
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let values = values.into_iter();
+    values.fold(none, |(low, high), v| (low.min(*v), high.max(*v)))
+}
+
 /// The names of records; parts of one record, which follow each other, once.
 #[must_use]
 pub fn record_names(records: &[Record]) -> Vec<&str> {

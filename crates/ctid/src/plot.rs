@@ -1,6 +1,7 @@
 //! A small plot for the terminal, drawn in braille dots.
 
 use console::{Color, Style};
+use ct_signals::range_of;
 use textplots::{Chart, Plot, Shape};
 
 use crate::look::Look;
@@ -155,9 +156,7 @@ pub(crate) fn limits<'a>(series: impl IntoIterator<Item = &'a [f64]>) -> (f64, f
         .into_iter()
         .flatten()
         .filter(|value| value.is_finite());
-    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
-        (low.min(value), high.max(value))
-    });
+    let (low, high) = range_of(all);
     if low <= high { (low, high) } else { (0.0, 1.0) }
 }
 

@@ -195,13 +195,8 @@ fn in_words(file: &OwnModelFile, design: &Design, experiment: &Experiment) -> Sh
         Some(_) => Kind::Again.name().to_string(),
         None => applied(design, experiment),
     };
-    let unit = |name: &str| {
-        let mut signals = file.signals();
-        let about = signals.find(|about| about.name == name);
-        about.map_or("", |about| about.unit.as_str())
-    };
     let reaches = experiment.reaches.iter().map(|reach| {
-        let to = range(reach.low, reach.high, unit(&reach.output));
+        let to = range(reach.low, reach.high, file.unit_of(&reach.output));
         format!("{} {to}", reach.output)
     });
     ShownExperiment {

@@ -47,7 +47,7 @@ pub(crate) fn said(
     let fails = |name: &str, step: &Step| {
         let clock = Clock::of(&records.records);
         let fitted = record_names(&records.records);
-        failures(name, step, (&clock, &fitted), |y| unit_of(file, y), look)
+        failures(name, step, (&clock, &fitted), |y| file.unit_of(y), look)
     };
     let mut not_determined: &[Vec<String>] = &[];
     if let Some(first) = diagnosis.steps.first() {
@@ -275,12 +275,6 @@ fn singles(diagnosis: &Diagnosis, look: Look) -> String {
     text
 }
 
-/// Unit of an output.
-fn unit_of<'a>(file: &'a OwnModelFile, output: &str) -> &'a str {
-    let own = file.base.about_outputs().find(|about| about.name == output);
-    own.map_or("", |about| about.unit.as_str())
-}
-
 /// The error of each step at each output.
 fn errors(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
     let mut text = format!("{}\n", look.heading("Simulation error, root mean square"));
@@ -330,7 +324,7 @@ fn errors(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
         .collect();
     text += &table_text(&sides, &rows);
     let outputs = diagnosis.steps.iter().map(|step| step.outputs.as_slice());
-    text + &state_rows(first) + &without_50(outputs, |name| unit_of(file, name), look)
+    text + &state_rows(first) + &without_50(outputs, |name| file.unit_of(name), look)
 }
 
 /// Number of rows for the fit of the held-out records' initial states.

@@ -312,6 +312,12 @@ impl OwnModelFile {
         spec.about_inputs().chain(spec.about_outputs())
     }
 
+    /// Unit of an input or output; empty if there is none of this name.
+    pub(crate) fn unit_of(&self, signal: &str) -> &str {
+        let own = self.signals().find(|about| about.name == signal);
+        own.map_or("", |about| about.unit.as_str())
+    }
+
     /// Seconds in one unit of the time column, as the model file declares it or, where it does not, the header of the first record.
     ///
     /// # Errors

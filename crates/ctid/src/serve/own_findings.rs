@@ -42,12 +42,6 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
         let values = step.rmse_per_output.values();
         values.map(|rmse| numbers::significant(*rmse, 3)).collect()
     };
-    let units = |name: &String| {
-        let mut outputs = model.base.about_outputs();
-        outputs
-            .find(|about| about.name == *name)
-            .map_or(String::new(), |about| about.unit.clone())
-    };
     let steps = found.steps.iter().map(|step| {
         let name = step
             .added
@@ -63,7 +57,7 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
         "headline": diagnosis_heading(found),
         "sentences": diagnosis_remaining(model, found),
         "groups": groups.collect::<Vec<_>>(),
-        "outputs": outputs.iter().map(|name| json!({ "name": name, "unit": units(name) })).collect::<Vec<_>>(),
+        "outputs": outputs.iter().map(|name| json!({ "name": name, "unit": model.unit_of(name) })).collect::<Vec<_>>(),
         "steps": steps.collect::<Vec<_>>(),
         "unknown": found.unknown.as_ref().map(|unknown| missing_term(&words, unknown)),
         "compared": COMPARED,

@@ -122,6 +122,18 @@ impl ModelSpec {
         }
     }
 
+    /// Attributes of the inputs, in order.
+    pub fn about_inputs(&self) -> impl Iterator<Item = &About> + Clone {
+        self.inputs.iter().map(|input| &input.about)
+    }
+
+    /// Attributes of the outputs, in order.
+    pub fn about_outputs(&self) -> impl Iterator<Item = &About> + Clone {
+        self.outputs
+            .iter()
+            .map(|output| self.about(output.variable))
+    }
+
     /// All variables: parameters, inputs, states, flows.
     pub fn variables(&self) -> impl Iterator<Item = Variable> + use<> {
         let parameters = (0..self.parameters.len()).map(Variable::Parameter);

@@ -91,7 +91,8 @@ pub use gaps::Gaps;
 pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
 pub use quote::{escaped, quoted, shown};
 pub use record::{
-    Channel, Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, interpolated, require_samples,
+    Channel, Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, interpolated, range_of, record_names,
+    require_samples,
 };
 pub use stationary_noise::{CovarianceSum, StationaryNoise};
 pub use stationary_whitener::StationaryWhitener;

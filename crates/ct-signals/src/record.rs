@@ -314,6 +314,22 @@ impl Record {
     }
 }
 
+/// Smallest and largest of some values, NaN aside; infinite, and in the wrong order, if there are none.
+#[must_use]
+pub fn range_of<'a>(values: impl IntoIterator<Item = &'a f64>) -> (f64, f64) {
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let values = values.into_iter();
+    values.fold(none, |(low, high), v| (low.min(*v), high.max(*v)))
+}
+
+/// The names of records; parts of one record, which follow each other, once.
+#[must_use]
+pub fn record_names(records: &[Record]) -> Vec<&str> {
+    let mut names: Vec<&str> = records.iter().map(|record| record.name.as_str()).collect();
+    names.dedup();
+    names
+}
+
 /// Checks that records have enough samples of an output to fit `parameters` parameters to all of them together (the initial states of
 /// each included): [`ROWS_PER_PARAMETER`] for each, and never fewer than [`MIN_ROWS`].
 ///
@@ -329,10 +345,8 @@ pub fn require_samples(records: &[Record], parameters: usize) -> Result<(), Erro
     if rows >= needed {
         return Ok(());
     }
-    let mut names: Vec<&str> = records.iter().map(|record| record.name.as_str()).collect();
-    names.dedup();
     Err(Error::TooFewRows {
-        record: names.join(" and "),
+        record: record_names(records).join(" and "),
         rows,
         needed,
         why: match records.iter().any(|record| samples(record) < record.len()) {

@@ -7,7 +7,7 @@ use ct_model::{About, Given, Linearity, Method, Model, ModelSpec, Variable};
 use ct_signals::{escaped, shown};
 
 use crate::Error;
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::model_file;
 use crate::numbers;
 use crate::own_model::{self, AnyModelFile, units};
@@ -116,9 +116,7 @@ pub(crate) fn said(model: &ModelSpec, look: Look) -> String {
         }
         text += &format!("\n{}\n", look.heading(title));
         let sides = [Side::Left, Side::Left, Side::Left, Side::Left, Side::Left];
-        for line in table(&sides, &rows) {
-            text += &format!("  {}\n", line.trim_end());
-        }
+        text += &table_text(&sides, &rows);
     };
     let states = model.states.iter().map(|state| {
         let start = format!("start {}", model.write(&state.start));

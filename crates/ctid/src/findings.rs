@@ -138,6 +138,11 @@ pub(crate) fn percent(part: f64) -> String {
     }
 }
 
+/// Whether no effect was scored: a comparison.
+pub(crate) fn is_comparison(diagnosis: &Diagnosis) -> bool {
+    diagnosis.scores.is_empty() && diagnosis.steps.len() < 2
+}
+
 /// `Mostly overflow: 62 % of the squared error above the noise floor (55 % on held-out data); what remains: ...`
 pub(crate) fn partial_headline(diagnosis: &Diagnosis) -> String {
     let acceptance = diagnosis.acceptance.as_ref();

@@ -2,7 +2,7 @@
 
 use ct_model::effects::{DescribedParameter, Effect, Place, all_effects};
 
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::symptoms::{Sought, best};
 
 /// An effect with the names of its port: `lag(u)`.
@@ -196,9 +196,7 @@ impl Sheet {
         let mut rows = vec![heading.map(|name| look.faint(name)).to_vec()];
         rows.extend(self.parameters.iter().map(|row| row.to_vec()));
         let sides = [Side::Left, Side::Left, Side::Right, Side::Left];
-        for line in table(&sides, &rows) {
-            text += &format!("  {line}\n");
-        }
+        text += &table_text(&sides, &rows);
         text.push('\n');
         if let Some(effect) = self.effect {
             let confused = match effect.confused_with {

@@ -77,6 +77,12 @@ impl Look {
         self.paint(Style::new().bold().yellow(), text)
     }
 
+    /// A warning on as many lines as it needs.
+    pub(crate) fn warning_paragraph(self, what: impl Display) -> String {
+        let lines = self.paragraph("", &format!("warning: {what}"));
+        self.warning(lines.trim_end()) + "\n"
+    }
+
     /// Text in a style.
     pub(crate) fn paint(self, style: Style, text: impl Display) -> String {
         style.force_styling(self.colour).apply_to(text).to_string()
@@ -142,6 +148,12 @@ pub(crate) fn table(sides: &[Side], rows: &[Vec<String>]) -> Vec<String> {
             cells.join("  ").trim_end().to_string()
         })
         .collect()
+}
+
+/// A [`table`] as text, indented by two blanks.
+pub(crate) fn table_text(sides: &[Side], rows: &[Vec<String>]) -> String {
+    let lines = table(sides, rows).into_iter();
+    lines.map(|line| format!("  {line}\n")).collect()
 }
 
 #[cfg(test)]

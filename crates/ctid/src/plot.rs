@@ -1,6 +1,7 @@
 //! A small plot for the terminal, drawn in braille dots.
 
 use console::{Color, Style};
+use ct_signals::range_of;
 use textplots::{Chart, Plot, Shape};
 
 use crate::look::Look;
@@ -84,6 +85,13 @@ pub(crate) fn plot(
     text + &look.faint(ticks) + "\n"
 }
 
+/// A plot of measured values, if there are any, and of the model's output over a record of a length in seconds.
+pub(crate) fn overlay(measured: &[f64], model: &[f64], length: f64, look: Look) -> String {
+    let curves = [(measured, MEASURED), (model, MODEL)];
+    let curves = curves.map(|(values, colour)| Curve { values, colour });
+    plot(&curves, (0.0, length), limits([measured, model]), 9, look)
+}
+
 /// A curve in braille, its corner at the lower left.
 fn drawn(points: &[(f32, f32)], width: usize, height: usize) -> String {
     let shape = Shape::Lines(points);
@@ -148,9 +156,7 @@ pub(crate) fn limits<'a>(series: impl IntoIterator<Item = &'a [f64]>) -> (f64, f
         .into_iter()
         .flatten()
         .filter(|value| value.is_finite());
-    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
-        (low.min(value), high.max(value))
-    });
+    let (low, high) = range_of(all);
     if low <= high { (low, high) } else { (0.0, 1.0) }
 }
 

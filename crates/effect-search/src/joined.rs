@@ -137,15 +137,6 @@ impl Residuals for Joined<'_> {
         Some(())
     }
 
-    fn each_residual(
-        &self,
-        x: &[f64],
-        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
-    ) -> Option<()> {
-        let last = self.columns.len();
-        self.each_row(x, |sample, row| each(sample, &mut row[last..]))
-    }
-
     fn floor(&self, output: usize) -> f64 {
         self.setup.floor(output)
     }

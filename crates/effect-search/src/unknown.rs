@@ -128,8 +128,7 @@ impl Context<'_> {
         let Some(candidate) = self.last_of(&best) else {
             return Ok(None);
         };
-        let outputs = node.spec().outputs.iter();
-        let names = outputs.map(|output| node.spec().about(output.variable).name.clone());
+        let names = node.spec().about_outputs().map(|y| y.name.clone());
         let places = all.iter().map(|(set, share)| PortScore {
             effect: self.last_of(set).map_or_else(String::new, |c| c.id.clone()),
             bic_gain: set.gain_over(&base),

@@ -42,9 +42,6 @@
 //!         }
 //!         Some(())
 //!     }
-//!     fn each_residual(&self, x: &[f64], mut each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()> {
-//!         self.each_row(x, |sample, row| each(sample, &mut row[2..]))
-//!     }
 //! }
 //!
 //! let lines = Lines { y: [vec![1.1, 2.9, 5.0, 7.0], vec![0.3, 1.6, 4.2, 6.1]] };

@@ -38,8 +38,15 @@ pub trait Residuals: Sync {
     /// then the result is `None`, as for a model that is not finite.
     fn each_row(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()>;
 
-    /// Rows of the residual alone, without derivatives.
-    fn each_residual(&self, x: &[f64], each: impl FnMut(Sample, &mut [f64]) -> bool) -> Option<()>;
+    /// Rows of the residual alone. The default computes the derivatives too; a model that is faster without them replaces it.
+    fn each_residual(
+        &self,
+        x: &[f64],
+        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
+    ) -> Option<()> {
+        let last = self.free().len();
+        self.each_row(x, |sample, row| each(sample, &mut row[last..]))
+    }
 
     /// BIC penalty of the fitted parameters, with this number of noise coefficients: the logarithm of the number of samples for each
     /// parameter, including the scales of the outputs' noise.

@@ -125,13 +125,8 @@ pub fn ideal_records(
             .map_err(|_| NotIdeal::Simulation)?;
         let channel =
             |(about, values): (&About, Vec<f64>)| Channel::new(&about.name, &about.unit, values);
-        let names = spec.inputs.iter().map(|input| &input.about);
-        let inputs = names.zip(inputs).map(channel).collect();
-        let names = spec
-            .outputs
-            .iter()
-            .map(|output| spec.about(output.variable));
-        let outputs = names.zip(outputs).map(channel).collect();
+        let inputs = spec.about_inputs().zip(inputs).map(channel).collect();
+        let outputs = spec.about_outputs().zip(outputs).map(channel).collect();
         records.push(Record::sampled("ideal", interval, inputs, outputs));
     }
     let setup = ModelSetup::new(model, &records, known, 1.0).map_err(|_| NotIdeal::Simulation)?;

@@ -25,7 +25,7 @@ pub use estimation::{
     Error as NoFit, Fit, Noise, Robust, Rows, Signature, Start, Stop, Stopping, Triangle,
     moved_by_weighting,
 };
-pub use feedback::{LinearPlant, Replay, replay};
+pub use feedback::{LinearPlant, Replay, replay, spectral_radius};
 pub use fit::{
     FitOptions, coloured, fit, fit_from, fit_initial_levels, fit_onward, noise_of, prewhitened,
     robust,

@@ -90,6 +90,13 @@ impl FitUncertainty {
         }))
     }
 
+    /// Standard error of an entry of the vector \[its unit\]; `None` if it has none.
+    #[must_use]
+    pub fn std_error(&self, entry: usize) -> Option<f64> {
+        let at = self.entries.iter().position(|own| *own == entry)?;
+        Some(self.covariance[at][at].sqrt())
+    }
+
     /// Half the width of the band with coverage `level` (0.95, say), in standard errors.
     #[must_use]
     pub fn quantile(&self, level: f64) -> f64 {

@@ -1,7 +1,7 @@
 //! Whether the readings of records are whole multiples of one number, and of which: exactly, as after a converter, or with additional
 //! noise.
 
-use ct_signals::Record;
+use ct_signals::{Record, range_of};
 
 use crate::reading_grid;
 
@@ -95,11 +95,7 @@ struct FirstLook {
 impl FirstLook {
     /// For at most `most_steps` over the range of the readings, with at most `most_readings` of them; `None` if they have no range.
     fn of(all: &[f64], most_steps: f64, most_readings: usize) -> Option<Self> {
-        let (low, high) = all
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
-                (low.min(*y), high.max(*y))
-            });
+        let (low, high) = range_of(all);
         let (span, reach) = (high - low, low.abs().max(high.abs()));
         if !(span > 0.0 && reach.is_finite()) {
             return None;

@@ -31,9 +31,6 @@ pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Smallest and largest of all finite values; 0 and 1 if there are none.
 pub(crate) fn limits(values: &[f64]) -> (f64, f64) {
-    let finite = values.iter().filter(|value| value.is_finite());
-    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
-        (low.min(value), high.max(value))
-    });
+    let (low, high) = ct_signals::range_of(values.iter().filter(|value| value.is_finite()));
     if low <= high { (low, high) } else { (0.0, 1.0) }
 }

@@ -42,6 +42,15 @@ pub fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Option<St
     }
 }
 
+/// A value and its standard error in one text, `21.30 ± 0.12`; the value alone without an error.
+#[must_use]
+pub fn with_error(value: f64, std_error: Option<f64>) -> String {
+    match value_and_error(value, std_error) {
+        (value, Some(error)) => format!("{value} ± {error}"),
+        (value, None) => value,
+    }
+}
+
 /// A whole number, `-` if there is none.
 #[must_use]
 pub fn whole(value: f64) -> String {
@@ -122,10 +131,7 @@ mod tests {
 
     #[test]
     fn a_value_stops_where_its_error_starts() {
-        let text = |value, error| match value_and_error(value, Some(error)) {
-            (value, Some(error)) => format!("{value} ± {error}"),
-            (value, None) => value,
-        };
+        let text = |value, error| with_error(value, Some(error));
         assert_eq!(text(11.023_456, 0.012_3), "11.023 ± 0.012");
         assert_eq!(text(47_012.0, 1_187.0), "47000 ± 1200");
         assert_eq!(text(0.0, 0.1), "0.00 ± 0.10");

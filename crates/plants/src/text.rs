@@ -70,9 +70,8 @@ impl Plant {
             input.about.unit.clone_from(&channel.unit);
             channel.name.clone_from(&input.about.name);
         }
-        let outputs = spec.outputs.clone();
-        for (output, channel) in outputs.iter().zip(&mut record.outputs) {
-            channel.name.clone_from(&spec.about(output.variable).name);
+        for (about, channel) in spec.about_outputs().zip(&mut record.outputs) {
+            channel.name.clone_from(&about.name);
         }
         // Heads up to this share of the largest level flow laminar, as in the kernel.
         const LAMINAR: f64 = 1e-4;
@@ -156,8 +155,7 @@ fn index_of(plant: Plant, spec: &ModelSpec, placed: &Placed, name: &str) -> Opti
     let own = kind(spec, name);
     match spec.find(name)? {
         Variable::State(_) if placed.effect.place == Place::Sensor => {
-            let mut outputs = spec.outputs.iter();
-            outputs.position(|output| spec.about(output.variable).name == name)
+            spec.about_outputs().position(|y| y.name == name)
         }
         Variable::State(vessel) => Some(vessel),
         Variable::Input(pump) => Some(pump),

@@ -37,6 +37,37 @@ struct KeptDiagnosis {
     simulated: Vec<Vec<Vec<f64>>>,
 }
 
+/// Name, measured values and values of each step of an output.
+type OutputSeries<'py> = (
+    String,
+    Bound<'py, PyArray1<f64>>,
+    Vec<Bound<'py, PyArray1<f64>>>,
+);
+
+/// Name of a record, whether it is held out, its times \[s\], and its outputs.
+pub type RecordSeries<'py> = (
+    String,
+    bool,
+    Bound<'py, PyArray1<f64>>,
+    Vec<OutputSeries<'py>>,
+);
+
+/// The outputs of a record by its position: names and measured values, with the series that each step simulated.
+pub fn simulated_series<'py, 'a>(
+    py: Python<'py>,
+    record: usize,
+    outputs: impl ExactSizeIterator<Item = (String, &'a [f64])>,
+    steps: &[&[Vec<f64>]],
+) -> Vec<OutputSeries<'py>> {
+    let first = record * outputs.len();
+    let of_output = |(o, (name, measured)): (usize, (String, &[f64]))| {
+        let series = steps.iter().filter_map(|step| step.get(first + o));
+        let series = series.map(|values| PyArray1::from_slice(py, values));
+        (name, PyArray1::from_slice(py, measured), series.collect())
+    };
+    outputs.enumerate().map(of_output).collect()
+}
+
 /// A bin of the residual: index of the record (for a window), from, to, samples, mean, root mean square, whether the model fails clearly in
 /// the bin.
 pub type Bin = (Option<usize>, f64, f64, usize, f64, f64, bool);
@@ -177,39 +208,23 @@ impl Diagnosis {
     /// For each record, fitted ones first: its name, whether it is held out, its times \[s\], and for each output its name, the measured
     /// values and the values of each step.
     #[getter]
-    #[allow(clippy::type_complexity)]
-    fn series<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> Vec<(
-        String,
-        bool,
-        Bound<'py, PyArray1<f64>>,
-        Vec<(
-            String,
-            Bound<'py, PyArray1<f64>>,
-            Vec<Bound<'py, PyArray1<f64>>>,
-        )>,
-    )> {
+    fn series<'py>(&self, py: Python<'py>) -> Vec<RecordSeries<'py>> {
         let Records { records, test, .. } = &self.records;
         let all_parts = [records.as_slice(), test].concat();
         let count = self.model.file.columns.outputs.len();
         let steps = self.found.steps.iter();
         let simulated = steps.map(|step| parts::joined_series(&all_parts, count, &step.simulated));
         let simulated: Vec<Vec<Vec<f64>>> = simulated.collect();
+        let steps: Vec<&[Vec<f64>]> = simulated.iter().map(Vec::as_slice).collect();
         let (fitted, held_out) = (parts::joined(records), parts::joined(test));
         let all = fitted.iter().map(|record| (record, false));
         let all = all.chain(held_out.iter().map(|record| (record, true)));
         let all = all.enumerate().map(|(i, (record, held_out))| {
-            let outputs = record.outputs.iter().enumerate().map(|(o, output)| {
-                let series = simulated.iter();
-                let series = series.filter_map(|series| series.get(i * count + o));
-                let series = series.map(|values| PyArray1::from_slice(py, values));
-                let measured = PyArray1::from_slice(py, &output.values);
-                (output.name.clone(), measured, series.collect())
-            });
+            let outputs = record.outputs.iter();
+            let outputs = outputs.map(|y| (y.name.clone(), &y.values[..]));
+            let outputs = simulated_series(py, i, outputs, &steps);
             let time = PyArray1::from_slice(py, &record.time);
-            (record.name.clone(), held_out, time, outputs.collect())
+            (record.name.clone(), held_out, time, outputs)
         });
         all.collect()
     }

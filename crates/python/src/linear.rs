@@ -29,10 +29,8 @@ pub fn linearize<'py>(
     let model = Compiled::new(spec);
     let spec = model.spec();
     let states: Vec<String> = spec.states.iter().map(|s| s.about.name.clone()).collect();
-    let inputs: Vec<String> = spec.inputs.iter().map(|u| u.about.name.clone()).collect();
-    let outputs = spec.outputs.iter();
-    let outputs = outputs.map(|output| spec.about(output.variable).name.clone());
-    let outputs: Vec<String> = outputs.collect();
+    let inputs: Vec<String> = spec.about_inputs().map(|u| u.name.clone()).collect();
+    let outputs: Vec<String> = spec.about_outputs().map(|y| y.name.clone()).collect();
     // An output that reads a state is another name of it.
     let own = |name: &String| match spec.find(name) {
         Some(Variable::State(i)) => Some(states[i].clone()),

@@ -254,9 +254,7 @@ impl Model {
     /// Names and units of the outputs.
     #[getter]
     fn outputs(&self) -> Vec<(String, String)> {
-        let spec = &self.0.file.base;
-        let names = spec.outputs.iter();
-        let names = names.map(|output| spec.about(output.variable).name.clone());
+        let names = self.0.file.base.about_outputs().map(|y| y.name.clone());
         names.zip(self.0.file.columns.outputs.clone()).collect()
     }
 

@@ -109,9 +109,8 @@ impl Watched {
         match &self.of {
             Of::Own { text, .. } => {
                 let spec = ModelSpec::parse_to_simulate(text).map_err(error::of_model)?;
-                let inputs = spec.inputs.iter().map(|u| u.about.name.clone());
-                let outputs = spec.outputs.iter();
-                let outputs = outputs.map(|output| spec.about(output.variable).name.clone());
+                let inputs = spec.about_inputs().map(|u| u.name.clone());
+                let outputs = spec.about_outputs().map(|y| y.name.clone());
                 Ok((inputs.collect(), outputs.collect()))
             }
             Of::Tank { text, .. } => {

@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
-use crate::diagnosis::{NamedBin, bins, json};
+use crate::diagnosis::{NamedBin, RecordSeries, bins, json, simulated_series};
 use crate::fit::{Covariance, check_simulation, simulation, units_of};
 use crate::frame::{Content, Frame};
 use crate::model::contents;
@@ -159,37 +159,16 @@ impl TankFit {
 
     /// As of a diagnosis of a model of the user's own.
     #[getter]
-    #[allow(clippy::type_complexity)]
-    fn series<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> Vec<(
-        String,
-        bool,
-        Bound<'py, PyArray1<f64>>,
-        Vec<(
-            String,
-            Bound<'py, PyArray1<f64>>,
-            Vec<Bound<'py, PyArray1<f64>>>,
-        )>,
-    )> {
-        let count = self.found.outputs.len().max(1);
+    fn series<'py>(&self, py: Python<'py>) -> Vec<RecordSeries<'py>> {
+        let steps = self.found.steps.iter();
+        let steps: Vec<&[Vec<f64>]> = steps.map(|step| step.simulated.as_slice()).collect();
         let all = self.found.records.iter().enumerate();
         let all = all.map(|(i, record)| {
-            let outputs = record.outputs.iter().enumerate().map(|(o, measured)| {
-                let steps = self.found.steps.iter();
-                let series = steps.filter_map(|step| step.simulated.get(i * count + o));
-                let series = series.map(|values| PyArray1::from_slice(py, values));
-                let name = self.found.outputs.get(o).cloned().unwrap_or_default();
-                (name, PyArray1::from_slice(py, measured), series.collect())
-            });
+            let names = self.found.outputs.iter().cloned();
+            let outputs = names.zip(record.outputs.iter().map(Vec::as_slice));
+            let outputs = simulated_series(py, i, outputs, &steps);
             let time = PyArray1::from_slice(py, &record.time);
-            (
-                record.name.clone(),
-                record.held_out,
-                time,
-                outputs.collect(),
-            )
+            (record.name.clone(), record.held_out, time, outputs)
         });
         all.collect()
     }

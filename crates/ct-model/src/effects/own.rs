@@ -308,10 +308,7 @@ fn about(name: &str, unit: &str, min: Option<f64>, max: Option<f64>) -> About {
 
 /// The variable that a term is added to.
 fn target(spec: &ModelSpec, name: &str) -> Result<Target, String> {
-    let output = spec
-        .outputs
-        .iter()
-        .position(|output| spec.about(output.variable).name == name);
+    let output = spec.about_outputs().position(|y| y.name == name);
     match (spec.find(name), output) {
         (Some(Variable::State(i)), _) => Ok(Target::State(i)),
         (Some(Variable::Flow(_)), Some(y)) => Ok(Target::Output(y)),

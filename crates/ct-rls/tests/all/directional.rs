@@ -1,6 +1,6 @@
 //! Directional forgetting: against exponential forgetting, against its differential equation, and within its bounds.
 
-use crate::support::{normal, normals, rng, spd};
+use crate::support::{State, normal, normals, rng, runge_kutta, spd};
 use ct_rls::{
     ContinuousRls, Directional, Guards, Integrator, Outcome, RecursiveEstimator, Sample, Weights,
 };
@@ -93,8 +93,6 @@ fn a_constant_direction_is_forgotten_exponentially() {
     }
 }
 
-type State = (SVector<f64, 3>, SMatrix<f64, 3, 3>);
-
 /// The equation with `phi` and `y` held, by the Runge-Kutta rule in 4000 steps.
 fn reference((theta, p): State, phi: SVector<f64, 3>, y: f64, w: &Weights, t: f64) -> State {
     let rate = |(theta, p): State| {
@@ -105,17 +103,7 @@ fn reference((theta, p): State, phi: SVector<f64, 3>, y: f64, w: &Weights, t: f6
             phi * phi.transpose() * (w.eta() / rho) - k * k.transpose() * w.gamma(),
         )
     };
-    let h = t / 4000.0;
-    let (mut theta, mut p) = (theta, p);
-    for _ in 0..4000 {
-        let a = rate((theta, p));
-        let b = rate((theta + a.0 * (0.5 * h), p + a.1 * (0.5 * h)));
-        let c = rate((theta + b.0 * (0.5 * h), p + b.1 * (0.5 * h)));
-        let d = rate((theta + c.0 * h, p + c.1 * h));
-        theta += (a.0 + (b.0 + c.0) * 2.0 + d.0) * (h / 6.0);
-        p += (a.1 + (b.1 + c.1) * 2.0 + d.1) * (h / 6.0);
-    }
-    (theta, p)
+    runge_kutta(rate, (theta, p), t)
 }
 
 /// First order where `P` links the regressor's direction to others: half the step, half the difference; the extrapolation of both

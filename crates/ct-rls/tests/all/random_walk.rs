@@ -1,6 +1,6 @@
 //! Parameters that walk at random: against the Kalman filter written plainly, against the differential equation, and at the cap.
 
-use crate::support::{normal, normals, rng, spd};
+use crate::support::{State, normal, normals, rng, runge_kutta, spd};
 use ct_rls::{
     ContinuousRls, Error, ExactHold, Guards, Outcome, RandomWalk, RecursiveEstimator, Sample,
     Weights,
@@ -71,8 +71,6 @@ fn it_is_the_kalman_filter() {
     kalman::<10>();
 }
 
-type State = (SVector<f64, 3>, SMatrix<f64, 3, 3>);
-
 /// The equation with `phi` and `y` held, by the Runge-Kutta rule in 4000 steps.
 fn reference(
     (theta, p): State,
@@ -88,17 +86,7 @@ fn reference(
             p * w.eta() + SMatrix::from_diagonal(&q) - k * k.transpose() * w.gamma(),
         )
     };
-    let h = t / 4000.0;
-    let (mut theta, mut p) = (theta, p);
-    for _ in 0..4000 {
-        let a = rate((theta, p));
-        let b = rate((theta + a.0 * (0.5 * h), p + a.1 * (0.5 * h)));
-        let c = rate((theta + b.0 * (0.5 * h), p + b.1 * (0.5 * h)));
-        let d = rate((theta + c.0 * h, p + c.1 * h));
-        theta += (a.0 + (b.0 + c.0) * 2.0 + d.0) * (h / 6.0);
-        p += (a.1 + (b.1 + c.1) * 2.0 + d.1) * (h / 6.0);
-    }
-    (theta, p)
+    runge_kutta(rate, (theta, p), t)
 }
 
 /// First order: half the step, half the difference; the extrapolation of both satisfies the equation to 1e-6. Exact without excitation.

@@ -7,11 +7,10 @@ use clap::{Args, ValueEnum};
 use greybox::FitOptions;
 use missing_effect::Options;
 
-use super::{Results, finish};
+use super::{Results, finish, plant_options};
 use crate::effort::EffortLevel;
-use crate::input::excitation::{self, ExcitationWarning};
+use crate::input::excitation;
 use crate::input::{self, Files, Input, ReadArguments};
-use crate::interrupt;
 use crate::look::Look;
 use crate::output::Kind;
 use crate::own_model::report::{self, Paged};
@@ -83,13 +82,8 @@ impl Compare {
                 &format!("note: [{table}] has no effect until `ctid add {name}`"),
             )
         };
-        let warning = |warning: &ExcitationWarning| {
-            look.warning(
-                look.paragraph("", &format!("warning: {warning}"))
-                    .trim_end(),
-            ) + "\n"
-        };
         let warnings = excitation::of_problem(problem);
+        let warnings = warnings.iter().map(|it| look.warning_paragraph(it));
         let clock = greybox::common_clock(&problem.records).map(|_| {
             let names: Vec<&str> = problem.records.iter().map(|r| r.name.as_str()).collect();
             let what = "the time stamps continue from file to file, so drifts, steps and periods run through them";
@@ -97,15 +91,13 @@ impl Compare {
         });
         let notes = std::iter::once(input::notes(summaries, look));
         let notes = notes.chain(waiting.iter().map(note)).chain(clock);
-        notes.chain(warnings.iter().map(warning)).collect()
+        notes.chain(warnings).collect()
     }
 
     fn options(&self) -> Options<'static> {
         Options {
             simulate_loop: self.way != Some(LoopWay::Measured),
-            time_limit: Some(self.effort.limit()),
-            interrupt: Some(interrupt::flag()),
-            ..Options::default()
+            ..plant_options(self.effort)
         }
     }
 

@@ -5,13 +5,11 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
 use greybox::FitOptions;
-use missing_effect::Options;
 
-use super::finish;
+use super::{finish, plant_options};
 use crate::Error;
 use crate::effort::EffortLevel;
 use crate::input::{self, Files, ReadArguments};
-use crate::interrupt;
 use crate::look::Look;
 use crate::output::{self, Kind};
 use crate::own_model::{self, AnyModelFile, FitLimit};
@@ -51,38 +49,24 @@ impl Export {
         files.check_repetition()?;
         let model = AnyModelFile::read(&self.model)?;
         let mut inputs = files.all();
-        if let AnyModelFile::Own(model) = &model {
-            inputs.push(&model.text);
-        }
+        inputs.extend(model.text());
         let text = self.modelica.as_deref().map(|path| (Kind::Model, path));
         let curves = self.csv.as_deref().map(|path| (Kind::Record, path));
         let wanted: Vec<(Kind, &Path)> = text.into_iter().chain(curves).collect();
         let outputs = output::plan(&wanted, &inputs)?;
-        if let (AnyModelFile::Plant(_), []) = (&model, &self.data[..]) {
-            return Err(Error::file(
-                &self.model,
-                "a model file of a plant holds first guesses, no values: give the records that it is fitted to, DATA.csv",
-            ));
-        }
+        model.require_records(&self.model, &self.data, "DATA.csv")?;
         let bar = Bar::new();
         bar.phase("fitting the model");
-        let limit = FitLimit {
-            time: Some(self.effort.limit()),
-            interrupt: Some(interrupt::flag()),
-        };
+        let options = plant_options(self.effort);
+        let limit = FitLimit::of(&options);
         let exported = match model {
             AnyModelFile::Plant(model) => {
-                let options = Options {
-                    time_limit: limit.time,
-                    interrupt: limit.interrupt,
-                    ..Options::default()
-                };
                 simulate::export_plant(*model, &files, &options, self.modelica.is_some())
             }
             AnyModelFile::Own(model) => {
                 let records = match self.data.is_empty() {
                     true => None,
-                    false => Some((model.records(&files)?, &self.data[..])),
+                    false => Some((model.records(&files)?, &files)),
                 };
                 own_model::export(&model, records, &FitOptions::default(), limit)
             }
@@ -94,12 +78,7 @@ impl Export {
             records => format!("{} fitted to {}", exported.model, records.join(", ")),
         };
         let warnings = exported.warnings.iter();
-        let warned: String = warnings
-            .map(|warning| {
-                let words = look.paragraph("", &format!("warning: {warning}"));
-                look.warning(words.trim_end()) + "\n"
-            })
-            .collect();
+        let warned: String = warnings.map(|it| look.warning_paragraph(it)).collect();
         let text = input::notes(&summaries, look) + &look.paragraph("", &said) + &warned;
         finish(&exported, &text, &outputs, out, look)
     }

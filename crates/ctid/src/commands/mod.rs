@@ -10,18 +10,20 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
+use missing_effect::Options;
 
 use self::compare::{Compare, Diagnose};
 use self::export::Export;
 use self::identify::Identify;
 use self::simulate::Simulate;
 use self::tables::Tables;
+use crate::effort::EffortLevel;
 use crate::look::Look;
 use crate::output::{self, Found, Kind, Output};
 use crate::own_model::{self, AnyModelFile};
 use crate::progress::Bar;
 use crate::symptoms::Sought;
-use crate::{Error, catalogue, check, design, edit, monitor, serve, tour};
+use crate::{Error, catalogue, check, design, edit, interrupt, monitor, serve, tour};
 
 /// Finds the physical effect that a model of measured data is missing.
 #[derive(Debug, Parser)]
@@ -189,6 +191,15 @@ pub fn run(cli: Cli, out: &mut dyn Write, look: Look) -> Result<(), Error> {
         Some(Command::Identify(arguments)) => arguments.run(out, look),
         Some(Command::Serve(arguments)) => arguments.run(out),
         Some(Command::Tables(arguments)) => arguments.run(out, look),
+    }
+}
+
+/// Options of a fit or a search of a plant that Ctrl-C ends.
+fn plant_options(effort: EffortLevel) -> Options<'static> {
+    Options {
+        time_limit: Some(effort.limit()),
+        interrupt: Some(interrupt::flag()),
+        ..Options::default()
     }
 }
 

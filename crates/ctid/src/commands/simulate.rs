@@ -6,13 +6,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use ct_signals::ReadOptions;
 use greybox::FitOptions;
-use missing_effect::Options;
 
-use super::finish;
+use super::{finish, plant_options};
 use crate::Error;
 use crate::effort::EffortLevel;
 use crate::input::{self, Files, ReadArguments};
-use crate::interrupt;
 use crate::look::Look;
 use crate::output::{self, Kind};
 use crate::own_model::{self, AnyModelFile, FitLimit};
@@ -94,33 +92,19 @@ impl Simulate {
         let model = AnyModelFile::read(&self.model)?;
         let mut all = files.all();
         all.push(&self.inputs);
-        if let AnyModelFile::Own(model) = &model {
-            all.push(&model.text);
-        }
+        all.extend(model.text());
         let json = self.json.as_deref().map(|path| (Kind::Json, path));
         let wanted: Vec<(Kind, &Path)> = std::iter::once((Kind::Record, self.out.as_path()))
             .chain(json)
             .collect();
         let outputs = output::plan(&wanted, &all)?;
-        if let (AnyModelFile::Plant(_), []) = (&model, &self.fit[..]) {
-            return Err(Error::file(
-                &self.model,
-                "a model file of a plant holds first guesses, no values: give the records that it is fitted to, --fit DATA.csv",
-            ));
-        }
+        model.require_records(&self.model, &self.fit, "--fit DATA.csv")?;
         let bar = Bar::new();
         bar.phase("fitting the model");
-        let limit = FitLimit {
-            time: Some(self.effort.limit()),
-            interrupt: Some(interrupt::flag()),
-        };
+        let options = plant_options(self.effort);
+        let limit = FitLimit::of(&options);
         let found = match model {
             AnyModelFile::Plant(model) => {
-                let options = Options {
-                    time_limit: limit.time,
-                    interrupt: limit.interrupt,
-                    ..Options::default()
-                };
                 simulate::simulate_plant(*model, &files, &inputs, &options)
             }
             AnyModelFile::Own(model) => {

@@ -21,6 +21,7 @@ use crate::model_file::ModelFile;
 use crate::output::{self, Found, Kind, Output};
 use crate::own_model::{self, AnyModelFile, OwnModelFile, OwnProposal};
 use crate::progress::Bar;
+use crate::simulate::header;
 use crate::{Error, names, sentences};
 
 /// Command line options.
@@ -151,10 +152,7 @@ impl Found for Proposal {
             return None;
         }
         let sequence = &self.design.experiment;
-        let mut header = sequence.name.clone();
-        if !sequence.unit.is_empty() {
-            header += &format!(" [{}]", sequence.unit);
-        }
+        let header = header(&sequence.name, &sequence.unit);
         let mut text = format!("{},{header}\n", self.time);
         for (time, value) in sequence.time.iter().zip(&sequence.values) {
             text += &format!("{},{}\n", digits(time / self.seconds), digits(*value));
@@ -257,8 +255,8 @@ impl Arguments {
                 limits.ranges.insert(name.clone(), *range);
             }
         }
-        let inputs = model.base.inputs.iter();
-        let all: Vec<String> = inputs.map(|input| input.about.name.clone()).collect();
+        let inputs = model.base.about_inputs();
+        let all: Vec<String> = inputs.map(|about| about.name.clone()).collect();
         let alone = match (&limits.inputs[..], &all[..]) {
             ([one], _) | ([], [one]) => Some(one.clone()),
             _ => None,

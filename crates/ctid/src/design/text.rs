@@ -3,20 +3,17 @@
 use missing_effect::design::{Alternative, Candidate, Design, Power};
 
 use crate::findings::{self, Reader};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
-use crate::sentences::{self, with_unit};
+use crate::sentences::{self, interval, placed, with_unit};
 
 /// Number of experiments in the table.
 pub(crate) const SHOWN: usize = 10;
 /// Meaning of the table's columns.
-pub(crate) const NOTE: &str = "(power: the expected rise of the criterion of the wrong model; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; among experiments with ample power the first stays closest to the range of the records)";
+const NOTE: &str = "(power: the expected rise of the criterion of the wrong model; decides: the probability that it ends more than 6 above the right one; ~: not confirmed by a refit; among experiments with ample power the first stays closest to the range of the records)";
 
 fn named(alternative: &Alternative) -> String {
-    match &alternative.place {
-        Some(place) => format!("{} ({place})", alternative.effect),
-        None => alternative.effect.clone(),
-    }
+    placed(&alternative.effect, alternative.place.as_deref())
 }
 
 /// What `ctid design` prints.
@@ -38,9 +35,8 @@ fn alternatives(design: &Design, look: Look) -> String {
     for alternative in [a, b] {
         let size = alternative.size.as_ref().map_or(String::new(), |size| {
             let name = size.name.rsplit('.').next().unwrap_or_default();
-            let (value, error) = numbers::value_and_error(size.value, size.std_error);
-            let error = error.map_or(String::new(), |error| format!(" ± {error}"));
-            with_unit(&format!("{name} {value}{error}"), &size.unit)
+            let value = numbers::with_error(size.value, size.std_error);
+            with_unit(&format!("{name} {value}"), &size.unit)
         });
         rows.push(vec![
             named(alternative),
@@ -67,9 +63,8 @@ fn experiments(design: &Design, look: Look) -> String {
         )
     });
     let title = format!(
-        "Experiments with the {what} between {} and {} ({}{slew}), {}",
-        numbers::significant(limits.low, 3),
-        with_unit(&numbers::significant(limits.high, 3), unit),
+        "Experiments with the {what} between {} ({}{slew}), {}",
+        interval((limits.low, limits.high), " and ", unit),
         limits.range_from,
         numbers::duration(limits.duration)
     );
@@ -96,21 +91,11 @@ fn experiments(design: &Design, look: Look) -> String {
         Side::Right,
         Side::Right,
     ];
-    let mut text = lines(&look.heading(&title), &sides, &rows);
-    text.pop();
-    let more = design.candidates.len().saturating_sub(SHOWN);
-    if more > 0 {
-        text += &format!("  {}\n", look.faint(format!("and {more} more")));
-    }
-    text += &look.faint(look.paragraph("  ", NOTE).trim_end());
-    text + "\n\n"
+    listed(&title, (&sides, &rows), design.candidates.len(), look)
 }
 
 fn row(number: &str, candidate: &Candidate, design: &Design) -> Vec<String> {
-    let range = |low: f64, high: f64, unit: &str| {
-        let high = with_unit(&numbers::significant(high, 3), unit);
-        format!("{} .. {high}", numbers::significant(low, 3))
-    };
+    let range = |low: f64, high: f64, unit: &str| interval((low, high), " .. ", unit);
     let mut kind = candidate.kind.name().to_string();
     if let Some(levels) = candidate.levels {
         kind += &format!(", {levels} levels");
@@ -152,10 +137,23 @@ fn findings(design: &Design, look: Look) -> String {
     text
 }
 
-fn lines(heading: &str, sides: &[Side], rows: &[Vec<String>]) -> String {
-    let mut text = format!("{heading}\n");
-    for line in table(sides, rows) {
-        text += &format!("  {line}\n");
+/// A table under a heading.
+pub(crate) fn lines(heading: &str, sides: &[Side], rows: &[Vec<String>]) -> String {
+    format!("{heading}\n{}\n", table_text(sides, rows))
+}
+
+/// The table of the experiments, of which the first [`SHOWN`] of `count` are in the rows, and the meaning of its columns.
+pub(crate) fn listed(
+    title: &str,
+    (sides, rows): (&[Side], &[Vec<String>]),
+    count: usize,
+    look: Look,
+) -> String {
+    let mut text = format!("{}\n{}", look.heading(title), table_text(sides, rows));
+    let more = count.saturating_sub(SHOWN);
+    if more > 0 {
+        text += &format!("  {}\n", look.faint(format!("and {more} more")));
     }
-    text + "\n"
+    text += &look.faint(look.paragraph("  ", NOTE).trim_end());
+    text + "\n\n"
 }

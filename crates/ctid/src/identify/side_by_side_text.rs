@@ -2,7 +2,7 @@
 
 use linear_identification::side_by_side::{Outcome, Row, SideBySide};
 
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::sentences::{of_gaps, of_violation, of_warning};
 
@@ -82,7 +82,7 @@ fn results(found: &SideBySide, look: Look) -> String {
     let sides: Vec<Side> = (0..heading.len())
         .map(|column| if column < 2 { Side::Left } else { Side::Right })
         .collect();
-    indented(&table(&sides, &rows)) + "\n"
+    table_text(&sides, &rows) + "\n"
 }
 
 fn parameters(found: &SideBySide, look: Look) -> String {
@@ -106,7 +106,7 @@ fn parameters(found: &SideBySide, look: Look) -> String {
         }
     }
     let sides = [Side::Left, Side::Left, Side::Right, Side::Right, Side::Left];
-    text += &indented(&table(&sides, &rows));
+    text += &table_text(&sides, &rows);
     text.push('\n');
     text
 }
@@ -176,7 +176,7 @@ fn orders(found: &SideBySide, look: Look) -> String {
     let [left, right] = [Side::Left, Side::Right];
     let mut text = format!("\n{}\n", look.heading("Orders"));
     text += &look.paragraph("  ", ORDERS);
-    text += &indented(&table(&[left, left, right, right, right, right], &rows));
+    text += &table_text(&[left, left, right, right, right, right], &rows);
     text
 }
 
@@ -199,8 +199,4 @@ pub(crate) fn largest_error(outcome: &Outcome) -> Option<f64> {
 
 fn or_dash(text: Option<String>) -> String {
     text.unwrap_or_else(|| "-".to_owned())
-}
-
-fn indented(lines: &[String]) -> String {
-    lines.iter().map(|line| format!("  {line}\n")).collect()
 }

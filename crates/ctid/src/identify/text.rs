@@ -5,10 +5,11 @@ mod facts;
 use linear_identification::{Identification, Order, deviation};
 
 pub(crate) use self::facts::{condition, facts, refined_facts};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
-use crate::plot::{self, Curve, plot};
+use crate::plot;
 use crate::sentences;
+use crate::simulate::header;
 
 /// The whole of it.
 #[must_use]
@@ -78,34 +79,14 @@ pub(crate) fn model(found: &Identification) -> String {
 
 fn overlay(found: &Identification, look: Look) -> String {
     let shown = &found.shown;
-    let curves = [
-        Curve {
-            values: &shown.output.values,
-            colour: plot::MEASURED,
-        },
-        Curve {
-            values: &shown.simulated,
-            colour: plot::MODEL,
-        },
-    ];
-    let limits = plot::limits([shown.output.values.as_slice(), &shown.simulated]);
     let (Some(first), Some(last)) = (shown.time.first(), shown.time.last()) else {
         return String::new();
     };
     format!(
-        "{}{}\n{}\n",
-        look.heading("Measured and simulated"),
-        bracketed(&shown.output.unit),
-        plot(&curves, (0.0, last - first), limits, 9, look)
+        "{}\n{}\n",
+        header(&look.heading("Measured and simulated"), &shown.output.unit),
+        plot::overlay(&shown.output.values, &shown.simulated, last - first, look)
     )
-}
-
-fn bracketed(unit: &str) -> String {
-    if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" [{unit}]")
-    }
 }
 
 fn parameters(found: &Identification, look: Look) -> String {
@@ -133,9 +114,7 @@ fn parameters(found: &Identification, look: Look) -> String {
     }
     let sides = [Side::Left, Side::Right, Side::Right, Side::Left, Side::Left];
     let mut text = format!("{}\n", look.heading(title));
-    for line in table(&sides, &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&sides, &rows);
     let note = match (&found.settings, &found.trajectory) {
         (Some(settings), _) => format!(
             "(memory {}, filters of {} 1/s, started from a time constant of {}; the last column is of the second half)",
@@ -205,10 +184,7 @@ fn drift(found: &Identification, look: Look) -> String {
         let Some(ends) = over_level.ends() else {
             continue;
         };
-        let [low, high] = ends.map(|(value, error)| {
-            let (value, error) = numbers::value_and_error(value, Some(error));
-            error.map_or(value.clone(), |error| format!("{value} ± {error}"))
-        });
+        let [low, high] = ends.map(|(value, error)| numbers::with_error(value, Some(error)));
         let apart = format!(
             "{} std. errors",
             numbers::decimals(over_level.difference.abs(), 1)
@@ -222,9 +198,7 @@ fn drift(found: &Identification, look: Look) -> String {
     }
     let sides = [Side::Left, Side::Right, Side::Right, Side::Left, Side::Left];
     let mut text = format!("{}\n", look.heading("Drift with the level"));
-    for line in table(&sides, &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&sides, &rows);
     text += &look.paragraph("  ", &drift_verdict(found));
     text.push('\n');
     text

@@ -195,6 +195,12 @@ impl Files {
         escaped(&name).into_owned()
     }
 
+    /// The file of a fitted record.
+    pub(crate) fn path_of(&self, record: &str) -> Option<&Path> {
+        let mut paths = self.data.iter().map(PathBuf::as_path);
+        paths.find(|path| self.name_of(path) == record)
+    }
+
     /// Checks that no record is given twice: a fitted record cannot be held out, and a repeated record adds no information.
     ///
     /// # Errors

@@ -135,11 +135,7 @@ fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
     let noise = setup
         .output_noise(&fit.x)
         .ok_or_else(|| blame(greybox::Error::Stopped))?;
-    let outputs: Vec<&ct_model::About> = spec
-        .outputs
-        .iter()
-        .map(|output| spec.about(output.variable))
-        .collect();
+    let outputs: Vec<&ct_model::About> = spec.about_outputs().collect();
     let named = |rms: &[f64]| -> BTreeMap<String, f64> {
         let pairs = outputs.iter().zip(rms);
         pairs
@@ -248,8 +244,8 @@ mod tests {
 
     const CUT: &str = "Left out by the time limit of 0 s: steps of the fit. For a longer search: `--effort thorough` (limit 10 min).";
 
-    /// The heated block of the examples, its record, and the record's file.
-    fn heated_block() -> (OwnModelFile, Records, PathBuf) {
+    /// The heated block of the examples, its record, and the files.
+    fn heated_block() -> (OwnModelFile, Records, Files) {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/models");
         let (model, data) = (
             folder.join("heated-block.toml"),
@@ -259,13 +255,13 @@ mod tests {
             unreachable!("it names a text")
         };
         let files = Files {
-            data: vec![data.clone()],
+            data: vec![data],
             test: Vec::new(),
             model: PathBuf::from("m.toml"),
             options: ct_signals::ReadOptions::default(),
         };
         let records = file.records(&files).unwrap();
-        (*file, records, data)
+        (*file, records, files)
     }
 
     /// A time limit that has passed still gives a fit, and one line reports that it was cut short.
@@ -291,9 +287,9 @@ mod tests {
 
     #[test]
     fn fits_for_an_export_and_a_simulation_keep_the_limit_too() {
-        let (file, records, data) = heated_block();
+        let (file, records, files) = heated_block();
         let inputs = Inputs {
-            path: data.clone(),
+            path: files.data[0].clone(),
             options: ct_signals::ReadOptions::default(),
             first: 10,
         };
@@ -303,8 +299,7 @@ mod tests {
                 interrupt: None,
             };
             let options = FitOptions::default();
-            let paths = std::slice::from_ref(&data);
-            let with_records = Some((records.clone(), paths));
+            let with_records = Some((records.clone(), &files));
             let (exported, _) = export(&file, with_records, &options, limit).unwrap();
             assert_eq!(exported.warnings, warnings);
             let fitted_to = Some(records.clone());

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_model::{ModelSpec, Variable};
+use ct_model::ModelSpec;
 use ct_signals::{Channel, Columns, Heading, Record, quoted};
 use effect_search::ControlLoop;
 use greybox::LoopController;
@@ -43,14 +43,8 @@ pub(super) fn read(
     raw: &RawControllers,
     source: &Source,
 ) -> Result<Vec<OwnController>, Error> {
-    let inputs: Vec<&str> = (0..spec.inputs.len())
-        .map(|i| spec.about(Variable::Input(i)).name.as_str())
-        .collect();
-    let outputs: Vec<&str> = spec
-        .outputs
-        .iter()
-        .map(|output| spec.about(output.variable).name.as_str())
-        .collect();
+    let inputs: Vec<&str> = spec.about_inputs().map(|u| u.name.as_str()).collect();
+    let outputs: Vec<&str> = spec.about_outputs().map(|y| y.name.as_str()).collect();
     let position = |at: usize, what: &str, known: &[&str], name: &str| {
         known.iter().position(|own| *own == name).ok_or_else(|| {
             source.at(

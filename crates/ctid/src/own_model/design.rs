@@ -10,12 +10,14 @@ use serde::Serialize;
 
 use super::effects::{every_candidate, find};
 use super::file::{OwnModelFile, Records};
-use super::problem::{blamed, problem};
+use super::fitted::blame;
+use super::problem::problem;
 use super::words::{EffectWords, shown_unit};
-use crate::design::text::{NOTE, SHOWN, power};
+use crate::design::text::{self, SHOWN, lines, power};
 use crate::findings::Reader;
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side};
 use crate::output::Found;
+use crate::sentences::{interval, with_unit};
 use crate::simulate::{cell, csv_text, header};
 use crate::{Error, numbers};
 
@@ -47,7 +49,7 @@ pub fn design(
         effect_search::Error::Design(refused) if refused != NoExperiment::OutOfTime => {
             Error::Usage(refused.to_string())
         }
-        error => blamed(&problem, &error),
+        error => blame(&problem.records, &error),
     })
 }
 
@@ -144,9 +146,7 @@ fn alternatives(design: &Design, look: Look) -> String {
 }
 
 fn range(low: f64, high: f64, unit: &str) -> String {
-    let unit = shown_unit(unit);
-    let (low, high) = (numbers::significant(low, 3), numbers::significant(high, 3));
-    format!("{low} .. {high} {unit}").trim_end().to_string()
+    interval((low, high), " .. ", shown_unit(unit))
 }
 
 /// Length and inputs with their permitted changes: `33 min, u 0 .. 36 % (visited)`.
@@ -154,9 +154,8 @@ pub(crate) fn limits(design: &Design) -> String {
     let of = |limits: &InputRange| {
         let from = if limits.visited { " (visited)" } else { "" };
         let slew = limits.slew.map_or(String::new(), |slew| {
-            let unit = shown_unit(&limits.unit);
-            let slew = format!("{} {unit}", numbers::significant(slew, 3));
-            format!(", at most {} a second", slew.trim_end())
+            let slew = with_unit(&numbers::significant(slew, 3), shown_unit(&limits.unit));
+            format!(", at most {slew} a second")
         });
         format!(
             "{} {}{from}{slew}",
@@ -196,13 +195,8 @@ fn in_words(file: &OwnModelFile, design: &Design, experiment: &Experiment) -> Sh
         Some(_) => Kind::Again.name().to_string(),
         None => applied(design, experiment),
     };
-    let unit = |name: &str| {
-        let mut signals = file.signals();
-        let about = signals.find(|about| about.name == name);
-        about.map_or("", |about| about.unit.as_str())
-    };
     let reaches = experiment.reaches.iter().map(|reach| {
-        let to = range(reach.low, reach.high, unit(&reach.output));
+        let to = range(reach.low, reach.high, file.unit_of(&reach.output));
         format!("{} {to}", reach.output)
     });
     ShownExperiment {
@@ -237,14 +231,7 @@ fn listed(file: &OwnModelFile, design: &Design, look: Look) -> String {
         Side::Right,
         Side::Right,
     ];
-    let mut text = lines(&look.heading(&title), &sides, &rows);
-    text.pop();
-    let more = design.experiments.len().saturating_sub(SHOWN);
-    if more > 0 {
-        text += &format!("  {}\n", look.faint(format!("and {more} more")));
-    }
-    text += &look.faint(look.paragraph("  ", NOTE).trim_end());
-    text + "\n\n"
+    text::listed(&title, (&sides, &rows), design.experiments.len(), look)
 }
 
 /// Course of the inputs that change.
@@ -323,11 +310,8 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         })
         .filter_map(|input| {
             let value = numbers::significant(*input.values.first()?, 3);
-            Some(
-                format!("{} = {value} {}", input.input, shown_unit(&input.unit))
-                    .trim_end()
-                    .to_string(),
-            )
+            let value = format!("{} = {value}", input.input);
+            Some(with_unit(&value, shown_unit(&input.unit)))
         })
         .collect();
     if !design.twins() && !held.is_empty() {
@@ -348,12 +332,4 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         ));
     }
     all
-}
-
-fn lines(heading: &str, sides: &[Side], rows: &[Vec<String>]) -> String {
-    let mut text = format!("{heading}\n");
-    for line in table(sides, rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
-    text + "\n"
 }

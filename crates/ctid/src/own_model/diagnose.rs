@@ -1,19 +1,21 @@
 //! Diagnosis of a user's own model.
 
-use ct_signals::Clock;
+use ct_signals::{Clock, record_names};
 use effect_search::{Diagnosis, NotNoise, Options, Step, Thresholds, Verdict};
 
 use super::file::{OwnModelFile, Records};
-use super::problem::{blamed, problem};
+use super::fitted::blame;
+use super::problem::problem;
 use super::singles;
 use super::text::{failures, undetermined};
 use super::unknown;
 use super::words::{EffectWords, shown_unit};
 use crate::Error;
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::sentences::of_gaps;
 use crate::sentences::remarks::{absorbed, rounding};
+use crate::sentences::with_unit;
 use crate::terminal::without_50;
 
 /// Searches the candidates.
@@ -27,7 +29,8 @@ pub fn diagnose(
     progress: &(dyn Fn(effect_search::Progress) + Sync),
 ) -> Result<Diagnosis, Error> {
     let problem = problem(file, records)?;
-    effect_search::diagnose(&problem, options, progress).map_err(|error| blamed(&problem, &error))
+    effect_search::diagnose(&problem, options, progress)
+        .map_err(|error| blame(&problem.records, &error))
 }
 
 /// Text output of a diagnosis.
@@ -41,9 +44,8 @@ pub(crate) fn said(
     let mut text = format!("{}\n\n", look.heading(&diagnosis.model));
     let fails = |name: &str, step: &Step| {
         let clock = Clock::of(&records.records);
-        let mut fitted: Vec<&str> = records.records.iter().map(|r| r.name.as_str()).collect();
-        fitted.dedup();
-        failures(name, step, (&clock, &fitted), |y| unit_of(file, y), look)
+        let fitted = record_names(&records.records);
+        failures(name, step, (&clock, &fitted), |y| file.unit_of(y), look)
     };
     let mut not_determined: &[Vec<String>] = &[];
     if let Some(first) = diagnosis.steps.first() {
@@ -188,11 +190,8 @@ pub(crate) fn sizes(diagnosis: &Diagnosis, effect: &str) -> Vec<String> {
         .flat_map(|last| &last.parameters)
         .filter(|p| p.effect.as_deref() == Some(effect));
     own.map(|p| {
-        let (value, error) = numbers::value_and_error(p.value, p.std_error);
-        let error = error.map_or(String::new(), |error| format!(" ± {error}"));
-        format!("{} = {value}{error} {}", p.name, shown_unit(&p.unit))
-            .trim_end()
-            .to_string()
+        let value = numbers::with_error(p.value, p.std_error);
+        with_unit(&format!("{} = {value}", p.name), shown_unit(&p.unit))
     })
     .collect()
 }
@@ -255,14 +254,6 @@ fn said_of(left: &NotNoise) -> String {
     }
 }
 
-/// Unit of an output.
-fn unit_of<'a>(file: &'a OwnModelFile, output: &str) -> &'a str {
-    let outputs = file.base.outputs.iter();
-    let mut outputs = outputs.map(|output| file.base.about(output.variable));
-    let own = outputs.find(|about| about.name == output);
-    own.map_or("", |about| about.unit.as_str())
-}
-
 /// The error of each step at each output.
 fn errors(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
     let mut text = format!("{}\n", look.heading("Simulation error, root mean square"));
@@ -310,11 +301,9 @@ fn errors(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
     let sides: Vec<Side> = (0..rows[0].len())
         .map(|i| if i == 0 { Side::Left } else { Side::Right })
         .collect();
-    for line in table(&sides, &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&sides, &rows);
     let outputs = diagnosis.steps.iter().map(|step| step.outputs.as_slice());
-    text + &state_rows(first) + &without_50(outputs, |name| unit_of(file, name), look)
+    text + &state_rows(first) + &without_50(outputs, |name| file.unit_of(name), look)
 }
 
 /// Number of rows for the fit of the held-out records' initial states.
@@ -331,7 +320,8 @@ pub(super) fn state_rows(step: &Step) -> String {
     format!("  held out: without {whose} that the initial states are fitted to\n")
 }
 
-fn estimates(step: &Step, look: Look) -> String {
+/// Table of the parameters and initial states of a model.
+pub(super) fn estimates(step: &Step, look: Look) -> String {
     let mut text = format!(
         "\n{}\n",
         look.heading("Parameters and initial states, with standard errors")
@@ -350,8 +340,6 @@ fn estimates(step: &Step, look: Look) -> String {
             vec![parameter.name.clone(), value, error, unit]
         })
         .collect();
-    for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows);
     text
 }

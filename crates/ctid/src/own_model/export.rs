@@ -1,18 +1,17 @@
 //! A user's own model with its fitted values as text, and the curves of its fit.
 
-use std::path::PathBuf;
-
 use ct_model::{Expression, Given, ModelSpec};
-use ct_signals::{Heading, ReadSummary, Record};
+use ct_signals::{Heading, ReadSummary, record_names};
 use greybox::FitOptions;
 use serde::Serialize;
 
 use super::file::{OwnModelFile, Records};
 use super::fitted::{FitLimit, FittedModel, blame};
 use crate::Error;
+use crate::input::Files;
 use crate::numbers;
 use crate::output::Found;
-use crate::simulate::{Curves, FittedRecord, TimeColumn};
+use crate::simulate::{Curves, FittedRecord};
 
 /// Output of `ctid export`.
 #[derive(Debug, Serialize)]
@@ -91,15 +90,12 @@ impl FittedModel {
         }
         let mut head = vec![format!(
             "Written by ctid export from {source}, fitted to {}.",
-            names_of(own).join(", ")
+            record_names(own).join(", ")
         )];
         head.push("Standard errors (fitted values are below):".to_string());
         for (i, parameter) in spec.parameters.iter().enumerate() {
             let (name, unit) = (&parameter.about.name, &parameter.about.unit);
-            let error = known.as_ref().and_then(|known| {
-                let at = known.entries.iter().position(|entry| *entry == i)?;
-                Some(known.covariance[at][at].sqrt())
-            });
+            let error = known.as_ref().and_then(|known| known.std_error(i));
             let said = match error {
                 Some(error) => format!("{} {unit}", numbers::significant(error, 3)),
                 None if parameter.given != Given::Fitted || file.known.contains_key(name) => {
@@ -116,20 +112,13 @@ impl FittedModel {
     }
 }
 
-/// The names of records; parts of one file once.
-fn names_of(records: &[Record]) -> Vec<String> {
-    let mut names: Vec<String> = records.iter().map(|record| record.name.clone()).collect();
-    names.dedup();
-    names
-}
-
 /// The model with the values of its text and of `[known]` or, with records, those of a fit to them.
 ///
 /// # Errors
 /// One line that names the file, the place and the correction.
 pub(crate) fn export(
     file: &OwnModelFile,
-    records: Option<(Records, &[PathBuf])>,
+    records: Option<(Records, &Files)>,
     options: &FitOptions,
     limit: FitLimit,
 ) -> Result<(Exported, Vec<ReadSummary>), Error> {
@@ -145,7 +134,7 @@ pub(crate) fn export(
         || file.text.display().to_string(),
         |name| name.to_string_lossy().into_owned(),
     );
-    let Some((records, paths)) = records else {
+    let Some((records, files)) = records else {
         exported.text = Some(text(file, &source)?);
         return Ok((exported, Vec::new()));
     };
@@ -158,41 +147,16 @@ pub(crate) fn export(
     let Some(model) = fitted.setup()?.simulate(&fitted.estimate().x) else {
         return Err(blame(own, &greybox::Error::Stopped));
     };
-    let outputs = spec.outputs.len();
-    let input_names = file
-        .columns
-        .inputs
-        .iter()
-        .map(|name| Heading::of(name).name);
-    let output_names = file
-        .columns
-        .outputs
-        .iter()
-        .map(|name| Heading::of(name).name);
-    let input_units = spec.inputs.iter().map(|input| input.about.unit.clone());
-    let output_units = spec.outputs.iter();
-    let output_units = output_units.map(|output| spec.about(output.variable).unit.clone());
-    let path = |name: &str| {
-        let own = paths.iter().find(|path| {
-            path.file_name()
-                .is_some_and(|file| file.to_string_lossy() == name)
-                || path.display().to_string() == name
-        });
-        own.unwrap_or(&paths[0]).clone()
-    };
-    let mut all = Vec::new();
-    for (record, model) in own.iter().zip(model.chunks(outputs.max(1))) {
-        all.push(FittedRecord {
-            time: TimeColumn::of(&path(&record.name), &file.columns, record)?,
-            record: record.clone(),
-            model: model.to_vec(),
-        });
-    }
-    exported.fitted_to = names_of(own);
+    let name = |column: &String| Heading::of(column).name;
+    let input_names = file.columns.inputs.iter().map(name);
+    let output_names = file.columns.outputs.iter().map(name);
+    let input_units = spec.about_inputs().map(|u| u.unit.clone());
+    let output_units = spec.about_outputs().map(|y| y.unit.clone());
+    exported.fitted_to = record_names(own).into_iter().map(String::from).collect();
     exported.curves = Some(Curves {
         inputs: input_names.zip(input_units).collect(),
         outputs: output_names.zip(output_units).collect(),
-        records: all,
+        records: FittedRecord::all(own, &model, (files, &file.columns))?,
     });
     Ok((exported, records.summaries.clone()))
 }

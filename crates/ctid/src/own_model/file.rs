@@ -114,6 +114,32 @@ impl AnyModelFile {
 }
 
 impl AnyModelFile {
+    /// The path of the model text that the file names.
+    pub(crate) fn text(&self) -> Option<&Path> {
+        match self {
+            Self::Plant(_) => None,
+            Self::Own(file) => Some(&file.text),
+        }
+    }
+
+    /// Checks that there are records for a plant, whose file holds no values; `path`: its name, `option`: how records are given.
+    pub(crate) fn require_records(
+        &self,
+        path: &Path,
+        records: &[PathBuf],
+        option: &str,
+    ) -> Result<(), Error> {
+        match (self, records) {
+            (Self::Plant(_), []) => Err(Error::file(
+                path,
+                format!(
+                    "a model file of a plant holds first guesses, no values: give the records that it is fitted to, {option}"
+                ),
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// Warning about a loop that the file declares and that is not simulated; empty if there is none.
     pub fn loop_said(&self, look: Look) -> String {
         match self {
@@ -244,11 +270,8 @@ impl OwnModelFile {
         let ColumnFault::Missing { wanted, .. } = &**fault else {
             return error.into();
         };
-        let spec = self.model.spec();
-        let inputs = spec.inputs.iter().map(|input| &input.about);
-        let outputs = spec.outputs.iter().map(|o| spec.about(o.variable));
         let columns = self.columns.inputs.iter().chain(&self.columns.outputs);
-        let mut signals = columns.zip(inputs.chain(outputs));
+        let mut signals = columns.zip(self.signals());
         let own = signals.find(|(column, _)| *wanted == format!("\"{}\"", quoted(column)));
         match own {
             None => error.into(),
@@ -280,12 +303,13 @@ impl OwnModelFile {
     /// Inputs and outputs in the order of the model.
     pub fn signals(&self) -> impl Iterator<Item = &About> {
         let spec = self.model.spec();
-        let inputs = spec.inputs.iter().map(|input| &input.about);
-        inputs.chain(
-            spec.outputs
-                .iter()
-                .map(|output| spec.about(output.variable)),
-        )
+        spec.about_inputs().chain(spec.about_outputs())
+    }
+
+    /// Unit of an input or output; empty if there is none of this name.
+    pub(crate) fn unit_of(&self, signal: &str) -> &str {
+        let own = self.signals().find(|about| about.name == signal);
+        own.map_or("", |about| about.unit.as_str())
     }
 
     /// Seconds in one unit of the time column, as the model file declares it or, where it does not, the header of the first record.

@@ -1,10 +1,11 @@
 //! A user's own model fitted to records: the basis of comparisons, simulations and exports.
 
+use std::fmt::Display;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use ct_signals::{Columns, Reading, Record};
+use ct_signals::{Columns, Reading, Record, record_names};
 use effect_search::{ControlLoop, Options, held_out, widened};
 use greybox::{
     Fit, FitOptions, FitUncertainty, ModelSetup, Robust, SimulatedLoop, TimeLimit,
@@ -42,6 +43,16 @@ pub struct FitLimit<'a> {
     pub time: Option<Duration>,
     /// A flag that is set.
     pub interrupt: Option<&'a AtomicBool>,
+}
+
+impl<'a> FitLimit<'a> {
+    /// The limit of a search of a plant.
+    pub(crate) fn of(options: &missing_effect::Options<'a>) -> Self {
+        Self {
+            time: options.time_limit,
+            interrupt: options.interrupt,
+        }
+    }
 }
 
 /// Agreement of a simulation with a measured output.
@@ -255,7 +266,8 @@ impl FittedModel {
             return Ok(None);
         }
         let moved = moved_by_weighting(setup, &self.fit, noise_order, stopping);
-        let moved = moved.map_err(|error| blame(&self.records.records, &error.into()))?;
+        let moved =
+            moved.map_err(|error| blame(&self.records.records, &greybox::Error::from(error)))?;
         Ok(Some(moved))
     }
 
@@ -321,14 +333,13 @@ impl FittedModel {
 
     /// Scores of each output, from its error and the scored readings.
     fn scores(&self, errors: impl Iterator<Item = (f64, Vec<f64>)>) -> Vec<OutputScore> {
-        let spec = self.model.model.spec();
-        let outputs = spec.outputs.iter().zip(errors);
-        let outputs = outputs.map(|(output, (rmse, values))| {
+        let outputs = self.model.model.spec().about_outputs().zip(errors);
+        let outputs = outputs.map(|(about, (rmse, values))| {
             let count = values.len() as f64;
             let mean = values.iter().sum::<f64>() / count;
             let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
             OutputScore {
-                output: spec.about(output.variable).name.clone(),
+                output: about.name.clone(),
                 rmse,
                 fit_percent: 100.0 * (1.0 - rmse / (squares / count).sqrt()),
             }
@@ -349,12 +360,10 @@ fn setup_of<'a>(model: &'a OwnModelFile, records: &'a Records) -> Result<ModelSe
     setup.map_err(|error| blame(&records.records, &error))
 }
 
-/// An error of the computation, with its records.
-pub(super) fn blame(records: &[Record], error: &greybox::Error) -> Error {
-    let mut names: Vec<&str> = records.iter().map(|r| r.name.as_str()).collect();
-    names.dedup();
+/// An error of a computation or of a search, with its records.
+pub(super) fn blame(records: &[Record], error: &impl Display) -> Error {
     Error::File {
-        file: names.join(", "),
+        file: record_names(records).join(", "),
         what: error.to_string(),
     }
 }

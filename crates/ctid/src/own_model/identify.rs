@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use ct_model::{Linearity, TransferFunction, Variable};
+use ct_model::{Linearity, TransferFunction};
 use ct_signals::{Columns, Hold, Record, quoted};
 use serde::Serialize;
 
 use super::controller::OwnController;
 use super::file::OwnModelFile;
 use crate::Error;
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::model_file::ControllerSettings;
 use crate::numbers;
 use crate::output::Found;
@@ -83,14 +83,8 @@ impl<'f> OneByOne<'f> {
                 ),
             ));
         }
-        let inputs: Vec<&str> = (0..spec.inputs.len())
-            .map(|i| spec.about(Variable::Input(i)).name.as_str())
-            .collect();
-        let outputs: Vec<&str> = spec
-            .outputs
-            .iter()
-            .map(|output| spec.about(output.variable).name.as_str())
-            .collect();
+        let inputs: Vec<&str> = spec.about_inputs().map(|u| u.name.as_str()).collect();
+        let outputs: Vec<&str> = spec.about_outputs().map(|y| y.name.as_str()).collect();
         let chosen = |what: &str, names: &[&str], wanted: Option<&str>| match (wanted, names) {
             (_, []) => Err(Error::file(
                 path,
@@ -301,18 +295,14 @@ impl OwnTransferFunction {
             let (found, unit) = match identified {
                 None => ("-".to_string(), String::new()),
                 Some(parameter) => {
-                    let (value, error) =
-                        numbers::value_and_error(parameter.value, parameter.std_error);
-                    let error = error.map_or(String::new(), |error| format!(" ± {error}"));
-                    (value + &error, parameter.unit.clone())
+                    let value = numbers::with_error(parameter.value, parameter.std_error);
+                    (value, parameter.unit.clone())
                 }
             };
             rows.push(vec![name, numbers::significant(value, 5), found, unit]);
         }
         let sides = [Side::Left, Side::Right, Side::Left, Side::Left];
-        for line in table(&sides, &rows) {
-            text += &format!("  {}\n", line.trim_end());
-        }
+        text += &table_text(&sides, &rows);
         let mut notes = Vec::new();
         if let Some((order, _)) = found
             && (order.n, order.m) != (n, m)

@@ -7,6 +7,7 @@ use ct_model::effects::{Candidate, Role, Visited, apply};
 use effect_search::{Believed, Options, Problem, all_candidates, believed, with_effects};
 
 use super::file::{OwnModelFile, Records};
+use super::fitted::blame;
 use crate::effort::EffortLevel;
 use crate::{Error, interrupt, numbers};
 
@@ -45,16 +46,6 @@ pub(super) fn problem(file: &OwnModelFile, records: &Records) -> Result<Problem,
     })
 }
 
-/// An error of the search, with the records that it is of.
-pub(super) fn blamed(problem: &Problem, error: &effect_search::Error) -> Error {
-    let mut names: Vec<&str> = problem.records.iter().map(|r| r.name.as_str()).collect();
-    names.dedup();
-    Error::File {
-        file: names.join(", "),
-        what: error.to_string(),
-    }
-}
-
 impl OwnModelFile {
     /// The model with its effects in it. With records the effects are fitted to them one after the other, and parameters begin there; what
     /// the file does not keep of an earlier record is taken from these. Without any the file has to say all of it.
@@ -84,7 +75,7 @@ impl OwnModelFile {
             None => self.as_it_stands()?,
             Some(records) => {
                 let problem = problem(self, records)?;
-                believed(&problem, options).map_err(|e| blamed(&problem, &e))?
+                believed(&problem, options).map_err(|e| blame(&problem.records, &e))?
             }
         };
         Ok(Self {

@@ -213,16 +213,8 @@ fn document(
     let fitted = &parts::joined(&records.records);
     let held_out = parts::joined(&records.test);
     let all_parts = [records.records.as_slice(), &records.test].concat();
-    let units: Vec<String> = spec
-        .outputs
-        .iter()
-        .map(|output| spec.about(output.variable).unit.clone())
-        .collect();
-    let outputs: Vec<String> = spec
-        .outputs
-        .iter()
-        .map(|output| spec.about(output.variable).name.clone())
-        .collect();
+    let units: Vec<String> = spec.about_outputs().map(|y| y.unit.clone()).collect();
+    let outputs: Vec<String> = spec.about_outputs().map(|y| y.name.clone()).collect();
     let shown = |record: &Record, held_out: bool| {
         let inputs = spec.inputs.iter().zip(&record.inputs);
         let inputs = inputs.map(|(input, channel)| ShownInput {

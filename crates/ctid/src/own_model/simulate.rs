@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ct_signals::{Heading, ReadSummary, Record};
+use ct_signals::{Heading, ReadSummary, Record, record_names};
 use greybox::{FitOptions, FitUncertainty, InitialStates, ModelSetup, output_errors};
 
 use super::file::{OwnModelFile, Records};
@@ -10,7 +10,7 @@ use super::fitted::{FitLimit, FittedModel};
 use crate::Error;
 use crate::simulate::{
     Band, Inputs, LEVEL, ReadInputs, Simulated, SimulatedOutput, StateSource, begins_with_readings,
-    first_readings, read_inputs,
+    of_first_readings, read_inputs,
 };
 
 /// Simulates the model on the inputs of a record, after a fit to other records if there are any.
@@ -134,42 +134,31 @@ pub(super) fn simulated(
             Some(errors.ok_or_else(|| runs_away(&setup, record, path, &x, &spec.name))?)
         }
     };
-    let names = file
-        .columns
-        .outputs
-        .iter()
-        .map(|name| Heading::of(name).name);
-    let outputs = spec.outputs.iter().zip(names).zip(mean).enumerate();
-    let outputs = outputs.map(|(o, ((output, name), mean))| {
+    let names = file.columns.outputs.iter();
+    let names = names.map(|name| Heading::of(name).name);
+    let outputs = spec.about_outputs().zip(names).zip(mean).enumerate();
+    let outputs = outputs.map(|(o, ((about, name), mean))| {
         let band = errors.as_ref().zip(known.as_ref());
         SimulatedOutput {
             name,
-            unit: spec.about(output.variable).unit.clone(),
+            unit: about.unit.clone(),
             band: band.map(|(errors, known)| Band::of(&errors[o], known, o, level)),
             mean,
             measured: record.outputs[o].values.clone(),
         }
     });
-    let std_errors = |i: usize| {
-        let known = known.as_ref()?;
-        let at = known.entries.iter().position(|entry| *entry == i)?;
-        Some(known.covariance[at][at].sqrt())
-    };
-    let mut fitted_to: Vec<String> = fitted.map_or_else(Vec::new, |fitted| {
-        let records = fitted.records().records.iter();
-        records.map(|record| record.name.clone()).collect()
-    });
-    fitted_to.dedup();
+    let std_error = |i: usize| known.as_ref()?.std_error(i);
+    let fitted_to = fitted.map_or_else(Vec::new, |fitted| record_names(&fitted.records().records));
     let names = spec.parameters.iter().map(|p| p.about.name.clone());
     Ok(Simulated {
         schema: 1,
         model: spec.name.clone(),
         inputs: record.name.clone(),
-        fitted_to,
+        fitted_to: fitted_to.into_iter().map(String::from).collect(),
         parameters: names
             .zip(parameters)
             .enumerate()
-            .map(|(i, (name, value))| (name, value, std_errors(i)))
+            .map(|(i, (name, value))| (name, value, std_error(i)))
             .collect(),
         states: spec
             .states
@@ -197,36 +186,18 @@ fn states(
 ) -> Result<(InitialStates, StateSource), greybox::Error> {
     let count = parameters.len();
     let entries: &[usize] = known.map_or(&[], |known| &known.entries);
-    let mut rows = first;
-    while begins_with_readings(record) {
-        let begun = [first_readings(record, rows)];
-        let frozen = setup.held_out(&begun, parameters)?;
-        match known {
-            None => {
-                let x = frozen.fit_states(options)?;
-                let states = InitialStates::known(x[count..].to_vec(), 0);
-                return Ok((states, StateSource::Readings));
-            }
-            Some(known) => {
-                let model = setup.with_records(&begun)?;
-                let x: Vec<f64> = [parameters, &frozen.start()[count..]].concat();
-                let states = InitialStates::of_readings(
-                    &frozen,
-                    &model,
-                    &x,
-                    count,
-                    known,
-                    options.stopping,
-                )?;
-                if let Some(states) = states {
-                    return Ok((states, StateSource::Readings));
-                }
-            }
-        }
-        if begun[0].len() >= record.len() {
-            break;
-        }
-        rows *= 2;
+    let fitted = of_first_readings((record, first), |begun| {
+        let frozen = setup.held_out(begun, parameters)?;
+        let Some(known) = known else {
+            let x = frozen.fit_states(options)?;
+            return Ok(Some(InitialStates::known(x[count..].to_vec(), 0)));
+        };
+        let model = setup.with_records(begun)?;
+        let x: Vec<f64> = [parameters, &frozen.start()[count..]].concat();
+        InitialStates::of_readings(&frozen, &model, &x, count, known, options.stopping)
+    })?;
+    if let Some(states) = fitted {
+        return Ok((states, StateSource::Readings));
     }
     let states = InitialStates::of_text(setup.model(), parameters, entries);
     Ok((states, StateSource::Text))

@@ -3,7 +3,7 @@
 use effect_search::{Diagnosis, Single};
 
 use super::words::shown_unit;
-use crate::look::{self, Look, Side};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::sentences::with_unit;
 
@@ -47,9 +47,7 @@ pub(super) fn table(diagnosis: &Diagnosis, look: Look) -> String {
             detectable(single).unwrap_or_default(),
         ]);
     }
-    for line in look::table(&[Side::Left, Side::Right, Side::Left], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&[Side::Left, Side::Right, Side::Left], &rows);
     text.push('\n');
     text
 }

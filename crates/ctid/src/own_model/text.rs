@@ -4,13 +4,14 @@ use ct_signals::Clock;
 use effect_search::Step;
 
 use super::compare::{Comparison, Curves};
-use super::diagnose::state_rows;
+use super::diagnose::{estimates, state_rows};
 use super::file::OwnModelFile;
 use super::fitted::cut_short;
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot::{self, Curve, plot};
 use crate::sentences::{FailureWords, of_gaps};
+use crate::simulate::header;
 use crate::terminal::{FAILURES, residual_tests, without_50};
 
 /// The complete comparison, with a plot of the first record.
@@ -53,9 +54,7 @@ pub(crate) fn said(file: &OwnModelFile, comparison: &Comparison, look: Look) -> 
         rows.push(row);
     }
     text += &format!("{}\n", look.heading("Simulation error, root mean square"));
-    for line in table(&[Side::Left, Side::Right, Side::Right], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&[Side::Left, Side::Right, Side::Right], &rows);
     text += &state_rows(step);
     let outputs = std::iter::once(step.outputs.as_slice());
     text += &without_50(outputs, |name| comparison.unit_of(name), look);
@@ -65,23 +64,7 @@ pub(crate) fn said(file: &OwnModelFile, comparison: &Comparison, look: Look) -> 
             numbers::significant(step.weighted_rmse, 3)
         );
     }
-    text += &format!(
-        "\n{}\n",
-        look.heading("Parameters and initial states, with standard errors")
-    );
-    let rows = step.parameters.iter().map(|parameter| {
-        let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
-        let error = match error {
-            Some(error) => format!("± {error}"),
-            None if parameter.known => "(known)".to_string(),
-            None => "(at a bound, or not determined)".to_string(),
-        };
-        vec![parameter.name.clone(), value, error, parameter.unit.clone()]
-    });
-    let rows: Vec<Vec<String>> = rows.collect();
-    for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &estimates(step, look);
     if let Some(cut) = cut_short(&comparison.effort) {
         text += &look.warning(format!("warning: {cut}"));
         text.push('\n');
@@ -173,8 +156,7 @@ pub(super) fn undetermined(found: &[Vec<String>], look: Look) -> String {
                 all.join(", ")
             ),
         };
-        text += &look.warning(look.paragraph("", &format!("warning: {what}")).trim_end());
-        text.push('\n');
+        text += &look.warning_paragraph(what);
     }
     text
 }
@@ -192,32 +174,18 @@ fn drawn(curves: &Curves, look: Look) -> String {
         [first, .., last] => last - first,
         _ => 0.0,
     };
-    let in_unit = if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" [{unit}]")
-    };
     let residual: Vec<f64> = measured.iter().zip(model).map(|(y, m)| y - m).collect();
-    let both = [
-        Curve {
-            values: measured,
-            colour: plot::MEASURED,
-        },
-        Curve {
-            values: model,
-            colour: plot::MODEL,
-        },
-    ];
     let one = [Curve {
         values: &residual,
         colour: plot::RESIDUAL,
     }];
-    let limits = plot::limits([measured.as_slice(), model]);
     let own = plot::limits([residual.as_slice()]);
     let title = look.heading(&format!("{record}, {output}:"));
     format!(
-        "{title} measured and model{in_unit}\n{}\nMeasured minus model{in_unit}\n{}\n",
-        plot(&both, (0.0, length), limits, 9, look),
+        "{title} {}\n{}\n{}\n{}\n",
+        header("measured and model", unit),
+        plot::overlay(measured, model, length, look),
+        header("Measured minus model", unit),
         plot(&one, (0.0, length), own, 5, look)
     )
 }

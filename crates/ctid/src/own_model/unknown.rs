@@ -3,8 +3,9 @@
 use effect_search::Unknown;
 
 use super::words::{EffectWords, shown_unit};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
+use crate::simulate::header;
 use crate::term_file::of_curve;
 
 /// Describes the function in one or two sentences.
@@ -31,10 +32,7 @@ pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
 pub(super) fn values(unknown: &Unknown, look: Look) -> String {
     /// Distance between listed values.
     const EVERY: usize = 4;
-    let head = |name: &str, unit: &str| match shown_unit(unit) {
-        "" => name.to_string(),
-        unit => format!("{name} [{unit}]"),
-    };
+    let head = |name: &str, unit: &str| header(name, shown_unit(unit));
     let mut rows = vec![vec![
         head(&unknown.variable, &unknown.variable_unit),
         head("term", &unknown.unit),
@@ -52,9 +50,7 @@ pub(super) fn values(unknown: &Unknown, look: Look) -> String {
         ]);
     }
     let mut text = format!("\n{}\n", look.heading(&unknown.effect));
-    for line in table(&[Side::Right; 3], &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&[Side::Right; 3], &rows);
     text
 }
 

@@ -19,9 +19,7 @@ pub fn html(study: &Study) -> String {
         iterations(),
         cells(study, 2, "Table II: the rig, emulated"),
         misprints(study),
-        "</main>".to_owned(),
-        "<footer><p>Written by ctid. This file holds all its data and loads nothing.</p></footer>"
-            .to_owned(),
+        page::footer(""),
     ]
     .concat();
     let figures = [

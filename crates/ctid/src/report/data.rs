@@ -9,6 +9,7 @@ use super::decimate::min_max;
 use super::missing_term::MissingTerm;
 use super::text;
 use crate::findings;
+use crate::sentences::placed;
 
 /// Largest number of points of a curve.
 const POINTS: usize = 5_000;
@@ -210,10 +211,9 @@ pub(super) fn script_safe(data: &impl Serialize) -> String {
 
 /// The name of a step: `base model`, or `+ overflow (upper)`.
 pub(super) fn step_label(step: &Step) -> String {
-    match (&step.added, &step.place) {
-        (None, _) => "base model".to_owned(),
-        (Some(effect), None) => format!("+ {effect}"),
-        (Some(effect), Some(place)) => format!("+ {effect} ({place})"),
+    match &step.added {
+        None => "base model".to_owned(),
+        Some(effect) => format!("+ {}", placed(effect, step.place.as_deref())),
     }
 }
 

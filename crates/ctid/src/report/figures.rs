@@ -99,6 +99,21 @@ impl Figure {
 }
 
 impl Panel {
+    /// Output, residual and input of a fit.
+    pub(super) fn of_fit(output_unit: &str, input_unit: &str) -> Vec<Self> {
+        vec![
+            Self {
+                share: 2.0,
+                ..Self::new("output", output_unit)
+            },
+            Self {
+                lines: vec![0.0],
+                ..Self::new("residual", output_unit)
+            },
+            Self::new("input", input_unit),
+        ]
+    }
+
     pub(super) fn new(title: &str, unit: &str) -> Self {
         Self {
             title: title.to_owned(),
@@ -112,6 +127,14 @@ impl Panel {
 }
 
 impl Curve {
+    /// An input, which is held.
+    pub(super) fn input(panel: usize, data: (&[f64], &[f64])) -> Self {
+        Self {
+            held: true,
+            ..Self::line("input", panel, Colour::Named("faint"), data)
+        }
+    }
+
     /// A line, thinned for display.
     pub(super) fn line(
         name: &str,

@@ -17,10 +17,10 @@ pub fn html(found: &Identification) -> String {
         fit(),
         parameters(found),
         convergence(found),
-        "</main>".to_owned(),
-        "<footer><p>Written by ctid. The simulation error is that of a model that runs on the input alone; it is not a prediction \
-         error. Bands and standard errors are one standard deviation. This file holds all its data and loads nothing.</p></footer>"
-            .to_owned(),
+        page::footer(
+            "The simulation error is that of a model that runs on the input alone; it is not a prediction error. \
+             Bands and standard errors are one standard deviation. ",
+        ),
     ]
     .concat();
     let figures: Vec<Figure> = [fit_figure(found)]
@@ -202,17 +202,7 @@ fn fit_figure(found: &Identification) -> Figure {
         .map(|(y, model)| y - model)
         .collect();
     let output = &shown.output;
-    let panels = vec![
-        Panel {
-            share: 2.0,
-            ..Panel::new("output", &output.unit)
-        },
-        Panel {
-            lines: vec![0.0],
-            ..Panel::new("residual", &output.unit)
-        },
-        Panel::new("input", &shown.input.unit),
-    ];
+    let panels = Panel::of_fit(&output.unit, &shown.input.unit);
     let measured = Colour::Named("measured");
     let curves = vec![
         Curve::line("measured", 0, measured, (&shown.time, &output.values)).named(),
@@ -227,15 +217,7 @@ fn fit_figure(found: &Identification) -> Figure {
         }
         .named(),
         Curve::line("residual", 1, Colour::Of(1), (&shown.time, &residual)),
-        Curve {
-            held: true,
-            ..Curve::line(
-                "input",
-                2,
-                Colour::Named("faint"),
-                (&shown.time, &shown.input.values),
-            )
-        },
+        Curve::input(2, (&shown.time, &shown.input.values)),
     ];
     Figure::over_time("fit", 560, panels, curves)
 }

@@ -103,7 +103,7 @@ fn headline(diagnosis: &Diagnosis, sentences: &[String]) -> String {
 }
 
 fn verdict(diagnosis: &Diagnosis) -> String {
-    if is_comparison(diagnosis) {
+    if findings::is_comparison(diagnosis) {
         return "Model against measurement".to_owned();
     }
     match diagnosis.verdict {
@@ -127,11 +127,6 @@ fn verdict(diagnosis: &Diagnosis) -> String {
         Verdict::Adequate => "The model is adequate",
     }
     .to_owned()
-}
-
-/// Whether no effect was scored: the report of `compare`.
-fn is_comparison(diagnosis: &Diagnosis) -> bool {
-    diagnosis.scores.is_empty() && diagnosis.steps.len() < 2
 }
 
 fn trail(diagnosis: &Diagnosis) -> String {

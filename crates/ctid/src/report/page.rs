@@ -62,6 +62,13 @@ pub(super) fn html(page: &Page) -> String {
     )
 }
 
+/// End of a page; `said`: sentences about its numbers, each with a blank behind it.
+pub(super) fn footer(said: &str) -> String {
+    format!(
+        "</main><footer><p>Written by ctid. {said}This file holds all its data and loads nothing.</p></footer>"
+    )
+}
+
 /// A part of the page under a heading; `title`, `lead` and `content` are HTML.
 pub(super) fn section(id: &str, title: &str, lead: &str, content: &str) -> String {
     let lead = if lead.is_empty() {

@@ -22,9 +22,7 @@ pub fn html(found: &SideBySide) -> String {
         parameters(found),
         assumptions(found),
         orders(found),
-        "</main>".to_owned(),
-        "<footer><p>Written by ctid. This file holds all its data and loads nothing.</p></footer>"
-            .to_owned(),
+        page::footer(""),
     ]
     .concat();
     page::html(&Page {
@@ -203,17 +201,7 @@ fn orders(found: &SideBySide) -> String {
 
 fn fit_figure(found: &SideBySide) -> Figure {
     let shown = &found.shown;
-    let panels = vec![
-        Panel {
-            share: 2.0,
-            ..Panel::new("output", &shown.output.unit)
-        },
-        Panel {
-            lines: vec![0.0],
-            ..Panel::new("residual", &shown.output.unit)
-        },
-        Panel::new("input", &shown.input.unit),
-    ];
+    let panels = Panel::of_fit(&shown.output.unit, &shown.input.unit);
     let measured = Colour::Named("measured");
     let output = &shown.output.values;
     let mut curves = vec![Curve::line("measured", 0, measured, (&shown.time, output)).named()];
@@ -230,14 +218,6 @@ fn fit_figure(found: &SideBySide) -> Figure {
             .collect();
         curves.push(Curve::line(name, 1, colour, (&shown.time, &residual)).dashed(dash));
     }
-    curves.push(Curve {
-        held: true,
-        ..Curve::line(
-            "input",
-            2,
-            Colour::Named("faint"),
-            (&shown.time, &shown.input.values),
-        )
-    });
+    curves.push(Curve::input(2, (&shown.time, &shown.input.values)));
     Figure::over_time("fit", 620, panels, curves)
 }

@@ -21,7 +21,7 @@ mod unknown;
 mod verdict;
 mod warnings;
 
-use missing_effect::numbers::value_and_error;
+use missing_effect::numbers;
 use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
 
 pub use self::alarm::{Told, of_alarm, of_scatter};
@@ -77,13 +77,23 @@ pub fn of_diagnosis(diagnosis: &Diagnosis) -> Vec<String> {
 
 /// A value with its standard error to two significant digits of the latter.
 fn with_error(parameter: &Parameter) -> String {
-    let (value, error) = value_and_error(parameter.value, parameter.std_error);
-    let error = error.map_or(String::new(), |error| format!(" ± {error}"));
-    with_unit(&format!("{value}{error}"), &parameter.unit)
+    let value = numbers::with_error(parameter.value, parameter.std_error);
+    with_unit(&value, &parameter.unit)
 }
 
 pub(crate) fn with_unit(number: &str, unit: &str) -> String {
     format!("{number} {unit}").trim_end().to_string()
+}
+
+/// `0 .. 3.50 V`: two values to three digits, with what stands between them.
+pub(crate) fn interval((low, high): (f64, f64), between: &str, unit: &str) -> String {
+    let [low, high] = [low, high].map(|end| numbers::significant(end, 3));
+    with_unit(&format!("{low}{between}{high}"), unit)
+}
+
+/// An effect, and its place where there is a choice: `overflow (upper)`.
+pub(crate) fn placed(effect: &str, place: Option<&str>) -> String {
+    place.map_or(effect.to_string(), |place| format!("{effect} ({place})"))
 }
 
 /// Root mean squares in words: `0.300 cm rms`, of several outputs `0.300 cm rms (upper) and 0.100 cm rms (lower)`.

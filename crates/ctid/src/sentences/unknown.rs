@@ -61,12 +61,7 @@ pub(super) fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> St
                 (100.0 * share.std_error).max(1.0)
             );
         }
-        let (low, high) = unknown
-            .ordinates
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-                (low.min(*v), high.max(*v))
-            });
+        let (low, high) = ct_signals::range_of(&unknown.ordinates);
         said += &format!(
             "; it ranges over {} {}",
             significant(high - low, 2),

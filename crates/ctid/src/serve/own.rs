@@ -180,9 +180,8 @@ impl Own {
         let model = self.model();
         let columns = model.as_ref().ok().map(|model| &model.columns);
         let signals = spec.as_ref().ok().map(|spec| {
-            let inputs = spec.inputs.iter().map(|input| ("input", &input.about));
-            let outputs = spec.outputs.iter();
-            let outputs = outputs.map(|output| ("output", spec.about(output.variable)));
+            let inputs = spec.about_inputs().map(|about| ("input", about));
+            let outputs = spec.about_outputs().map(|about| ("output", about));
             let names = columns
                 .iter()
                 .flat_map(|c| c.inputs.iter().chain(&c.outputs));

@@ -1,6 +1,6 @@
 //! Diagnosis of a user's own model for the page: the effects, their ports in the model, and the fall of the error.
 
-use ct_model::{About, ModelSpec, Variable};
+use ct_model::{About, ModelSpec};
 use effect_search::{Diagnosis, Step};
 use serde_json::{Value, json};
 
@@ -42,16 +42,6 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
         let values = step.rmse_per_output.values();
         values.map(|rmse| numbers::significant(*rmse, 3)).collect()
     };
-    let units = |name: &String| {
-        let spec = &model.base;
-        let mut outputs = spec
-            .outputs
-            .iter()
-            .map(|output| spec.about(output.variable));
-        outputs
-            .find(|about| about.name == *name)
-            .map_or(String::new(), |about| about.unit.clone())
-    };
     let steps = found.steps.iter().map(|step| {
         let name = step
             .added
@@ -67,7 +57,7 @@ pub(super) fn body(model: &OwnModelFile, found: &Diagnosis) -> Value {
         "headline": diagnosis_heading(found),
         "sentences": diagnosis_remaining(model, found),
         "groups": groups.collect::<Vec<_>>(),
-        "outputs": outputs.iter().map(|name| json!({ "name": name, "unit": units(name) })).collect::<Vec<_>>(),
+        "outputs": outputs.iter().map(|name| json!({ "name": name, "unit": model.unit_of(name) })).collect::<Vec<_>>(),
         "steps": steps.collect::<Vec<_>>(),
         "unknown": found.unknown.as_ref().map(|unknown| missing_term(&words, unknown)),
         "compared": COMPARED,
@@ -99,12 +89,9 @@ pub(super) fn ports(model: &OwnModelFile, found: &[String]) -> Value {
 }
 
 fn listed(spec: &ModelSpec) -> Vec<(Site, &About)> {
-    let inputs = (0..spec.inputs.len()).map(Variable::Input);
-    let inputs = inputs.map(|v| (Site::Input(spec.about(v).name.clone()), spec.about(v)));
-    let outputs = spec
-        .outputs
-        .iter()
-        .map(|output| spec.about(output.variable));
+    let inputs = spec.about_inputs();
+    let inputs = inputs.map(|about| (Site::Input(about.name.clone()), about));
+    let outputs = spec.about_outputs();
     let outputs = outputs.map(|about| (Site::Output(about.name.clone()), about));
     let states = spec.states.iter().map(|state| &state.about);
     let states = states.map(|about| (Site::Equation(about.name.clone()), about));

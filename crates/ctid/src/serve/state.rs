@@ -14,6 +14,7 @@ use super::upload::Upload;
 use super::words;
 use crate::input::excitation;
 use crate::model_file::ModelFile;
+use crate::sentences::{interval, placed};
 
 /// Progress of the computation, if one is running.
 pub(super) fn job(session: &Session) -> Value {
@@ -129,14 +130,8 @@ fn is_of<T>(found: &Found<T>, session: &Session) -> bool {
 /// Description of a record.
 fn about(record: &Record) -> Value {
     let signal = |signal: &ct_signals::Channel| {
-        let (low, high) = signal.range();
         let unit = &signal.unit;
-        let range = format!(
-            "{} to {} {unit}",
-            numbers::significant(low, 3),
-            numbers::significant(high, 3)
-        );
-        json!({ "name": signal.name, "unit": unit, "range": range.trim_end() })
+        json!({ "name": signal.name, "unit": unit, "range": interval(signal.range(), " to ", unit) })
     };
     json!({
         "samples": record.len(),
@@ -165,10 +160,8 @@ fn chain_name(chain: &Chain) -> String {
     if chain.is_empty() {
         return "base model".to_string();
     }
-    let named = chain.iter().map(|(effect, place)| match place {
-        Some(place) => format!("{effect} ({place})"),
-        None => effect.clone(),
-    });
+    let named = chain.iter();
+    let named = named.map(|(effect, place)| placed(effect, place.as_deref()));
     named.collect::<Vec<_>>().join(" + ")
 }
 

@@ -9,7 +9,7 @@ use super::session::{Found, Session};
 use crate::findings::{self, Reader};
 use crate::model_file::ModelFile;
 use crate::report;
-use crate::sentences::{self, with_unit};
+use crate::sentences::{self, interval, placed, with_unit};
 
 /// Number of experiments in the design's table.
 const EXPERIMENTS: usize = 8;
@@ -73,10 +73,9 @@ fn parameter(parameter: &Parameter) -> Value {
 }
 
 fn size(parameter: &Parameter) -> String {
-    let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
     let name = parameter.name.rsplit('.').next().unwrap_or_default();
-    let error = error.map_or(String::new(), |error| format!(" ± {error}"));
-    with_unit(&format!("{name} {value}{error}"), &parameter.unit)
+    let value = numbers::with_error(parameter.value, parameter.std_error);
+    with_unit(&format!("{name} {value}"), &parameter.unit)
 }
 
 /// Texts of a diagnosis.
@@ -209,10 +208,7 @@ fn ranked(diagnosis: &Diagnosis, score: &Score) -> Value {
 pub(super) fn design(id: u64, design: &Design) -> Value {
     let unit = &design.experiment.unit;
     let row = |candidate: &Candidate| {
-        let range = |low: f64, high: f64, unit: &str| {
-            let high = with_unit(&numbers::significant(high, 3), unit);
-            format!("{} to {high}", numbers::significant(low, 3))
-        };
+        let range = |low: f64, high: f64, unit: &str| interval((low, high), " to ", unit);
         json!({
             "kind": candidate.kind.name(),
             "range": range(candidate.low, candidate.high, unit),
@@ -226,17 +222,13 @@ pub(super) fn design(id: u64, design: &Design) -> Value {
     let sequence = &design.experiment;
     json!({
         "id": id,
-        "between": design.between.each_ref().map(|alternative| match &alternative.place {
-            Some(place) => format!("{} ({place})", alternative.effect),
-            None => alternative.effect.clone(),
-        }),
+        "between": design.between.each_ref().map(|one| placed(&one.effect, one.place.as_deref())),
         "sentences": sentences::of_design(design).into_iter().chain(findings::left_out(&design.effort)).collect::<Vec<_>>(),
         "rows": candidates.chain(&design.again).map(row).collect::<Vec<_>>(),
         "twins": design.twins(),
         "limits": format!(
-            "{} to {} ({}), {}",
-            numbers::significant(design.limits.low, 3),
-            with_unit(&numbers::significant(design.limits.high, 3), unit),
+            "{} ({}), {}",
+            interval((design.limits.low, design.limits.high), " to ", unit),
             design.limits.range_from,
             numbers::duration(design.limits.duration)
         ),

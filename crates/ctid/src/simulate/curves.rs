@@ -1,8 +1,10 @@
 //! Curves and residuals of a fit as CSV.
 
-use ct_signals::Record;
+use ct_signals::{Columns, Record};
 
 use super::{TimeColumn, cell, csv_text, header};
+use crate::Error;
+use crate::input::Files;
 
 /// A record that was fitted.
 #[derive(Debug, Clone)]
@@ -11,6 +13,32 @@ pub(crate) struct FittedRecord {
     pub record: Record,
     /// The model's outputs, row by row.
     pub model: Vec<Vec<f64>>,
+}
+
+impl FittedRecord {
+    /// Records with the outputs of a model, series by series.
+    ///
+    /// # Errors
+    /// Where a file cannot be read any more.
+    pub fn all(
+        records: &[Record],
+        model: &[Vec<f64>],
+        (files, columns): (&Files, &Columns),
+    ) -> Result<Vec<Self>, Error> {
+        let outputs = records
+            .first()
+            .map_or(1, |record| record.outputs.len().max(1));
+        let both = records.iter().zip(model.chunks(outputs));
+        let all = both.map(|(record, model)| {
+            let path = files.path_of(&record.name);
+            Ok(Self {
+                time: TimeColumn::of(path.unwrap_or(&files.data[0]), columns, record)?,
+                record: record.clone(),
+                model: model.to_vec(),
+            })
+        });
+        all.collect()
+    }
 }
 
 /// Curves of all fitted records.

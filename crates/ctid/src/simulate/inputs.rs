@@ -6,6 +6,7 @@ use ct_signals::{
     Channel, Clock, Columns, ReadOptions, ReadSummary, Reading, Record, escaped, quoted,
     read_inputs_csv,
 };
+use greybox::InitialStates;
 
 use super::TimeColumn;
 use crate::Error;
@@ -101,8 +102,28 @@ pub(crate) fn begins_with_readings(record: &Record) -> bool {
     record.outputs.iter().any(has)
 }
 
+/// Initial states fitted to the first readings of a record or, if these do not determine them, to twice as many, and so on; `None` if all
+/// do not. `fit`: the fit to a part of the record.
+pub(crate) fn of_first_readings(
+    (record, first): (&Record, usize),
+    fit: impl Fn(&[Record]) -> Result<Option<InitialStates>, greybox::Error>,
+) -> Result<Option<InitialStates>, greybox::Error> {
+    let mut rows = first;
+    while begins_with_readings(record) {
+        let begun = [first_readings(record, rows)];
+        if let Some(states) = fit(&begun)? {
+            return Ok(Some(states));
+        }
+        if begun[0].len() >= record.len() {
+            break;
+        }
+        rows *= 2;
+    }
+    Ok(None)
+}
+
 /// A record up to the row where each of its outputs has this number of readings, without further readings.
-pub(crate) fn first_readings(record: &Record, count: usize) -> Record {
+fn first_readings(record: &Record, count: usize) -> Record {
     let end = |output: &Channel| {
         let present = output.values.iter().enumerate();
         let mut present = present.filter(|(_, value)| !value.is_nan()).map(|(k, _)| k);

@@ -22,7 +22,7 @@ use serde::Serialize;
 
 pub(crate) use self::curves::{Curves, FittedRecord};
 pub(crate) use self::inputs::{
-    Inputs, ReadInputs, begins_with_readings, first_readings, read_inputs,
+    Inputs, ReadInputs, begins_with_readings, of_first_readings, read_inputs,
 };
 pub use self::plant::of_plant;
 pub(crate) use self::plant::simulate as simulate_plant;

@@ -11,7 +11,7 @@ use missing_effect::{Fitted, Options, Problem};
 
 use super::{
     Band, Inputs, LEVEL, Simulated, SimulatedOutput, StateSource, TimeColumn, begins_with_readings,
-    first_readings, read_inputs,
+    of_first_readings, read_inputs,
 };
 use crate::Error;
 use crate::input::{self, Files};
@@ -223,11 +223,7 @@ fn simulated(
             )
         }
     };
-    let std_error = |i: usize| {
-        let known = uncertainty?;
-        let at = known.entries.iter().position(|entry| *entry == i)?;
-        Some(known.covariance[at][at].sqrt())
-    };
+    let std_error = |i: usize| uncertainty?.std_error(i);
     let names = setup.names();
     let mut warnings = Vec::new();
     if lacking {
@@ -266,32 +262,20 @@ fn states(
     known: Option<&FitUncertainty>,
 ) -> Result<Option<(InitialStates, StateSource)>, greybox::Error> {
     let count = parameters.len();
-    let mut rows = first;
-    while begins_with_readings(record) {
-        let begun = [first_readings(record, rows)];
-        let model = setup.with_records(&begun)?;
-        match known {
-            None => {
-                let x = greybox::fit_initial_levels(&model, parameters, STOPPING)?;
-                let states = InitialStates::known(x[count..].to_vec(), 0);
-                return Ok(Some((states, StateSource::Readings)));
-            }
-            Some(known) => {
-                let mut frozen = model.clone();
-                frozen.freeze_parameters();
-                let levels = levels_from_readings(&model, parameters);
-                let x: Vec<f64> = parameters.iter().copied().chain(levels).collect();
-                let states =
-                    InitialStates::of_readings(&frozen, &model, &x, count, known, STOPPING)?;
-                if let Some(states) = states {
-                    return Ok(Some((states, StateSource::Readings)));
-                }
-            }
-        }
-        if begun[0].len() >= record.len() {
-            break;
-        }
-        rows *= 2;
+    let fitted = of_first_readings((record, first), |begun| {
+        let model = setup.with_records(begun)?;
+        let Some(known) = known else {
+            let x = greybox::fit_initial_levels(&model, parameters, STOPPING)?;
+            return Ok(Some(InitialStates::known(x[count..].to_vec(), 0)));
+        };
+        let mut frozen = model.clone();
+        frozen.freeze_parameters();
+        let levels = levels_from_readings(&model, parameters);
+        let x: Vec<f64> = parameters.iter().copied().chain(levels).collect();
+        InitialStates::of_readings(&frozen, &model, &x, count, known, STOPPING)
+    })?;
+    if let Some(states) = fitted {
+        return Ok(Some((states, StateSource::Readings)));
     }
     let at_rest = |parameters: &[f64]| steady_state(setup, parameters);
     let states = InitialStates::of_parameters(at_rest, parameters, known);

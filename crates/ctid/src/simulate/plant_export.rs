@@ -5,7 +5,7 @@ use ct_signals::{Columns, Heading, Hold, ReadSummary};
 use missing_effect::{Fitted, Options, Problem};
 
 use super::plant_text::AtPorts;
-use super::{Curves, FittedRecord, TimeColumn};
+use super::{Curves, FittedRecord};
 use crate::Error;
 use crate::input::{Files, Input};
 use crate::model_file::ModelFile;
@@ -124,11 +124,8 @@ pub(crate) fn export(
         let model = fitted.setup.simulate(&fitted.fit.x)?.output;
         let names = fitted.setup.names().iter().cloned();
         let values: Vec<_> = names.zip(fitted.fit.x.iter().copied()).collect();
-        let errors = (0..fitted.setup.parameter_count()).map(|i| {
-            let known = fitted.uncertainty?;
-            let at = known.entries.iter().position(|entry| *entry == i)?;
-            Some(known.covariance[at][at].sqrt())
-        });
+        let std_error = |i: usize| fitted.uncertainty?.std_error(i);
+        let errors = (0..fitted.setup.parameter_count()).map(std_error);
         let errors: Vec<Option<f64>> = errors.collect();
         Ok((
             fitted.setup.records.to_vec(),
@@ -151,19 +148,6 @@ pub(crate) fn export(
             Some(text.map_err(refused)?)
         }
     };
-    let mut all = Vec::new();
-    for (record, model) in records.into_iter().zip(model.chunks(outputs.len())) {
-        let path = files
-            .data
-            .iter()
-            .find(|path| files.name_of(path) == record.name);
-        let path = path.unwrap_or(&files.data[0]);
-        all.push(FittedRecord {
-            time: TimeColumn::of(path, &columns, &record)?,
-            record,
-            model: model.to_vec(),
-        });
-    }
     let exported = Exported {
         schema: 1,
         model: name,
@@ -173,7 +157,7 @@ pub(crate) fn export(
         curves: Some(Curves {
             inputs,
             outputs,
-            records: all,
+            records: FittedRecord::all(&records, &model, (files, &columns))?,
         }),
     };
     Ok((exported, summaries))

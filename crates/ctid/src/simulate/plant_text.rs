@@ -124,10 +124,7 @@ impl AtPorts {
             time_unit: 1.0,
             summaries: Vec::new(),
         };
-        let limit = FitLimit {
-            time: options.time_limit,
-            interrupt: options.interrupt,
-        };
+        let limit = FitLimit::of(options);
         let fits = self.sets.par_iter().map(|effects| {
             let settings = OwnSettings {
                 effects: effects.clone(),

@@ -1,9 +1,9 @@
 //! Text output of a simulation.
 
 use super::{Simulated, SimulatedOutput, StateSource, header};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
-use crate::plot::{self, Curve, plot};
+use crate::plot;
 
 /// The whole of it.
 pub(crate) fn said(simulated: &Simulated, look: Look) -> String {
@@ -62,19 +62,14 @@ pub(crate) fn said(simulated: &Simulated, look: Look) -> String {
         Side::Right,
         Side::Left,
     ];
-    for line in table(&sides, &rows) {
-        text += &format!("  {}\n", line.trim_end());
-    }
+    text += &table_text(&sides, &rows);
     if !simulated.fitted_to.is_empty() {
         text += &format!("\n{}\n", look.heading("Parameters, with standard errors"));
         let rows: Vec<Vec<String>> = simulated.parameters.iter().map(parameter).collect();
-        for line in table(&[Side::Left, Side::Right, Side::Left], &rows) {
-            text += &format!("  {}\n", line.trim_end());
-        }
+        text += &table_text(&[Side::Left, Side::Right, Side::Left], &rows);
     }
     for warning in &simulated.warnings {
-        let words = format!("warning: {warning}");
-        text += &(look.warning(look.paragraph("", &words).trim_end()) + "\n");
+        text += &look.warning_paragraph(warning);
     }
     text
 }
@@ -105,31 +100,14 @@ fn states(simulated: &Simulated) -> String {
 }
 
 fn drawn(output: &SimulatedOutput, length: f64, look: Look) -> String {
-    let mut curves = Vec::new();
-    let measured = output.measured.iter().any(|y| !y.is_nan());
-    if measured {
-        curves.push(Curve {
-            values: &output.measured,
-            colour: plot::MEASURED,
-        });
-    }
-    curves.push(Curve {
-        values: &output.mean,
-        colour: plot::MODEL,
-    });
-    let limits = if measured {
-        plot::limits([output.mean.as_slice(), &output.measured])
-    } else {
-        plot::limits([output.mean.as_slice()])
-    };
-    let what = if measured {
-        "measured and model"
-    } else {
-        "model"
+    let is_measured = output.measured.iter().any(|y| !y.is_nan());
+    let (what, measured) = match is_measured {
+        true => ("measured and model", output.measured.as_slice()),
+        false => ("model", &[][..]),
     };
     format!(
         "{} {what}\n{}\n",
         look.heading(&format!("{}:", header(&output.name, &output.unit))),
-        plot(&curves, (0.0, length), limits, 9, look)
+        plot::overlay(measured, &output.mean, length, look)
     )
 }

@@ -4,7 +4,7 @@ use paper_tables::udink::gains::Gains;
 use paper_tables::udink::{Cell, Changed, Comparison, ConstantGain, Contrast, LargerP, Study};
 
 use super::udink_sentences as sentences;
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table, table_text};
 use crate::numbers;
 
 /// The text, complete.
@@ -169,9 +169,7 @@ fn power(changed: &[Changed], look: Look) -> String {
             noticed,
         ]);
     }
-    for line in table(&[Side::Left, Side::Right, Side::Right, Side::Right], &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&[Side::Left, Side::Right, Side::Right, Side::Right], &rows);
     text.push('\n');
     text
 }
@@ -190,9 +188,7 @@ fn constant_gains(gains: &[ConstantGain], look: Look) -> String {
     let [left, right] = [Side::Left, Side::Right];
     let sides = [left, left, right, right, right, right, right, right];
     let mut text = format!("{}\n", look.heading(sentences::CONSTANT_GAINS));
-    for line in table(&sides, &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&sides, &rows);
     text.push('\n');
     text
 }
@@ -221,9 +217,7 @@ fn larger_p(rows: &[LargerP], look: Look) -> String {
     }
     let title = "Table 1 with larger P(0): runs lost, and the median of the criterion";
     let mut text = format!("{}\n", look.heading(title));
-    for line in table(&[Side::Right; 5], &lines) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&[Side::Right; 5], &lines);
     text.push('\n');
     text
 }
@@ -271,9 +265,7 @@ fn gains(gains: &Gains, look: Look) -> String {
         "{}\n",
         look.heading("Three gains on one experiment of second order")
     );
-    for line in table(&sides, &lines) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&sides, &lines);
     let note = format!(
         "The truth is 1, 1, 1. End: the estimates without noise, at 2000 s. Error: with 1 % of noise, of the worst parameter, mean over the last \
          quarter of 1000 s; median of {} noises. The block-diagonal gain of the paper ends elsewhere without noise, which its theorem \

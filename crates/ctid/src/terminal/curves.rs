@@ -7,6 +7,7 @@ use super::{length, model_name};
 use crate::findings;
 use crate::look::Look;
 use crate::plot::{self, Curve, plot};
+use crate::simulate::header;
 
 /// Measurement and model over time, in the first record, output by output.
 pub(crate) fn overlay(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
@@ -20,16 +21,6 @@ fn overlay_of(diagnosis: &Diagnosis, step: &Step, output: usize, look: Look) -> 
     let Some((record, measured, model)) = first_record(diagnosis, step, output) else {
         return String::new();
     };
-    let curves = [
-        Curve {
-            values: measured,
-            colour: plot::MEASURED,
-        },
-        Curve {
-            values: model,
-            colour: plot::MODEL,
-        },
-    ];
     let key = if look.colour {
         format!(
             "measured {} and model {}",
@@ -39,22 +30,13 @@ fn overlay_of(diagnosis: &Diagnosis, step: &Step, output: usize, look: Look) -> 
     } else {
         "measured and model".to_string()
     };
-    let limits = plot::limits([measured, model]);
     let title = format!("{}{}:", record.name, of_output(diagnosis, output));
     format!(
-        "{} {key}{}\n{}\n",
+        "{} {}\n{}\n",
         look.heading(&title),
-        in_unit(&diagnosis.output_unit),
-        plot(&curves, (0.0, length(record)), limits, 9, look)
+        header(&key, &diagnosis.output_unit),
+        plot::overlay(measured, model, length(record), look)
     )
-}
-
-fn in_unit(unit: &str) -> String {
-    if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" [{unit}]")
-    }
 }
 
 /// ` upper` after a comma, if there are several outputs.
@@ -93,11 +75,8 @@ fn residuals_of(diagnosis: &Diagnosis, steps: &[&Step], output: usize, look: Loo
             values: residual,
             colour: plot::RESIDUAL,
         };
-        let title = format!(
-            "Measured minus model{}{}:",
-            of_output(diagnosis, output),
-            in_unit(&diagnosis.output_unit)
-        );
+        let title = format!("Measured minus model{}", of_output(diagnosis, output));
+        let title = header(&title, &diagnosis.output_unit) + ":";
         text += &format!(
             "{} {}\n{}\n",
             look.heading(&title),

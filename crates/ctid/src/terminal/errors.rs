@@ -3,15 +3,15 @@
 use effect_search::OutputStep;
 use missing_effect::Diagnosis;
 
-use super::{BAR, compared, model_name, step_name, with_unit};
-use crate::look::{Look, Side, table};
+use super::{BAR, model_name, step_name, with_unit};
+use crate::look::{Look, Side, table_text};
 use crate::sentences::of_noise_source;
 use crate::{findings, numbers};
 
 /// The error from step to step: for each output and, if there are several, for all together.
 pub(crate) fn trail(diagnosis: &Diagnosis, look: Look) -> String {
     // The residual of a single model does not separate its noise from its model error.
-    let floor_known = !compared(diagnosis);
+    let floor_known = !findings::is_comparison(diagnosis);
     let several = findings::several(diagnosis);
     let mut text = String::new();
     for (index, floor) in diagnosis.noise.iter().enumerate() {
@@ -150,9 +150,7 @@ impl Errors<'_> {
             rows.push(row);
         }
         let mut text = format!("{}\n", look.heading(self.title));
-        for line in table(&sides, &rows) {
-            text += &format!("  {line}\n");
-        }
+        text += &table_text(&sides, &rows);
         text
     }
 }

@@ -11,10 +11,10 @@ pub(crate) use self::curves::{overlay, residuals};
 pub(crate) use self::errors::{trail, without_50};
 pub(crate) use self::ranking::ranking;
 use crate::findings::{self, Reader};
-use crate::look::{Look, Side, table};
+use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot;
-use crate::sentences::{self, with_unit};
+use crate::sentences::{self, interval, placed, with_unit};
 
 /// Number of findings about where a model fails.
 pub(crate) const FAILURES: usize = 5;
@@ -102,9 +102,7 @@ pub(crate) fn header(diagnosis: &Diagnosis, look: Look) -> String {
         Side::Left,
     ];
     let mut text = format!("{}\n", look.heading(&base_name(diagnosis)));
-    for line in table(&sides, &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&sides, &rows);
     text.push('\n');
     text
 }
@@ -117,13 +115,7 @@ fn length(record: &Shown) -> f64 {
 }
 
 fn range(values: &[f64], unit: &str) -> String {
-    let (low, high) = plot::limits([values]);
-    let text = format!(
-        "{} .. {} {unit}",
-        numbers::significant(low, 3),
-        numbers::significant(high, 3)
-    );
-    text.trim_end().to_string()
+    interval(plot::limits([values]), " .. ", unit)
 }
 
 /// The plant with the effects that the model file already has.
@@ -152,13 +144,6 @@ fn model_name(diagnosis: &Diagnosis, step: &Step) -> String {
     }
 }
 
-fn placed(effect: &str, place: Option<&str>) -> String {
-    match place {
-        Some(place) => format!("{effect} ({place})"),
-        None => effect.to_string(),
-    }
-}
-
 /// Sentences about where a model fails, output by output.
 pub(crate) fn failures(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {
     let outputs = step.outputs.iter();
@@ -176,7 +161,7 @@ fn failures_of(
 ) -> String {
     let name = step_name(diagnosis, step);
     let title = match diagnosis.verdict {
-        Verdict::Adequate if !compared(diagnosis) => {
+        Verdict::Adequate if !findings::is_comparison(diagnosis) => {
             format!("Tests of the residual of {name}")
         }
         _ => format!("Where {name} fails"),
@@ -248,9 +233,7 @@ pub(crate) fn parameters(diagnosis: &Diagnosis, step: &Step, look: Look) -> Stri
         "{}\n",
         look.heading(&format!("Parameters of {model}, with standard errors"))
     );
-    for line in table(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&[Side::Left, Side::Right, Side::Left, Side::Left], &rows);
     if step.starts > 1 {
         text += &format!(
             "  {}\n",
@@ -311,22 +294,15 @@ fn rankings(diagnosis: &Diagnosis, look: Look) -> String {
     rows.extend(ranked.into_iter().map(|(rank, a, b)| vec![rank, a, b]));
     let mut text = format!("{}\n", look.heading("Two rankings"));
     text += &look.paragraph("  ", findings::RANKINGS_DISAGREE);
-    for line in table(&[Side::Right, Side::Left, Side::Left], &rows) {
-        text += &format!("  {line}\n");
-    }
+    text += &table_text(&[Side::Right, Side::Left, Side::Left], &rows);
     text.push('\n');
     text
-}
-
-/// Whether no effect was scored: a comparison.
-fn compared(diagnosis: &Diagnosis) -> bool {
-    diagnosis.scores.is_empty() && diagnosis.steps.len() < 2
 }
 
 /// The verdict and its sentences.
 pub(crate) fn findings(diagnosis: &Diagnosis, look: Look) -> String {
     let headline = match diagnosis.verdict {
-        _ if compared(diagnosis) => {
+        _ if findings::is_comparison(diagnosis) => {
             look.strong("`ctid diagnose` says whether anything is missing, and what")
         }
         Verdict::Adequate => look.good("The model is adequate"),

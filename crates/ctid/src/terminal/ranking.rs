@@ -2,8 +2,9 @@
 
 use missing_effect::{Diagnosis, Parameter, Score, Verdict};
 
-use super::{placed, with_unit};
+use super::with_unit;
 use crate::look::{Look, Side, table};
+use crate::sentences::placed;
 use crate::{findings, numbers};
 
 /// Number of effects in the ranking.
@@ -123,10 +124,10 @@ fn ranking_table(diagnosis: &Diagnosis, columns: &[Ranked], look: Look) -> Vec<S
 /// `rim 21.30 ± 0.12 cm`, or without the error, with the significant digits.
 fn size(parameter: &Parameter, with_error: bool) -> String {
     let name = parameter.name.rsplit('.').next().unwrap_or_default();
-    let (value, error) = numbers::value_and_error(parameter.value, parameter.std_error);
-    let value = match error.filter(|_| with_error) {
-        Some(error) => format!("{value} ± {error}"),
-        None => value,
+    let (value, error) = (parameter.value, parameter.std_error);
+    let value = match with_error {
+        true => numbers::with_error(value, error),
+        false => numbers::value_and_error(value, error).0,
     };
     format!("{name} {}", with_unit(&value, &parameter.unit))
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ct_signals::Record;
+use ct_signals::{Record, range_of};
 use estimation::{Noise, Start, Triangle, fit_from, linearise};
 use greybox::{ModelSetup, PriorValue};
 
@@ -31,10 +31,7 @@ pub(super) struct Comparison<'s, 'a> {
 
 /// An output's range, missing samples aside.
 fn range(values: &[f64]) -> (f64, f64) {
-    let finite = values.iter().filter(|v| v.is_finite());
-    finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-        (a.min(*v), b.max(*v))
-    })
+    range_of(values.iter().filter(|v| v.is_finite()))
 }
 
 fn joined(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {

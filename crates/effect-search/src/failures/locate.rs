@@ -61,11 +61,7 @@ fn bin(from: f64, to: f64, values: impl Iterator<Item = f64>, expected: &Expecte
 
 /// Bins of equal width of the residual as a function of another signal.
 fn by(signal: &[f64], residual: &[f64], expected: &Expected) -> Vec<Bin> {
-    let (low, high) = signal
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
-            (l.min(*x), h.max(*x))
-        });
+    let (low, high) = ct_signals::range_of(signal);
     if high <= low {
         return vec![bin(low, high, residual.iter().copied(), expected)];
     }

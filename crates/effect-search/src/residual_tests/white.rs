@@ -57,11 +57,7 @@ pub fn standardised(noise: &ArModel, residual: &[f64]) -> Vec<f64> {
 /// p-value of the test that a whitened residual is independent of the model's previous output.
 #[must_use]
 pub fn level_p(model: &[f64], white: &[f64]) -> f64 {
-    let (low, high) = model
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
-            (low.min(y), high.max(y))
-        });
+    let (low, high) = ct_signals::range_of(model);
     let width = (high - low) / (KNOTS - 1) as f64;
     if !(width.is_finite() && width > 0.0) {
         return 1.0;

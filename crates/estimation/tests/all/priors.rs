@@ -55,13 +55,6 @@ impl Residuals for Curves {
         }
         Some(())
     }
-    fn each_residual(
-        &self,
-        x: &[f64],
-        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
-    ) -> Option<()> {
-        self.each_row(x, |sample, row| each(sample, &mut row[3..]))
-    }
     fn priors(&self) -> &[Prior] {
         &self.priors
     }

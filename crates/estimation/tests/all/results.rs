@@ -33,13 +33,6 @@ impl Residuals for Curve {
         }
         Some(())
     }
-    fn each_residual(
-        &self,
-        x: &[f64],
-        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
-    ) -> Option<()> {
-        self.each_row(x, |sample, row| each(sample, &mut row[2..]))
-    }
 }
 
 #[test]
@@ -131,13 +124,6 @@ impl Residuals for Sine {
             each(sample, &mut [t * cos, y - sin]).then_some(())?;
         }
         Some(())
-    }
-    fn each_residual(
-        &self,
-        x: &[f64],
-        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
-    ) -> Option<()> {
-        self.each_row(x, |sample, row| each(sample, &mut row[1..]))
     }
 }
 

@@ -38,13 +38,6 @@ impl Residuals for Curve {
         }
         Some(())
     }
-    fn each_residual(
-        &self,
-        x: &[f64],
-        mut each: impl FnMut(Sample, &mut [f64]) -> bool,
-    ) -> Option<()> {
-        self.each_row(x, |sample, row| each(sample, &mut row[self.free.len()..]))
-    }
 }
 
 #[test]

@@ -33,6 +33,7 @@ use plants::{Command, Dual, MAX_VESSELS, Scalar, Simulator, Structure};
 
 pub use self::replay::{Replay, replay};
 pub(crate) use self::replay::{fitting, replay_of, require_moving_reference, step};
+pub use self::response::spectral_radius;
 pub(crate) use self::response::{LinearResponse, Response};
 use crate::Error;
 
@@ -82,6 +83,13 @@ impl LinearPlant {
 }
 
 impl LinearPlant {
+    /// The largest magnitude of the eigenvalues of the plant in a loop with a controller, over one sampling interval \[s\]: above one the
+    /// loop is unstable.
+    #[must_use]
+    pub fn radius_in_loop(self, controller: &Controller, interval: f64) -> f64 {
+        spectral_radius(&self.response().in_loop([controller], interval))
+    }
+
     fn response(self) -> LinearResponse {
         LinearResponse {
             outputs: self
@@ -112,7 +120,7 @@ impl Feedback {
         plant: LinearPlant,
     ) -> Result<Self, Error> {
         for record in records {
-            require_moving_reference(record, Some(0))?;
+            require_moving_reference(record)?;
         }
         let (controller, replays) = fitting(controller, |controller| {
             records

@@ -1,28 +1,21 @@
 //! The controller of a record simulated on the measured signals.
 
-use ct_signals::{Hold, Record};
+use ct_signals::{Channel, Hold, Record};
 use estimation::Triangle;
 use plants::controller::{Controller, MAX_CONTROLLER_STATES};
 use plants::{Dual, Scalar};
 
 use crate::Error;
 
-/// Checks that the reference at a position moves: a constant one drives nothing.
-pub(crate) fn require_moving_reference(
-    record: &Record,
-    reference: Option<usize>,
-) -> Result<(), Error> {
-    let Some(reference) = reference.and_then(|at| record.references.get(at)) else {
-        return Ok(());
-    };
-    let (low, high) = reference.range();
-    if low < high {
-        return Ok(());
+/// Checks that the reference of a record moves: a constant one drives nothing.
+pub(crate) fn require_moving_reference(record: &Record) -> Result<(), Error> {
+    match record.references.first().map(Channel::range) {
+        Some((low, high)) if low.is_nan() || low >= high => Err(Error::ConstantReference {
+            record: record.name.clone(),
+            value: low,
+        }),
+        _ => Ok(()),
     }
-    Err(Error::ConstantReference {
-        record: record.name.clone(),
-        value: low,
-    })
 }
 
 /// The controller simulated on the measured signals.

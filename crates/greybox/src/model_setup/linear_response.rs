@@ -7,7 +7,7 @@ use ct_signals::Record;
 use nalgebra::DMatrix;
 
 use super::ModelSetup;
-use crate::feedback::{LinearResponse, Response};
+use crate::feedback::{LinearResponse, Response, spectral_radius};
 
 /// A model whose linear response grows by this number of factors e over the longest record has none.
 const GROWTH: f64 = 3.0;
@@ -46,13 +46,8 @@ impl ModelSetup<'_> {
         if !phi.iter().all(|value| value.is_finite()) {
             return none();
         }
-        let eigenvalues = phi.complex_eigenvalues();
-        let largest = eigenvalues
-            .iter()
-            .map(|value| value.norm())
-            .fold(0.0, f64::max);
         let longest = self.records.iter().map(Record::len).max().unwrap_or(0);
-        if largest.ln() * longest as f64 > GROWTH {
+        if spectral_radius(&phi).ln() * longest as f64 > GROWTH {
             return none();
         }
         let row = |c: &Vec<f64>| {

@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use ct_model::{ModelSpec, Scalar, Variable};
 use ct_signals::{Channel, Record};
-use nalgebra::DMatrix;
 use plants::controller::{Controller, Regulator};
 
 use super::ModelSetup;
 use crate::Error;
-use crate::feedback::{LinearResponse, Replay, Response, fitting, replay_of, step};
+use crate::feedback::{
+    LinearResponse, Replay, Response, fitting, replay_of, spectral_radius, step,
+};
 
 /// A controller that drives an input of a model; it reads the output [`Controller::output`].
 #[derive(Debug, Clone, PartialEq)]
@@ -109,58 +110,13 @@ impl SimulatedLoop {
     /// alone: above one it grows. `None` where the model has no linear response.
     #[must_use]
     pub fn radius(&self) -> Option<(f64, f64)> {
-        let LinearResponse { a, b, outputs } = &*self.response;
-        if a.is_empty() {
+        if self.response.a.is_empty() {
             return None;
         }
-        let linear = self.controllers.iter();
-        let linear: Vec<_> = linear
-            .map(|of| of.controller.linear(self.interval))
-            .collect();
-        let n = a.len();
-        let all = n + linear.iter().map(|own| own.b.len()).sum::<usize>();
-        let mut matrix = DMatrix::<f64>::zeros(all, all);
-        for (i, row) in a.iter().enumerate() {
-            for (j, value) in row.iter().enumerate() {
-                matrix[(i, j)] = *value;
-            }
-        }
-        // States x of the model, then z of each controller: e = -(C x), u = c z + d e.
-        let mut at = n;
-        for ((of, own), b) in self.controllers.iter().zip(&linear).zip(b) {
-            let m = own.b.len();
-            for &(j, c) in &outputs[of.controller.output()] {
-                for i in 0..n {
-                    matrix[(i, j)] -= b[i] * own.d * c;
-                }
-                for i in 0..m {
-                    matrix[(at + i, j)] -= own.b[i] * c;
-                }
-            }
-            for i in 0..n {
-                for j in 0..m {
-                    matrix[(i, at + j)] = b[i] * own.c[j];
-                }
-            }
-            for i in 0..m {
-                // A constant for an operating point is not a part of the loop.
-                let row = &own.a[i];
-                let constant = own.b[i] == 0.0 && (0..m).all(|j| row[j] == f64::from(i == j));
-                for j in 0..m {
-                    matrix[(at + i, at + j)] = if constant { 0.0 } else { row[j] };
-                }
-            }
-            at += m;
-        }
-        let alone = DMatrix::from_fn(n, n, |i, j| a[i][j]);
-        let largest = |of: &DMatrix<f64>| {
-            let eigenvalues = of.complex_eigenvalues();
-            eigenvalues
-                .iter()
-                .map(|value| value.norm())
-                .fold(0.0, f64::max)
-        };
-        Some((largest(&matrix), largest(&alone)))
+        let controllers = self.controllers.iter().map(|of| &of.controller);
+        let controlled = self.response.in_loop(controllers, self.interval);
+        let alone = self.response.in_loop([], self.interval);
+        Some((spectral_radius(&controlled), spectral_radius(&alone)))
     }
 
     /// Whether an output contains a driven input without a state in between.

@@ -142,12 +142,7 @@ pub(super) fn over_level(trajectory: &Trajectory, scaled: &Scaled, order: Order)
         let place = (STRETCHES as f64 * (level - low) / (high - low)) as usize;
         stretches[place.min(STRETCHES - 1)].add(level, gain, time_constant);
     }
-    let range = scaled
-        .y
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
-            (low.min(*y), high.max(*y))
-        });
+    let range = ct_signals::range_of(&scaled.y);
     let duration = scaled.time.last().copied().unwrap_or(f64::NAN);
     let seen: Vec<&Stretch> = stretches.iter().filter(|s| s.count > 0.0).collect();
     let drift = Drift {

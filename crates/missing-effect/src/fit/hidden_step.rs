@@ -45,12 +45,7 @@ pub(crate) fn hidden_step(node: &Node, output: usize) -> Result<Option<Picked>, 
     let segments: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
     let noise = ArModel::fit(&segments, NOISE_ORDER)?;
     let samples = node.setup.samples_per_output()[output];
-    let (low, high) = models
-        .iter()
-        .flatten()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
-            (low.min(y), high.max(y))
-        });
+    let (low, high) = ct_signals::range_of(models.iter().flatten());
     let (span, reach) = (high - low, low.abs().max(high.abs()));
     let grid = TURN / reach;
     let affordable = STEPS.0 + LOOKED_AT / samples as f64 * grid * span;

@@ -6,7 +6,7 @@
 
 use ct_model::{Dual, Scalar, Simulation};
 use ct_signals::Hold;
-use greybox::{FitOptions, ModelSetup};
+use greybox::{FitOptions, ModelSetup, spectral_radius};
 use nalgebra::DMatrix;
 
 use super::OwnModel;
@@ -184,8 +184,7 @@ fn time_constant(
             }
         }
     }
-    let sizes = transition.complex_eigenvalues();
-    let largest = sizes.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    let largest = spectral_radius(&transition);
     if largest > 1.0 - SETTLES || largest.is_nan() {
         return Err(
             "the fitted model does not settle under steady inputs, so that it cannot run beside the plant".into(),

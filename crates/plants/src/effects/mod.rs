@@ -1,6 +1,6 @@
 //! The catalogue: one file per effect. To add an effect, write its file and add its name to the list below, at its position in the chain.
 
-use crate::{Domain, Known, Law, ParameterInfo, Plant, Scalar, Site};
+use crate::{Domain, Known, Law, ParameterInfo, Plant, Scalar, Site, Unit};
 
 /// The place of an effect in the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -175,6 +175,20 @@ pub(crate) fn chain_position(effect: &EffectInfo) -> usize {
         .iter()
         .position(|known| known.id == effect.id)
         .unwrap_or(CATALOGUE.len())
+}
+
+/// The time constant of a first-order lag.
+fn lag(site: &Site, meaning: &'static str) -> Vec<ParameterInfo> {
+    let (sample, duration) = (site.scales.sample_interval, site.scales.duration);
+    vec![ParameterInfo {
+        name: "time_constant",
+        unit: Unit::TIME,
+        meaning,
+        absent: 0.0,
+        lower: 0.0,
+        upper: 0.5 * duration,
+        starts: vec![sample, 8.0 * sample],
+    }]
 }
 
 /// All plants.

@@ -1,7 +1,7 @@
 //! `pump_lag`: the inflow follows the command with a first-order lag.
 
-use super::{EffectInfo, Place, any_plant};
-use crate::{Law, ParameterInfo, Scalar, Site, Unit};
+use super::{EffectInfo, Place, any_plant, lag};
+use crate::{Law, ParameterInfo, Scalar, Site};
 
 pub(super) const INFO: EffectInfo = EffectInfo {
     id: "pump_lag",
@@ -19,16 +19,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
 };
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {
-    let (sample, duration) = (site.scales.sample_interval, site.scales.duration);
-    vec![ParameterInfo {
-        name: "time_constant",
-        unit: Unit::TIME,
-        meaning: "time constant of the pump",
-        absent: 0.0,
-        lower: 0.0,
-        upper: 0.5 * duration,
-        starts: vec![sample, 8.0 * sample],
-    }]
+    lag(site, "time constant of the pump")
 }
 
 struct PumpLag<T>(T);

@@ -1,6 +1,6 @@
 //! Parser of the model file of a user's own model: keys, columns, and their errors.
 
-use ct_model::{Model, ModelSpec, Variable};
+use ct_model::{Model, ModelSpec};
 use ct_signals::{Columns, Hold, Zone, quoted};
 use greybox::PriorValue;
 use serde::Deserialize;
@@ -145,11 +145,8 @@ impl OwnModelFile {
         for parameter in known.keys().chain(priors.keys()) {
             is_parameter(&spec, &effects, parameter).map_err(Error::Usage)?;
         }
-        let inputs = spec.inputs.iter().map(|input| input.about.name.clone());
-        let inputs: Vec<String> = inputs.collect();
-        let outputs = spec.outputs.iter();
-        let outputs = outputs.map(|output| spec.about(output.variable).name.clone());
-        let outputs: Vec<String> = outputs.collect();
+        let inputs: Vec<String> = spec.about_inputs().map(|u| u.name.clone()).collect();
+        let outputs: Vec<String> = spec.about_outputs().map(|y| y.name.clone()).collect();
         let own = [
             (&mut columns.inputs, inputs, "inputs"),
             (&mut columns.outputs, outputs, "outputs"),
@@ -218,13 +215,8 @@ fn is_parameter(spec: &ModelSpec, effects: &OwnEffects, name: &str) -> Result<()
 
 /// The columns of the model's signals: those named by `[columns]`, else columns with the signals' names.
 pub(super) fn columns(spec: &ModelSpec, raw: &Raw, source: &Source) -> Result<Columns, Error> {
-    let inputs = (0..spec.inputs.len()).map(Variable::Input);
-    let inputs: Vec<&str> = inputs.map(|v| spec.about(v).name.as_str()).collect();
-    let outputs = spec
-        .outputs
-        .iter()
-        .map(|output| spec.about(output.variable).name.as_str());
-    let outputs: Vec<&str> = outputs.collect();
+    let inputs: Vec<&str> = spec.about_inputs().map(|u| u.name.as_str()).collect();
+    let outputs: Vec<&str> = spec.about_outputs().map(|y| y.name.as_str()).collect();
     for key in raw.columns.keys() {
         let name = key.as_ref().as_str();
         let known = || inputs.iter().chain(&outputs).chain(&OTHER_COLUMNS).copied();

@@ -24,9 +24,7 @@ pub fn html(study: &Study) -> String {
         constant_gains(&study.constant_gains),
         larger_p(&study.larger_p),
         gains(&study.gains),
-        "</main>".to_owned(),
-        "<footer><p>Written by ctid. This file holds all its data and loads nothing.</p></footer>"
-            .to_owned(),
+        page::footer(""),
     ]
     .concat();
     page::html(&Page {

@@ -70,13 +70,7 @@ impl Rig {
                 .unwrap()
                 .with_sensor_filter(0.2)
                 .unwrap(),
-            step: 2.0,
-            r: excitation::prbs(1270, 10, -1.0, 1.0, 7).unwrap(),
-            snr: 20.0,
-            in_loop,
-            unknown_levels: false,
-            rho: 0.0,
-            missing: false,
+            ..Self::second_order(in_loop)
         }
     }
 

@@ -2,14 +2,13 @@
 //! `cargo run --release -p ctid-tests --example blind_as_text`
 //!
 //! The records and their model files lie in `../shared/blind/public` beside the checkout, or in the folder that is given as an argument; a
-//! second argument selects the records whose names contain it. The text is simulated on the measured command; the built-in plant in its loop
-//! where the model file has a controller.
+//! second argument selects the records whose names contain it. Both are simulated in the loop where the model file has a controller.
 
 use std::error::Error;
 use std::{env, fs};
 
 use ct_model::ModelSpec;
-use ctid_tests::blind;
+use ctid_tests::{as_text, blind};
 use plants::Plant;
 use serde_json::Value;
 
@@ -21,11 +20,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (name, files) in blind::cases(&public, &part)? {
         let problem = files.read()?.problem;
         let built_in = missing_effect::diagnose(&problem, &Default::default(), &|_| {})?;
-        let mut record = problem.records[0].clone();
-        let spec = problem.plant.spec_of(&problem.known, &mut record)?;
-        record.references.clear();
-        let as_text = effect_search::Problem::builder(spec.clone(), [record]).build()?;
-        let as_text = effect_search::diagnose(&as_text, &Default::default(), &|_| {})?;
+        let (spec, builder) = as_text::of_plant(&problem)?;
+        let as_text = effect_search::diagnose(&builder.build()?, &Default::default(), &|_| {})?;
         let errors = |steps: Vec<Option<f64>>| {
             let known = [steps.first(), steps.last()];
             let known = known.into_iter().flatten().flatten();

@@ -1,5 +1,6 @@
 //! Shared parts of the tests: simulated rigs, servers and programs that are run, measured records, statistical bounds.
 
+pub mod as_text;
 pub mod blind;
 pub mod coverage;
 pub mod design_cases;

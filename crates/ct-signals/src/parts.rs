@@ -3,19 +3,24 @@
 use crate::gaps::SHORTEST;
 use crate::{Error, Gaps, Record};
 
-/// The parts of records whose inputs are held for at most `longest` \[s\] ([`Record::without_gaps`]), and the handling of all gaps.
+/// The parts of records, and the handling of all gaps. `longest`: for a record the longest time for which its inputs are held \[s\]
+/// ([`Record::without_gaps`]).
 ///
 /// # Errors
 /// [`Error::NoStretch`] if no part of a record is left.
-pub fn without_gaps(records: &[Record], longest: f64) -> Result<(Vec<Record>, Gaps), Error> {
+pub fn without_gaps(
+    records: &[Record],
+    longest: impl Fn(&Record) -> f64,
+) -> Result<(Vec<Record>, Gaps), Error> {
     let (mut all, mut gaps) = (Vec::new(), Gaps::default());
     for record in records {
-        let (parts, own) = record.without_gaps(longest);
+        let limit = longest(record);
+        let (parts, own) = record.without_gaps(limit);
         if parts.is_empty() {
             return Err(Error::NoStretch {
                 record: record.name.clone(),
                 readings: SHORTEST,
-                limit: longest,
+                limit,
             });
         }
         gaps = gaps.and(own);

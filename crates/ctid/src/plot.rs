@@ -26,15 +26,39 @@ pub(crate) struct Curve<'a> {
     pub colour: Color,
 }
 
-/// Draws curves with a common abscissa, evenly from `x.0` to `x.1`; `rows` lines high, within the width, with the ordinate's limits at the
-/// left and `x` in seconds below.
-pub(crate) fn plot(
-    curves: &[Curve],
-    x: (f64, f64),
-    y: (f64, f64),
-    rows: usize,
-    look: Look,
-) -> String {
+/// The abscissa of curves.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Axis<'a> {
+    /// Values at even distances between these instants \[s\].
+    Even(f64, f64),
+    /// The instants of a record \[s\]; labelled from its begin.
+    Times(&'a [f64]),
+}
+
+impl Axis<'_> {
+    /// The first and last label \[s\].
+    fn ends(self) -> (f64, f64) {
+        match self {
+            Self::Even(from, to) => (from, to),
+            Self::Times([first, .., last]) => (0.0, last - first),
+            Self::Times(_) => (0.0, 0.0),
+        }
+    }
+
+    /// Place of a value among `count`, as a share of the width.
+    fn place(self, k: usize, count: usize) -> f64 {
+        match self {
+            Self::Times(times) if times.len() == count && count > 1 => {
+                (times[k] - times[0]) / (times[count - 1] - times[0])
+            }
+            _ => k as f64 / count.saturating_sub(1).max(1) as f64,
+        }
+    }
+}
+
+/// Draws curves with a common abscissa; `rows` lines high, within the width, with the ordinate's limits at the left and the ends of the
+/// abscissa below.
+pub(crate) fn plot(curves: &[Curve], x: Axis, y: (f64, f64), rows: usize, look: Look) -> String {
     let labels = [y.1, y.0].map(|limit| numbers::significant(limit, 3));
     let margin = labels
         .iter()
@@ -51,7 +75,7 @@ pub(crate) fn plot(
 
     let mut cells = vec![vec![(BLANK, None); columns]; rows];
     for curve in curves {
-        let points = points(curve.values, width, (low, high));
+        let points = points((curve.values, x), width, (low, high));
         for (row, line) in drawn(&points, width, height).lines().enumerate() {
             for (column, cell) in line.chars().enumerate() {
                 let dots = u32::from(cell).saturating_sub(BLANK);
@@ -75,7 +99,8 @@ pub(crate) fn plot(
         let line = coloured(cells, look);
         text += &format!("{} {line}\n", look.faint(format!("{label:>margin$} │")));
     }
-    let (from, to) = (numbers::duration(x.0), numbers::duration(x.1));
+    let (from, to) = x.ends();
+    let (from, to) = (numbers::duration(from), numbers::duration(to));
     let gap = columns.saturating_sub(from.chars().count() + to.chars().count());
     let ticks = format!(
         "{}{from}{}{to}",
@@ -85,11 +110,11 @@ pub(crate) fn plot(
     text + &look.faint(ticks) + "\n"
 }
 
-/// A plot of measured values, if there are any, and of the model's output over a record of a length in seconds.
-pub(crate) fn overlay(measured: &[f64], model: &[f64], length: f64, look: Look) -> String {
+/// A plot of measured values, if there are any, and of the model's output.
+pub(crate) fn overlay(measured: &[f64], model: &[f64], x: Axis, look: Look) -> String {
     let curves = [(measured, MEASURED), (model, MODEL)];
     let curves = curves.map(|(values, colour)| Curve { values, colour });
-    plot(&curves, (0.0, length), limits([measured, model]), 9, look)
+    plot(&curves, x, limits([measured, model]), 9, look)
 }
 
 /// A curve in braille, its corner at the lower left.
@@ -120,9 +145,8 @@ fn coloured(cells: &[(u32, Option<Color>)], look: Look) -> String {
 }
 
 /// Points in dots across and shares of the height; for several values in one dot the smallest and the largest.
-fn points(values: &[f64], width: usize, (low, high): (f64, f64)) -> Vec<(f32, f32)> {
-    let last = values.len().saturating_sub(1).max(1);
-    let at = |k: usize| (k * width) as f64 / last as f64;
+fn points((values, x): (&[f64], Axis), width: usize, (low, high): (f64, f64)) -> Vec<(f32, f32)> {
+    let at = |k: usize| x.place(k, values.len()) * width as f64;
     let height = |value: f64| ((value - low) / (high - low)).clamp(0.0, 1.0) as f32;
     let finite = || {
         values
@@ -173,7 +197,7 @@ mod tests {
             colour: false,
             width,
         };
-        let text = plot(&[curve], (0.0, 600.0), limits([values]), 5, look);
+        let text = plot(&[curve], Axis::Even(0.0, 600.0), limits([values]), 5, look);
         text.lines().map(str::to_string).collect()
     }
 
@@ -219,5 +243,17 @@ mod tests {
         assert!(!blank(
             first.trim_end_matches(blank).chars().next_back().unwrap()
         ));
+    }
+
+    #[test]
+    fn values_stand_at_their_instants() {
+        // A record of which the middle is missing: nothing stands there, and the last value stays at the end.
+        let times: Vec<f64> = (0..50).chain(150..200).map(f64::from).collect();
+        let place = |k| Axis::Times(&times).place(k, times.len());
+        assert!((place(50) - 150.0 / 199.0).abs() < 1e-12);
+        assert_eq!((place(0), place(99)), (0.0, 1.0));
+        let values: Vec<f64> = (0..100).map(f64::from).collect();
+        let drawn = points((&values, Axis::Times(&times)), 400, (0.0, 99.0));
+        assert!(drawn.iter().all(|(x, _)| *x < 100.0 || *x > 300.0));
     }
 }

@@ -7,7 +7,7 @@ use greybox::{Setup, Stopping, fit_from};
 use plants::{Command, EffectInfo, Known, Placed, Plant, Simulator, Structure};
 
 use crate::look::Look;
-use crate::plot::{Curve, MEASURED, RESIDUAL, limits, plot};
+use crate::plot::{Axis, Curve, MEASURED, RESIDUAL, limits, plot};
 
 /// Commands of the experiment \[V\]: large and small steps, up and down, over a wide range.
 const COMMANDS: [f64; 16] = [
@@ -25,7 +25,7 @@ const STOPPING: Stopping = Stopping {
 /// no tank.
 pub(crate) fn picture(effect: &'static EffectInfo, look: Look) -> Option<String> {
     let (measured, residual) = experiment(effect)?;
-    let end = (0.0, INTERVAL * (measured.len() - 1) as f64);
+    let end = Axis::Even(0.0, INTERVAL * (measured.len() - 1) as f64);
     let draw = |values: &[f64], colour, rows| {
         let curve = Curve { values, colour };
         plot(&[curve], end, limits([values]), rows, look)

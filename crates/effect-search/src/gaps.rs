@@ -4,46 +4,48 @@
 //! Through a gap that is short beside the fastest time constant the input is held; at a longer one the record is cut, and the simulation
 //! starts again after it with states of its own ([`ct_signals::Gaps`]). The parts keep their time stamps and so their clock: a drift runs
 //! through them. Results join them again to the records that were given ([`ct_signals::parts`]).
+//!
+//! An input is held through one missing row in any case, because each part costs its initial states. A model that only integrates has no
+//! fastest time constant: inputs are held for at most a tenth of the record. If the first fit fails, longer gaps cut the record.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::time::Duration;
 
 use ct_model::Model;
 use ct_signals::{Gaps, Record, parts};
 use estimation::Stopping;
-use greybox::{FitOptions, ModelSetup, TimeLimit};
+use greybox::{FitOptions, ModelSetup, PriorValue};
 use serde::{Deserialize, Serialize};
 
-/// An input is held through a gap of at most this part of the fastest time constant.
+/// An input is held through a gap of at most this part of the fastest time constant, and of the record.
 pub const LONGEST_HOLD: f64 = 0.1;
 /// For the first fit, inputs are held for this number of sampling intervals.
 pub const FIRST_HOLD: f64 = 20.0;
-/// Whatever the time constant, an input is held through one missing row: a part costs its initial states. \[sampling intervals\]
+/// An input is held through one missing row \[sampling intervals\].
 const ONE_ROW: f64 = 1.5;
 /// The first fit gives a time constant, no estimates.
 const FIRST_FIT: FitOptions = FitOptions {
-    starts: 2,
+    starts: 6,
     seed: 1,
     noise_order: 0,
     stopping: Stopping {
-        evaluations: 40,
-        cost: 1e-4,
+        evaluations: 30,
+        cost: 1e-3,
     },
 };
-/// Time limit of the first fit.
-const FIRST_FIT_TIME: Duration = Duration::from_secs(3);
+/// Rows of all records for the first fit: they bound its time.
+const FIRST_ROWS: usize = 4000;
 
 /// Handling of gaps in records.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MendedGaps {
-    /// Rows and places.
+    /// Rows and places, those of held-out records too.
     #[serde(flatten)]
     pub gaps: Gaps,
-    /// The fastest time constant of the model \[s\], by a first fit; not finite if there is none.
+    /// The fastest time constant of the model \[s\], by a first fit: infinite for a model that only integrates, NaN if the fit failed; both
+    /// are `null` in JSON.
     #[serde(deserialize_with = "crate::not_finite::number")]
     pub time_constant: f64,
-    /// The longest time for which an input would have been held \[s\].
+    /// The longest time for which an input would have been held \[s\]; of several records the longest.
     #[serde(deserialize_with = "crate::not_finite::number")]
     pub limit: f64,
 }
@@ -59,14 +61,27 @@ pub struct Whole {
     pub gaps: Option<MendedGaps>,
 }
 
-/// Fills short gaps of fitted and held-out records, and cuts the records at long ones. `model`: with what is known of its parameters, and
-/// the seconds in one unit of its time; names that are none of its parameters are ignored.
+/// What is known of the parameters of a model; names that are none of its parameters are ignored.
+#[derive(Debug, Clone, Copy)]
+pub struct Believes<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// Parameters that are not fitted, by name \[unit of the text\].
+    pub known: &'a BTreeMap<String, f64>,
+    /// Prior knowledge of parameters.
+    pub priors: &'a BTreeMap<String, PriorValue>,
+    /// Seconds in one unit of the model's time.
+    pub time_unit: f64,
+}
+
+/// Fills short gaps of fitted and held-out records, and cuts the records at long ones. The effects of a model file are not in the model of
+/// the first fit.
 ///
 /// # Errors
-/// If no part of a record has enough readings.
+/// If a record is not sound, or no part of it has enough readings.
 pub fn mend(
     (records, test): (Vec<Record>, Vec<Record>),
-    (model, known, time_unit): (&Model, &BTreeMap<String, f64>, f64),
+    believes: Believes,
 ) -> Result<Whole, ct_signals::Error> {
     let lacks = |record: &Record| {
         record.has_gaps()
@@ -75,42 +90,75 @@ pub fn mend(
                 .iter()
                 .any(|reference| reference.missing() > 0)
     };
-    if !records.iter().chain(&test).any(lacks) {
+    let all = || records.iter().chain(&test);
+    all().try_for_each(Record::validate)?;
+    if !all().any(lacks) {
         return Ok(Whole {
             records,
             test,
             gaps: None,
         });
     }
-    let interval = records.iter().map(Record::sample_interval);
-    let interval = interval.fold(0.0, f64::max);
-    let longest = records.iter().map(Record::duration).fold(0.0, f64::max);
-    let (first, _) = parts::without_gaps(&records, FIRST_HOLD * interval)?;
-    let is_parameter = |name: &str| {
-        let mut all = model.spec().parameters.iter();
-        all.any(|parameter| parameter.about.name == name)
+    let time_constant = first_fit(&records, believes);
+    let limit = |record: &Record| {
+        let share = time_constant.map_or(0.0, |constant| constant.min(record.duration()));
+        (LONGEST_HOLD * share).max(ONE_ROW * record.sample_interval())
     };
-    let known = known.iter().filter(|(name, _)| is_parameter(name));
-    let known = known.map(|(name, value)| (name.clone(), *value)).collect();
-    let setup = ModelSetup::new(model, &first, &known, time_unit);
-    let time_constant = setup.ok().and_then(|setup| {
-        let time = Arc::new(TimeLimit::new(Some(FIRST_FIT_TIME)));
-        let setup = setup.with_time_limit(time, None);
-        let fit = setup.fit(&FIRST_FIT).ok()?;
-        setup.fastest_time_constant(&fit.x)
-    });
-    let time_constant = time_constant.unwrap_or(f64::NAN);
-    // An integrator never forgets: the hold is then short beside the record.
-    let limit = (LONGEST_HOLD * time_constant.min(longest)).max(ONE_ROW * interval);
-    let (records, of_fitted) = parts::without_gaps(&records, limit)?;
-    let (test, of_test) = parts::without_gaps(&test, limit)?;
+    let (fitted, of_fitted) = parts::without_gaps(&records, limit)?;
+    let (held_out, of_test) = parts::without_gaps(&test, limit)?;
+    let limits = all().filter(|record| lacks(record)).map(limit);
     Ok(Whole {
-        records,
-        test,
         gaps: Some(MendedGaps {
             gaps: of_fitted.and(of_test),
-            time_constant,
-            limit,
+            time_constant: time_constant.unwrap_or(f64::NAN),
+            limit: limits.fold(0.0, f64::max),
         }),
+        records: fitted,
+        test: held_out,
     })
+}
+
+/// The fastest time constant of a first fit \[s\]; `None` if the fit fails.
+fn first_fit(records: &[Record], believes: Believes) -> Option<f64> {
+    let is_parameter = |name: &str| {
+        let mut all = believes.model.spec().parameters.iter();
+        all.any(|parameter| parameter.about.name == name)
+    };
+    let known = believes.known.iter();
+    let known = known.filter(|(name, _)| is_parameter(name));
+    let known = known.map(|(name, value)| (name.clone(), *value)).collect();
+    let priors = believes.priors.iter();
+    let priors = priors.filter(|(name, _)| is_parameter(name));
+    let priors = priors.map(|(name, value)| (name.clone(), *value)).collect();
+    let mut rows = FIRST_ROWS;
+    let first = provisional(records)?.into_iter().filter_map(|part| {
+        let part = part.rows(0..rows);
+        rows -= part.len();
+        (!part.is_empty()).then_some(part)
+    });
+    let first: Vec<Record> = first.collect();
+    let setup = ModelSetup::new(believes.model, &first, &known, believes.time_unit).ok()?;
+    let setup = setup.with_priors(&priors).ok()?;
+    let fit = setup.fit(&FIRST_FIT).ok()?;
+    setup.fastest_time_constant(&fit.x)
+}
+
+/// Parts of records for the first fit: inputs are held for longer, up to a tenth of the record, if otherwise no part is left.
+fn provisional(records: &[Record]) -> Option<Vec<Record>> {
+    let mut hold = FIRST_HOLD;
+    loop {
+        let of = |record: &Record| {
+            let most = LONGEST_HOLD * record.duration();
+            (hold * record.sample_interval()).min(most.max(FIRST_HOLD * record.sample_interval()))
+        };
+        if let Ok((parts, _)) = parts::without_gaps(records, of) {
+            return Some(parts);
+        }
+        let longer =
+            |record: &Record| hold * record.sample_interval() < LONGEST_HOLD * record.duration();
+        if !records.iter().any(longer) {
+            return None;
+        }
+        hold *= 2.0;
+    }
 }

@@ -28,9 +28,9 @@ impl Context<'_> {
         for own in found {
             let mut group = vec![own];
             let position = last.added.iter().position(|i| *i == own);
-            if self.limit.leaves_out(OTHERS) {
-                // Without refits: candidates whose sensitivity is collinear are known to fit as well.
-                group.extend(self.tied_to(own, &last.added));
+            if position.is_some() && self.limit.leaves_out(OTHERS) {
+                // Without refits: candidates whose sensitivities are collinear fit as well, to first order.
+                group.extend(self.tied_to(own, &last));
             } else if let Some(position) = position {
                 let others = self.stand_ins(&last, position, noise, slowness)?;
                 let is_same = |node: &&Node| {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::HeldOut;
 use crate::failures::{FailureKind, Failures, Series, Signal, locate};
 
-/// Residual tests of one fit, of its first record but for `input_p`; the bounds are for 95 %.
+/// Residual tests of one fit, of its first record, or of the part with the most readings if that was cut; the bounds are for 95 %.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ResidualTests {
     /// Autocorrelation of the simulation residual at lags 0, 1, ...
@@ -138,7 +138,17 @@ pub fn output_steps(
             rmse_test: test.map(|test| test.rmse[o]),
             rmse_test_50: test.and_then(|test| Some(test.rmse_50.as_ref()?[o])),
             held_out_error: test.map(|test| test.errors[o]),
-            tests: ResidualTests::of(&setup.external_signals(&records[0]), &residuals[o]),
+            tests: {
+                // Of the first record, or of its part with the most readings.
+                let of_first = (0..records.len()).take_while(|&part| of_parts[part] == 0);
+                let readings = |part: &usize| {
+                    let output = &records[*part].outputs[o];
+                    output.values.len() - output.missing()
+                };
+                let part = of_first.max_by_key(readings).unwrap_or(0);
+                let external = setup.external_signals(&records[part]);
+                ResidualTests::of(&external, &residuals[part * count + o])
+            },
             failures: locate(&series, &signals, &noise[o]),
         }
     };

@@ -8,7 +8,7 @@ use ct_model::{Model, ModelSpec};
 use ct_signals::Record;
 use greybox::{LoopController, ModelSetup, PriorValue};
 
-use crate::{Error, Kept, Problem, mend};
+use crate::{Believes, Error, Kept, Problem, mend};
 
 /// Builds a [`Problem`]: required parts were given to [`Problem::builder`], the other parts have one method each.
 #[derive(Debug, Clone)]
@@ -136,7 +136,13 @@ impl ProblemBuilder {
         }
         let model = Model::new(problem.spec.clone());
         let records = (take(&mut problem.records), take(&mut problem.test));
-        let whole = mend(records, (&model, &problem.known, seconds))?;
+        let believes = Believes {
+            model: &model,
+            known: &problem.known,
+            priors: &problem.priors,
+            time_unit: seconds,
+        };
+        let whole = mend(records, believes)?;
         (problem.records, problem.test) = (whole.records, whole.test);
         problem.gaps = whole.gaps;
         let (none, no_priors) = (BTreeMap::new(), BTreeMap::new());

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 /// The criterion is BIC; a fall of the criterion is a difference of BIC, a fall of the deviance a difference of `-2 log likelihood`. Both
 /// are dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Thresholds {
     // The control loop of the records.
     /// Without a known controller, feedback through an input is reported if the p-value of its test, corrected for the number of tests, is

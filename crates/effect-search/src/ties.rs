@@ -174,14 +174,33 @@ impl Context<'_> {
         Some(matrix.column(0).into_owned())
     }
 
-    /// The candidates with the same sensitivity as one that may take its place in a set.
-    pub fn tied_to(&self, candidate: usize, added: &[usize]) -> Vec<usize> {
-        let others = added.iter().copied().filter(|&i| i != candidate);
+    /// The candidates that may take the place of one in a fitted set: with the same sensitivity, and the size that has its influence within
+    /// their bounds. Those of the user come first.
+    pub fn tied_to(&self, candidate: usize, set: &Node) -> Vec<usize> {
+        let others = set.added.iter().copied().filter(|&i| i != candidate);
         let others: Vec<usize> = others.collect();
+        let reaches = |i: usize| {
+            let (Some(of), Some(fitted)) = (self.ties.get(i), self.ties.get(candidate)) else {
+                return false;
+            };
+            let ([own], [fitted_own]) = (
+                &self.candidates[i].parameters[..],
+                &self.candidates[candidate].parameters[..],
+            ) else {
+                return false;
+            };
+            set.value(&fitted_own.name).is_some_and(|value| {
+                let size = own.absent + (value - fitted_own.absent) * of.scale / fitted.scale;
+                (own.bounds.0..=own.bounds.1).contains(&size)
+            })
+        };
         let all = 0..self.candidates.len();
-        all.filter(|i| !added.contains(i) && self.is_tied_to_one_of(*i, &[candidate]))
-            .filter(|i| !self.repeats_one_of(*i, &others))
-            .collect()
+        let tied = all
+            .filter(|i| !set.added.contains(i) && self.is_tied_to_one_of(*i, &[candidate]))
+            .filter(|i| !self.repeats_one_of(*i, &others) && reaches(*i));
+        let mut tied: Vec<usize> = tied.collect();
+        tied.sort_by_key(|&i| self.candidates[i].effect.is_some());
+        tied
     }
 
     /// Whether a set has another candidate with the same sensitivity.

@@ -2,18 +2,16 @@
 
 use std::error::Error;
 
-use ctid_tests::Rig;
-use effect_search::{Diagnosis, Options, Problem, diagnose};
+use ctid_tests::{Rig, as_text};
+use effect_search::{Diagnosis, Options, diagnose};
 
 use crate::outcome::Answer;
 
-/// The diagnosis with the text of the plant, on the measured command. The effects are those of the catalogue of tanks.
+/// The diagnosis with the text of the plant. The effects are those of the catalogue of tanks.
 pub fn diagnosed(rig: &Rig, kernel: &missing_effect::Problem) -> Result<Diagnosis, Box<dyn Error>> {
-    let mut record = kernel.records[0].clone();
-    let spec = rig.plant.spec_of(&kernel.known, &mut record)?;
-    record.references.clear();
+    let (spec, builder) = as_text::of_plant(kernel)?;
     let general = rig.plant.general_effects(&spec);
-    let problem = Problem::builder(spec, [record]).left_out(general).build()?;
+    let problem = builder.left_out(general).build()?;
     Ok(diagnose(&problem, &Options::default(), &|_| {})?)
 }
 

@@ -76,8 +76,7 @@ struct Arguments {
     /// effect.
     #[arg(long)]
     mark: bool,
-    /// The plants are diagnosed as models written as text, on the measured command; the effects have their names in the catalogue of
-    /// tanks.
+    /// The plants are diagnosed as models written as text; the effects have their names in the catalogue of tanks.
     #[arg(long)]
     text: bool,
     /// Writes every record's outcome.

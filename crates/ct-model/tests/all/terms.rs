@@ -61,8 +61,11 @@ fn a_name_that_is_taken_is_refused_with_what_has_it() {
     };
     let vent = BTreeMap::from([("vent".to_string(), vent)]);
     all.extend(own_candidates(&spec, &vent).unwrap());
+    let shapes = shapes_keeping(&spec, &Visited::nominal(&spec), &BTreeMap::new());
+    let shape = shapes.first().unwrap();
+    let check = |all: &[Candidate], name| check_term_name(&spec, all, shape, name);
     for free in ["heat_loss", "Q1", "lag_of_heater"] {
-        assert_eq!(check_term_name(&spec, &all, free), Ok(()));
+        assert_eq!(check(&all, free), Ok(()));
     }
     for (taken, what) in [
         ("", "begins with a letter"),
@@ -74,11 +77,20 @@ fn a_name_that_is_taken_is_refused_with_what_has_it() {
         ("y", "a variable of Block"),
         ("lag", "an effect of the catalogue"),
         ("course", "an effect of the catalogue"),
-        ("lag_u", "the effect lag(u)"),
-        ("shape_T_u", "the effect shape(T,u)"),
-        ("vent", "the effect vent"),
+        ("lag_u", "a variable of lag(u) is called `lag_u`"),
+        ("lag_u_tau", "a variable of lag(u) is called `lag_u_tau`"),
+        ("shape_T_u", "a variable of shape(T,u)"),
+        ("vent_q", "a variable of vent"),
     ] {
-        let refused = check_term_name(&spec, &all, taken).unwrap_err();
+        let refused = check(&all, taken).unwrap_err();
         assert!(refused.contains(what), "{taken}: {refused}");
     }
+    // The parameters of one term are no name of another one.
+    all.push(shape.clone().named(&spec, "a"));
+    let refused = check(&all, "a_h1").unwrap_err();
+    assert!(
+        refused.contains("a variable of a is called `a_h1`"),
+        "{refused}"
+    );
+    assert_eq!(check(&all, "b"), Ok(()));
 }

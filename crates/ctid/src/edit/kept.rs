@@ -33,8 +33,9 @@ impl Findings {
         let is_free = is_free(&all, &id);
         let missing = self.unknown.as_ref().and_then(|step| step.effect.as_ref());
         if let (true, Some(missing)) = (is_free, missing) {
-            check_term_name(spec, &all, &id).map_err(|what| refuse(format!("{id}: {what}")))?;
             let shape = function(spec, &all, missing).map_err(Error::UnknownEffect)?;
+            check_term_name(spec, &all, shape, &id)
+                .map_err(|what| refuse(format!("{id}: {what}")))?;
             let kept = self.values(shape).map_err(refuse)?;
             return Ok((shape.clone().named(spec, &id), of_function(kept, missing)));
         }
@@ -63,7 +64,10 @@ impl Findings {
         let (spec, functions) = (&model.base, &model.effects.functions);
         let all = every_candidate(spec, &model.candidates, functions);
         let id = plain(name);
-        self.has(&id) || self.unknown.is_some() && all.is_ok_and(|all| is_free(&all, &id))
+        // A term of the file that is not in the model takes the values of the missing term, or is refused.
+        let waits = functions.contains_key(&id) && !model.effects.on.contains(&id);
+        self.has(&id)
+            || self.unknown.is_some() && (waits || all.is_ok_and(|all| is_free(&all, &id)))
     }
 
     /// The values of an effect in the result.

@@ -7,7 +7,7 @@ use linear_identification::{Identification, Order, deviation};
 pub(crate) use self::facts::{condition, facts, refined_facts};
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
-use crate::plot;
+use crate::plot::{self, Axis};
 use crate::sentences;
 use crate::simulate::header;
 
@@ -79,13 +79,15 @@ pub(crate) fn model(found: &Identification) -> String {
 
 fn overlay(found: &Identification, look: Look) -> String {
     let shown = &found.shown;
-    let (Some(first), Some(last)) = (shown.time.first(), shown.time.last()) else {
-        return String::new();
-    };
     format!(
         "{}\n{}\n",
         header(&look.heading("Measured and simulated"), &shown.output.unit),
-        plot::overlay(&shown.output.values, &shown.simulated, last - first, look)
+        plot::overlay(
+            &shown.output.values,
+            &shown.simulated,
+            Axis::Times(&shown.time),
+            look
+        )
     )
 }
 

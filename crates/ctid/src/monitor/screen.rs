@@ -10,7 +10,7 @@ use ct_signals::quoted;
 
 use crate::look::Look;
 use crate::numbers::{significant, value_and_error};
-use crate::plot::{Curve, RESIDUAL, plot};
+use crate::plot::{Axis, Curve, RESIDUAL, plot};
 
 /// Number of plotted innovations.
 const DRAWN: usize = 400;
@@ -173,7 +173,7 @@ impl Screen {
         let values: Vec<f64> = signal.innovations.iter().map(|(_, v)| *v).collect();
         let most = values.iter().fold(LEAST, |most, v| most.max(v.abs()));
         let times = match (signal.innovations.front(), signal.innovations.back()) {
-            (Some((from, _)), Some((to, _))) => (*from, *to),
+            (Some((from, _)), Some((to, _))) => Axis::Even(*from, *to),
             _ => return String::new(),
         };
         let curve = Curve {

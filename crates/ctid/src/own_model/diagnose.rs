@@ -315,7 +315,10 @@ pub(super) fn state_rows(step: &Step) -> String {
     let whose = if let [only] = &rows[..] {
         format!("its first {only} rows")
     } else {
-        format!("the first {} rows of the records", rows.join(", "))
+        format!(
+            "the first {} rows of the records and their parts",
+            rows.join(", ")
+        )
     };
     format!("  held out: without {whose} that the initial states are fitted to\n")
 }

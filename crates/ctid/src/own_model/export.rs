@@ -106,7 +106,14 @@ impl FittedModel {
             head.push(format!("  {name}: {}", said.trim_end()));
         }
         if own.len() > 1 && !spec.states.is_empty() {
-            head.push(format!("Initial states are those of {}.", own[0].name));
+            let part = match own[0].part {
+                0 => String::new(),
+                part => format!("part {part} of "),
+            };
+            head.push(format!(
+                "Initial states are those of {part}{}.",
+                own[0].name
+            ));
         }
         Ok(commented(&head, &spec))
     }

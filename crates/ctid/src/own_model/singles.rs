@@ -19,14 +19,24 @@ fn detectable(single: &Single) -> Option<String> {
     Some(with_unit(&smallest, shown_unit(unit)))
 }
 
+/// Single effects whose falls of the criterion differ by less than this are one effect under several names.
+const SAME_FALL: f64 = 0.01;
+
 /// The minimum detectable sizes of the most likely effects.
 pub(super) fn would_have_shown(diagnosis: &Diagnosis) -> Option<String> {
-    let sizes = diagnosis.singles.iter().filter_map(|single| {
+    let mut singles: Vec<&Single> = diagnosis.singles.iter().collect();
+    singles.dedup_by(|next, kept| (next.bic_gain - kept.bic_gain).abs() < SAME_FALL);
+    let sizes = singles.into_iter().filter_map(|single| {
         let size = detectable(single)?;
         Some(format!("{} of {size}", single.effect))
     });
     let sizes: Vec<String> = sizes.take(SHOWN).collect();
-    (!sizes.is_empty()).then(|| format!("These records would have shown {}.", sizes.join(", ")))
+    (!sizes.is_empty()).then(|| {
+        format!(
+            "A test of one effect alone would have shown {} in nine of ten such records; a search among all candidates needs more.",
+            sizes.join(", ")
+        )
+    })
 }
 
 /// The single effects, best first.

@@ -23,7 +23,7 @@ pub(super) fn functions(
     tables: &RawEffects,
     source: &Source,
 ) -> Result<BTreeMap<String, String>, Error> {
-    let mut functions = BTreeMap::new();
+    let (mut functions, mut all) = (BTreeMap::new(), all.to_vec());
     for (name, table) in tables {
         let mut settings = table.iter();
         let Some((key, setting)) = settings.find(|(key, _)| key.as_ref() == FUNCTION) else {
@@ -33,12 +33,14 @@ pub(super) fn functions(
             let what = "function of a term: write function = \"shape(x,u)\"";
             return Err(source.at(key.span().start, what.to_string()));
         };
-        let function = function(spec, all, written);
+        let function = function(spec, &all, written);
         let function = function.map_err(|what| source.at(key.span().start, what))?;
+        let function = function.clone();
         let term = name.as_ref();
-        check_term_name(spec, all, term)
+        check_term_name(spec, &all, &function, term)
             .map_err(|what| source.at(name.span().start, format!("{}: {what}", quoted(term))))?;
         functions.insert(term.clone(), function.id.clone());
+        all.push(function.named(spec, term));
     }
     Ok(functions)
 }

@@ -9,7 +9,7 @@ use super::file::OwnModelFile;
 use super::fitted::cut_short;
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
-use crate::plot::{self, Curve, plot};
+use crate::plot::{self, Axis, Curve, plot};
 use crate::sentences::{FailureWords, of_gaps};
 use crate::simulate::header;
 use crate::terminal::{FAILURES, residual_tests, without_50};
@@ -170,10 +170,6 @@ fn drawn(curves: &Curves, look: Look) -> String {
         measured,
         model,
     } = curves;
-    let length = match time[..] {
-        [first, .., last] => last - first,
-        _ => 0.0,
-    };
     let residual: Vec<f64> = measured.iter().zip(model).map(|(y, m)| y - m).collect();
     let one = [Curve {
         values: &residual,
@@ -184,9 +180,9 @@ fn drawn(curves: &Curves, look: Look) -> String {
     format!(
         "{title} {}\n{}\n{}\n{}\n",
         header("measured and model", unit),
-        plot::overlay(measured, model, length, look),
+        plot::overlay(measured, model, Axis::Times(time), look),
         header("Measured minus model", unit),
-        plot(&one, (0.0, length), own, 5, look)
+        plot(&one, Axis::Times(time), own, 5, look)
     )
 }
 

@@ -3,17 +3,23 @@
 use ct_signals::{Gaps, duration};
 use missing_effect::{LONGEST_HOLD, MendedGaps};
 
-/// The longest hold, by the fastest time constant where that sets it.
+/// The longest hold, and its reason.
 fn longest_hold_of(mended: &MendedGaps) -> String {
-    let share = LONGEST_HOLD * mended.time_constant;
-    if (mended.limit - share).abs() <= 1e-9 * share {
+    let (limit, constant) = (mended.limit, mended.time_constant);
+    let share = LONGEST_HOLD * constant;
+    if share.is_finite() && (limit - share).abs() <= 1e-9 * share {
         format!(
             "{:.0} % of the fastest time constant ({})",
             100.0 * LONGEST_HOLD,
-            duration(mended.time_constant)
+            duration(constant)
+        )
+    } else if constant.is_nan() {
+        format!(
+            "{}: no fastest time constant was found, which would permit a longer hold",
+            duration(limit)
         )
     } else {
-        duration(mended.limit)
+        duration(limit)
     }
 }
 

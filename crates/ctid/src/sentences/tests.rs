@@ -347,6 +347,18 @@ fn gaps_are_counted_with_the_longest_hold() {
         super::of_gaps(&mended).unwrap_or_default(),
         "12 rows are missing in 3 places; the input is held through 2 of them, for at most 8 s; the simulation restarts after 1, where the input would have to be held longer than 10 % of the fastest time constant (100 s); 1 row is not used."
     );
+    // Of a model that only integrates, and without a first fit.
+    for (time_constant, limit) in [
+        (f64::INFINITY, "longer than 10 s; 1 row"),
+        (
+            f64::NAN,
+            "longer than 10 s: no fastest time constant was found, which would permit a longer hold; 1 row",
+        ),
+    ] {
+        mended.time_constant = time_constant;
+        let said = super::of_gaps(&mended).unwrap_or_default();
+        assert!(said.contains(limit), "{said}");
+    }
 }
 
 #[test]

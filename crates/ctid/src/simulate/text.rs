@@ -3,7 +3,7 @@
 use super::{Simulated, SimulatedOutput, StateSource, header};
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
-use crate::plot;
+use crate::plot::{self, Axis};
 
 /// The whole of it.
 pub(crate) fn said(simulated: &Simulated, look: Look) -> String {
@@ -108,6 +108,6 @@ fn drawn(output: &SimulatedOutput, length: f64, look: Look) -> String {
     format!(
         "{} {what}\n{}\n",
         look.heading(&format!("{}:", header(&output.name, &output.unit))),
-        plot::overlay(measured, &output.mean, length, look)
+        plot::overlay(measured, &output.mean, Axis::Even(0.0, length), look)
     )
 }

@@ -4,7 +4,7 @@ use paper_tables::baysse::{Cell, Study};
 
 use crate::look::{Look, Side, table};
 use crate::numbers;
-use crate::plot::{self, Curve, plot};
+use crate::plot::{self, Axis, Curve, plot};
 
 /// The text, complete.
 pub(crate) fn text(study: &Study, look: Look) -> String {
@@ -287,14 +287,11 @@ fn figure(study: &Study, look: Look) -> String {
         },
     ];
     let limits = plot::limits(curves.iter().map(|curve| curve.values));
-    let (Some(first), Some(last)) = (shown.time.first(), shown.time.last()) else {
-        return String::new();
-    };
     format!(
         "\n{}\n{}",
         look.heading(
             "Figure 3: measured (cyan), by instruments (magenta), by output error (yellow) [cm]"
         ),
-        plot(&curves, (0.0, last - first), limits, 9, look)
+        plot(&curves, Axis::Times(&shown.time), limits, 9, look)
     )
 }

@@ -3,10 +3,10 @@
 use console::Style;
 use missing_effect::{Diagnosis, Shown, Step};
 
-use super::{length, model_name};
+use super::model_name;
 use crate::findings;
 use crate::look::Look;
-use crate::plot::{self, Curve, plot};
+use crate::plot::{self, Axis, Curve, plot};
 use crate::simulate::header;
 
 /// Measurement and model over time, in the first record, output by output.
@@ -35,7 +35,7 @@ fn overlay_of(diagnosis: &Diagnosis, step: &Step, output: usize, look: Look) -> 
         "{} {}\n{}\n",
         look.heading(&title),
         header(&key, &diagnosis.output_unit),
-        plot::overlay(measured, model, length(record), look)
+        plot::overlay(measured, model, Axis::Times(&record.time), look)
     )
 }
 
@@ -83,7 +83,7 @@ fn residuals_of(diagnosis: &Diagnosis, steps: &[&Step], output: usize, look: Loo
             model_name(diagnosis, step),
             plot(
                 &[curve],
-                (0.0, length(record)),
+                Axis::Times(&record.time),
                 (-largest, largest),
                 5,
                 look

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use ct_model::{Model, ModelSpec};
 use ct_signals::{Error, Record};
-use effect_search::{LONGEST_HOLD, Problem, mend};
+use effect_search::{Believes, LONGEST_HOLD, Problem, mend};
 
 use crate::records::{STEP, found, record};
 
@@ -112,7 +112,13 @@ fn an_integrator_is_not_held_for_ever() {
         (100..150).contains(&k) || (300..460).contains(&k)
     });
     let model = Model::new(ModelSpec::parse(text).unwrap());
-    let found = mend((vec![cut], Vec::new()), (&model, &BTreeMap::new(), 1.0)).unwrap();
+    let believes = Believes {
+        model: &model,
+        known: &BTreeMap::new(),
+        priors: &BTreeMap::new(),
+        time_unit: 1.0,
+    };
+    let found = mend((vec![cut], Vec::new()), believes).unwrap();
     let gaps = found.gaps.unwrap();
     assert!(gaps.time_constant.is_infinite());
     let of_record = (whole.len() - 1) as f64 * STEP;
@@ -135,4 +141,95 @@ fn a_record_without_a_usable_part_is_refused() {
         panic!("{refused}")
     };
     assert_eq!(readings, 8);
+}
+
+#[test]
+fn each_record_has_the_limit_of_its_own_interval() {
+    let whole = record(crate::records::BLOCK, 0.0, 0.05, 6);
+    // C/k = 62.5 s: a gap of 50 s is long for the record with a row every 5 s, and one row of that with a row every 50 s.
+    let fast = without(&whole, |k| (100..110).contains(&k));
+    let slow = without(&whole, |k| k % 10 != 0 || k == 200);
+    let spec = ModelSpec::parse(crate::records::BLOCK).unwrap();
+    let problem = Problem::builder(spec, [fast, slow]).build().unwrap();
+    let parts: Vec<usize> = problem.records.iter().map(|record| record.part).collect();
+    assert_eq!(parts, [1, 2, 0]);
+}
+
+#[test]
+fn without_a_first_fit_only_one_row_is_held_through() {
+    // From every start the state leaves the range of numbers.
+    let text = "model Away
+      parameter Real a(min=1.5, max=3) = 2;
+      input Real u;
+      output Real y = x;
+      Real x(start=1);
+    equation
+      der(x) = a*x + u;
+    end Away;";
+    let whole = record(&slow(), 0.0, 0.05, 7);
+    let mut cut = without(&whole, |k| (200..203).contains(&k));
+    cut.inputs.truncate(1);
+    let model = Model::new(ModelSpec::parse(text).unwrap());
+    let believes = Believes {
+        model: &model,
+        known: &BTreeMap::new(),
+        priors: &BTreeMap::new(),
+        time_unit: 1.0,
+    };
+    let gaps = mend((vec![cut], Vec::new()), believes)
+        .unwrap()
+        .gaps
+        .unwrap();
+    assert!(gaps.time_constant.is_nan());
+    assert!((gaps.limit - 1.5 * STEP).abs() < 1e-9);
+    assert_eq!((gaps.gaps.held, gaps.gaps.cut), (0, 1));
+}
+
+#[test]
+fn a_sparse_input_of_a_slow_model_is_held() {
+    // An input every 30 rows: the first fit holds it for longer than 20 rows.
+    let mut sparse = record(&slow(), 0.0, 0.05, 8);
+    for input in &mut sparse.inputs {
+        for (k, value) in input.values.iter_mut().enumerate() {
+            if k % 24 != 0 {
+                *value = f64::NAN;
+            }
+        }
+    }
+    let problem = problem(vec![sparse]);
+    assert_eq!(problem.records.len(), 1, "{:?}", problem.gaps);
+}
+
+#[test]
+fn residual_tests_are_of_the_longest_part() {
+    // A model without the heater; the first part has only 15 rows.
+    let whole = record(&slow(), 0.0, 0.05, 9);
+    let cut = without(&whole, |k| (15..90).contains(&k));
+    let wrong = slow().replace("g*u - k*(T - Ta)", "0.001*g*u - k*(T - Ta)");
+    let problem = Problem::builder(ModelSpec::parse(&wrong).unwrap(), [cut])
+        .build()
+        .unwrap();
+    assert_eq!(problem.records.len(), 2);
+    let first = &found(&problem).steps[0];
+    assert!(
+        first.outputs[0].tests.whiteness_p < 1e-6,
+        "{:?}",
+        first.outputs[0].tests
+    );
+}
+
+#[test]
+fn an_unsound_record_is_refused() {
+    let mut record = record(&slow(), 0.0, 0.05, 10);
+    record.inputs[0].values.truncate(300);
+    record.inputs[0].values[7] = f64::NAN;
+    let spec = ModelSpec::parse(&slow()).unwrap();
+    let refused = Problem::builder(spec, [record]).build().unwrap_err();
+    assert!(
+        matches!(
+            refused,
+            effect_search::Error::Signals(Error::LengthMismatch { .. })
+        ),
+        "{refused}"
+    );
 }

@@ -1,6 +1,7 @@
 //! Names of an effect's variables in the model, and names that a user gives to the smooth functions.
 
 use super::Candidate;
+use crate::effects::fragment::Fragment;
 use crate::effects::{all_effects, level_shift, shape};
 use crate::spec::ModelSpec;
 use crate::text::is_reserved;
@@ -42,6 +43,22 @@ impl Candidate {
         self
     }
 
+    /// Names of all its variables in the model.
+    fn variables(&self) -> impl Iterator<Item = &str> {
+        let Fragment {
+            parameters,
+            states,
+            flows,
+            ..
+        } = &self.fragment;
+        let parameters = parameters.iter().map(|parameter| &parameter.about);
+        let states = states.iter().map(|state| &state.about);
+        let abouts = parameters
+            .chain(states)
+            .chain(flows.iter().map(|flow| &flow.about));
+        abouts.map(|about| about.name.as_str())
+    }
+
     fn rename(&mut self, named: impl Fn(&str) -> String) {
         let fragment = &mut self.fragment;
         for parameter in &mut fragment.parameters {
@@ -71,11 +88,16 @@ fn identifier(id: &str) -> String {
 }
 
 /// Checks that a name can be given to a smooth function that stays in the model: it is an identifier that neither the model nor one of
-/// `all`, its candidates, uses.
+/// `all`, its candidates and other terms, uses, for itself or for a variable.
 ///
 /// # Errors
 /// What is wrong and the correction.
-pub fn check_term_name(spec: &ModelSpec, all: &[Candidate], name: &str) -> Result<(), String> {
+pub fn check_term_name(
+    spec: &ModelSpec,
+    all: &[Candidate],
+    function: &Candidate,
+    name: &str,
+) -> Result<(), String> {
     let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
     if !name.starts_with(|c: char| c.is_ascii_alphabetic()) || !name.chars().all(letters) {
         let what = "a term's name begins with a letter and has letters, digits and `_` alone, as `heat_loss`";
@@ -100,11 +122,14 @@ pub fn check_term_name(spec: &ModelSpec, all: &[Candidate], name: &str) -> Resul
             "`{name}` is an effect of the catalogue: choose another name for the term"
         ));
     }
-    if let Some(other) = all.iter().find(|other| other.stem == name) {
-        return Err(format!(
-            "variables of the effect {} are called `{name}`: choose another name for the term",
+    let named = function.clone().named(spec, name);
+    let others = all.iter().filter(|other| other.id != name);
+    let mut pairs = others.flat_map(|other| other.variables().map(move |taken| (other, taken)));
+    match pairs.find(|(_, taken)| named.variables().any(|own| own == *taken)) {
+        Some((other, taken)) => Err(format!(
+            "a variable of {} is called `{taken}`: choose another name for the term",
             other.id
-        ));
+        )),
+        None => Ok(()),
     }
-    Ok(())
 }

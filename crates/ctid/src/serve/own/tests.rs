@@ -163,8 +163,22 @@ fn the_missing_term_gets_a_name() {
     let effect = "heat_loss".to_string();
     change(&mut session, Change::Remove { effect }).unwrap();
     assert_eq!(state(&mut session)["own"]["effects"], json!([]));
-    add(&mut session, "heat_loss").unwrap();
-    assert_eq!(state(&mut session)["own"]["effects"], json!(["heat_loss"]));
+    // Again, from another result: with its values, and not if its missing term is another function.
+    let again = |session: &mut Session, found: &str| {
+        let own = session.own.as_mut().unwrap();
+        own.diagnosis.as_mut().unwrap().findings = Findings::of_text(found).unwrap();
+        add(session, "heat_loss")
+    };
+    let other = found
+        .replace("shape(T,u)", "course(T)")
+        .replace("shape_T_u", "course_T");
+    let refused = again(&mut session, &other).unwrap_err();
+    assert!(refused.contains("give another name"), "{refused}");
+    again(&mut session, &found.replace("1.5", "2.5")).unwrap();
+    let shown = state(&mut session)["own"].clone();
+    assert_eq!(shown["effects"], json!(["heat_loss"]));
+    let file = shown["file"].as_str().unwrap();
+    assert!(file.contains("h1 = 2.5"), "{file}");
 }
 
 /// The accepted effects outside a group are in the model of its experiment, and the experiment has the inputs' units.

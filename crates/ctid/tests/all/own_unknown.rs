@@ -99,7 +99,7 @@ fn the_term_has_a_name_of_ones_choice(place: &Place, effect: &str, mended: &serd
         ("k", ["`k` is a variable of Block", "choose another name"]),
         ("der", ["`der` is a reserved word", "choose another name"]),
         ("my-loss", ["begins with a letter", "as `heat_loss`"]),
-        ("lag_u", ["the effect lag(u)", "choose another name"]),
+        ("lag_u", ["a variable of lag(u)", "choose another name"]),
         (
             "lag",
             ["lag may act here", "the missing term of the result"],

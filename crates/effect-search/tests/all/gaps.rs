@@ -185,19 +185,26 @@ fn without_a_first_fit_only_one_row_is_held_through() {
     assert_eq!((gaps.gaps.held, gaps.gaps.cut), (0, 1));
 }
 
+/// The heater has a new value every 24 rows, and only these are recorded.
 #[test]
 fn a_sparse_input_of_a_slow_model_is_held() {
-    // An input every 30 rows: the first fit holds it for longer than 20 rows.
     let mut sparse = record(&slow(), 0.0, 0.05, 8);
-    for input in &mut sparse.inputs {
-        for (k, value) in input.values.iter_mut().enumerate() {
-            if k % 24 != 0 {
-                *value = f64::NAN;
-            }
-        }
+    let decay = (-STEP * 0.04 / 50.0).exp();
+    let mut temperature = 20.0;
+    for k in 0..sparse.len() {
+        let heater = ((k / 24) * 7 % 5) as f64;
+        let known = k % 24 == 0;
+        sparse.inputs[0].values[k] = if known { heater } else { f64::NAN };
+        sparse.inputs[1].values[k] = if known { 15.0 } else { f64::NAN };
+        let noise = 0.05 * ((k * 7919) % 17) as f64 / 17.0;
+        sparse.outputs[0].values[k] = temperature + noise;
+        let steady = 15.0 + 1.6 * heater / 0.04;
+        temperature = steady + decay * (temperature - steady);
     }
+    // Held for more than the 20 rows with which the first fit begins.
     let problem = problem(vec![sparse]);
     assert_eq!(problem.records.len(), 1, "{:?}", problem.gaps);
+    assert!(problem.gaps.unwrap().gaps.longest_hold > 20.0 * STEP);
 }
 
 #[test]

@@ -6,10 +6,10 @@ use effect_search::{Diagnosis, NotNoise, Options, Step, Thresholds, Verdict};
 use super::file::{OwnModelFile, Records};
 use super::fitted::blame;
 use super::problem::problem;
-use super::singles;
 use super::text::{failures, undetermined};
 use super::unknown;
 use super::words::{EffectWords, shown_unit};
+use super::{held_out, singles};
 use crate::Error;
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
@@ -166,6 +166,7 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
             "{many} effects or more together may compensate for an effect that is not among the candidates: treat them as a description of the records until each is confirmed."
         ));
     }
+    all.extend(held_out::rises(file, &diagnosis.steps));
     all.extend(diagnosis.absorbed.iter().map(absorbed));
     all.extend(diagnosis.gaps.as_ref().and_then(of_gaps));
     let known = diagnosis.control_loop.iter();

@@ -22,6 +22,7 @@ mod enclosed;
 mod export;
 mod file;
 mod fitted;
+mod held_out;
 mod identify;
 pub(crate) mod ports;
 mod problem;

@@ -19,6 +19,7 @@ mod own_candidates;
 mod own_design;
 mod own_effects;
 mod own_gaps;
+mod own_held_out;
 mod own_limits;
 mod own_loop;
 mod own_term;

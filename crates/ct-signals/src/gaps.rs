@@ -33,6 +33,28 @@ const MOST_PUT_IN: usize = 100_000;
 /// A part with fewer samples of an output contains less information than its initial states need.
 pub(crate) const SHORTEST: usize = 8;
 
+/// An input is the same before and after a gap if its values differ by at most this share of its range: a step differs by more, a slow
+/// signal by less. Chosen.
+const UNCHANGED: f64 = 0.1;
+
+/// The longest time for which inputs are held through a gap \[s\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LongestHold {
+    /// If all inputs are the same after the gap as before it.
+    pub unchanged: f64,
+    /// If an input has changed: when, is not known.
+    pub changed: f64,
+}
+
+impl From<f64> for LongestHold {
+    fn from(longest: f64) -> Self {
+        Self {
+            unchanged: longest,
+            changed: longest,
+        }
+    }
+}
+
 /// How missing rows and missing samples of inputs were handled.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Gaps {
@@ -174,16 +196,17 @@ impl Record {
         self.inputs.iter().any(|u| u.missing() > 0) || self.missing_rows() > 0
     }
 
-    /// The record without gaps, as the head of this file says: inputs are held for at most `longest` \[s\] (from 0 on, infinite: for as
+    /// The record without gaps, as the head of this file says: inputs are held for at most `longest` (from 0 s on, infinite: for as
     /// long as it takes), and the parts between longer gaps are records of their own, numbered, under one name and on one clock. A missing row
     /// that is held through becomes a row without outputs. A reference is held for as long as it takes, as a set point is.
     ///
     /// A record without gaps comes back as it is. No part comes back where no row has all inputs.
     #[must_use]
-    pub fn without_gaps(&self, longest: f64) -> (Vec<Record>, Gaps) {
+    pub fn without_gaps(&self, longest: impl Into<LongestHold>) -> (Vec<Record>, Gaps) {
         if !self.has_gaps() && self.references.iter().all(|r| r.missing() == 0) {
             return (vec![self.clone()], Gaps::default());
         }
+        let longest = longest.into();
         let mut gaps = Gaps::default();
         let sampling = Sampling::of(&self.time);
         let whole = self.with_missing_rows(sampling, longest, &mut gaps);
@@ -208,7 +231,12 @@ impl Record {
     }
 
     /// Puts rows without a sample where rows are missing for at most `longest`.
-    fn with_missing_rows(&self, sampling: Sampling, longest: f64, gaps: &mut Gaps) -> Record {
+    fn with_missing_rows(
+        &self,
+        sampling: Sampling,
+        longest: LongestHold,
+        gaps: &mut Gaps,
+    ) -> Record {
         // For every row the index of the original row; none for an inserted row.
         let mut from: Vec<Option<usize>> = Vec::with_capacity(self.len());
         let mut time = Vec::with_capacity(self.len());
@@ -218,7 +246,8 @@ impl Record {
                 let missing = sampling.missing(t - begin);
                 gaps.rows += missing;
                 let known = self.inputs.iter().all(|u| !u.values[before].is_nan());
-                if missing > 0 && (!known || t - begin - sampling.interval <= longest) {
+                let hold = || self.longest_hold(longest, (before, k));
+                if missing > 0 && (!known || t - begin - sampling.interval <= hold()) {
                     let step = (t - begin) / (missing + 1) as f64;
                     if missing < MOST_PUT_IN {
                         time.extend((1..=missing).map(|i| begin + step * i as f64));
@@ -247,11 +276,26 @@ impl Record {
         }
     }
 
+    /// The longest hold between two rows.
+    fn longest_hold(&self, longest: LongestHold, (before, after): (usize, usize)) -> f64 {
+        let same = |input: &Channel| {
+            let (low, high) = input.range();
+            let change = (input.values[after] - input.values[before]).abs();
+            // A value that is missing there shows no change.
+            change.is_nan() || change <= UNCHANGED * (high - low)
+        };
+        if self.inputs.iter().all(same) {
+            longest.unchanged
+        } else {
+            longest.changed
+        }
+    }
+
     /// Rows between gaps that are too long to be held through.
     fn stretches(
         &self,
         sampling: Sampling,
-        longest: f64,
+        longest: LongestHold,
         gaps: &mut Gaps,
     ) -> Vec<std::ops::Range<usize>> {
         let known = |k: usize| self.inputs.iter().all(|u| !u.values[k].is_nan());
@@ -276,7 +320,7 @@ impl Record {
             };
             if !end && (k > last + 1 || sampling.missing(self.time[k] - self.time[last]) > 0) {
                 gaps.places += 1;
-                if unknown <= longest {
+                if unknown <= self.longest_hold(longest, (last, k)) {
                     gaps.held += 1;
                     gaps.longest_hold = gaps.longest_hold.max(unknown);
                 } else {

@@ -87,7 +87,7 @@ pub use csv::{
     parse_inputs_csv, read_csv, read_inputs_csv,
 };
 pub use error::{Error, ReadError};
-pub use gaps::Gaps;
+pub use gaps::{Gaps, LongestHold};
 pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
 pub use quote::{escaped, quoted, shown};
 pub use record::{

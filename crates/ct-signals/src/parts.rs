@@ -1,16 +1,16 @@
 //! Parts of records that were cut at gaps: the record of a part, and the parts joined again for a result.
 
 use crate::gaps::SHORTEST;
-use crate::{Error, Gaps, Record};
+use crate::{Error, Gaps, LongestHold, Record};
 
-/// The parts of records, and the handling of all gaps. `longest`: for a record the longest time for which its inputs are held \[s\]
+/// The parts of records, and the handling of all gaps. `longest`: for a record the longest time for which its inputs are held
 /// ([`Record::without_gaps`]).
 ///
 /// # Errors
 /// [`Error::NoStretch`] if no part of a record is left.
 pub fn without_gaps(
     records: &[Record],
-    longest: impl Fn(&Record) -> f64,
+    longest: impl Fn(&Record) -> LongestHold,
 ) -> Result<(Vec<Record>, Gaps), Error> {
     let (mut all, mut gaps) = (Vec::new(), Gaps::default());
     for record in records {
@@ -20,7 +20,7 @@ pub fn without_gaps(
             return Err(Error::NoStretch {
                 record: record.name.clone(),
                 readings: SHORTEST,
-                limit,
+                limit: limit.unchanged,
             });
         }
         gaps = gaps.and(own);

@@ -1,8 +1,9 @@
 //! Records with missing rows or samples of an input: the longest time for which an input may be held depends on the model, so a first fit
 //! determines it.
 //!
-//! Through a gap that is short beside the fastest time constant the input is held; at a longer one the record is cut, and the simulation
-//! starts again after it with states of its own ([`ct_signals::Gaps`]). The parts keep their time stamps and so their clock: a drift runs
+//! Through a gap that is short beside the fastest time constant, and after which the inputs are as before, they are held; otherwise the
+//! record is cut, and the simulation starts again after the gap with states of its own ([`ct_signals::Gaps`]): the instant of a change in a
+//! gap is not known, and a wrong one would look like an effect. The parts keep their time stamps and so their clock: a drift runs
 //! through them. Results join them again to the records that were given ([`ct_signals::parts`]).
 //!
 //! An input is held through one missing row in any case, because each part costs its initial states. A model that only integrates has no
@@ -11,7 +12,7 @@
 use std::collections::BTreeMap;
 
 use ct_model::Model;
-use ct_signals::{Gaps, Record, parts};
+use ct_signals::{Gaps, LongestHold, MIN_ROWS, Record, parts};
 use estimation::Stopping;
 use greybox::{FitOptions, ModelSetup, PriorValue};
 use serde::{Deserialize, Serialize};
@@ -45,7 +46,7 @@ pub struct MendedGaps {
     /// are `null` in JSON.
     #[serde(deserialize_with = "crate::not_finite::number")]
     pub time_constant: f64,
-    /// The longest time for which an input would have been held \[s\]; of several records the longest.
+    /// The longest time for which unchanged inputs would have been held \[s\]; of several records the longest.
     #[serde(deserialize_with = "crate::not_finite::number")]
     pub limit: f64,
 }
@@ -104,8 +105,8 @@ pub fn mend(
         let share = time_constant.map_or(0.0, |constant| constant.min(record.duration()));
         (LONGEST_HOLD * share).max(ONE_ROW * record.sample_interval())
     };
-    let (fitted, of_fitted) = parts::without_gaps(&records, limit)?;
-    let (held_out, of_test) = parts::without_gaps(&test, limit)?;
+    let (fitted, of_fitted) = cut(&records, limit)?;
+    let (held_out, of_test) = cut(&test, limit)?;
     let limits = all().filter(|record| lacks(record)).map(limit);
     Ok(Whole {
         gaps: Some(MendedGaps {
@@ -116,6 +117,25 @@ pub fn mend(
         records: fitted,
         test: held_out,
     })
+}
+
+/// Cuts records at gaps with a longer hold than `limit`, or in which an input has changed. If that leaves short parts, as with an input that
+/// is recorded at a slow rate, inputs are held through all gaps up to the limit.
+fn cut(
+    records: &[Record],
+    limit: impl Fn(&Record) -> f64,
+) -> Result<(Vec<Record>, Gaps), ct_signals::Error> {
+    let longest = |record: &Record| LongestHold {
+        unchanged: limit(record),
+        changed: ONE_ROW * record.sample_interval(),
+    };
+    if let Ok((parts, gaps)) = parts::without_gaps(records, longest) {
+        let rows: usize = parts.iter().map(Record::len).sum();
+        if rows >= MIN_ROWS * parts.len() {
+            return Ok((parts, gaps));
+        }
+    }
+    parts::without_gaps(records, |record| limit(record).into())
 }
 
 /// The fastest time constant of a first fit \[s\]; `None` if the fit fails.
@@ -149,7 +169,10 @@ fn provisional(records: &[Record]) -> Option<Vec<Record>> {
     loop {
         let of = |record: &Record| {
             let most = LONGEST_HOLD * record.duration();
-            (hold * record.sample_interval()).min(most.max(FIRST_HOLD * record.sample_interval()))
+            let first = FIRST_HOLD * record.sample_interval();
+            (hold * record.sample_interval())
+                .min(most.max(first))
+                .into()
         };
         if let Ok((parts, _)) = parts::without_gaps(records, of) {
             return Some(parts);

@@ -97,8 +97,8 @@ pub fn mend(
 /// A record with inputs held for at most `limit`; after longer gaps the readings within `memory` \[s\] are left out of the whole record.
 fn cut(record: &Record, limit: f64, memory: f64) -> Result<Mended, Error> {
     let one = std::slice::from_ref(record);
-    let (parts, gaps) = ct_signals::parts::without_gaps(one, |_| limit)?;
-    let (mut whole, _) = ct_signals::parts::without_gaps(one, |_| f64::INFINITY)?;
+    let (parts, gaps) = ct_signals::parts::without_gaps(one, |_| limit.into())?;
+    let (mut whole, _) = ct_signals::parts::without_gaps(one, |_| f64::INFINITY.into())?;
     let mut whole = whole.swap_remove(0);
     let begin = whole.time.first().copied().unwrap_or(0.0);
     let known = |t: f64| {

@@ -82,7 +82,7 @@ fn gaps_are_said_and_initial_states_named_by_their_part() {
 
 #[test]
 fn a_short_gap_does_not_cut_a_record() {
-    let place = place(|k| (200..206).contains(&k), |_| false);
+    let place = place(|k| (205..211).contains(&k), |_| false);
     let found = place.result("compare r.csv --model m.toml");
     let names = found["steps"][0]["parameters"].as_array().unwrap();
     let names: Vec<&str> = names

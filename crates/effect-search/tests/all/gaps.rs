@@ -35,9 +35,9 @@ fn problem(records: Vec<Record>) -> Problem {
 #[test]
 fn the_time_constant_of_a_first_fit_decides_which_gaps_are_held_through() {
     let whole = record(&slow(), 0.0, 0.05, 1);
-    // The input is known for 100 s before it may be held for 125 s: 10 rows are filled, 60 are not.
+    // The inputs may be held for 125 s: 10 rows are filled, 60 are not.
     let cut = without(&whole, |k| {
-        (100..110).contains(&k) || (250..310).contains(&k)
+        (104..114).contains(&k) || (250..310).contains(&k)
     });
     let problem = problem(vec![cut]);
     let gaps = problem.gaps.unwrap();
@@ -50,6 +50,18 @@ fn the_time_constant_of_a_first_fit_decides_which_gaps_are_held_through() {
     assert!((gaps.limit - LONGEST_HOLD * gaps.time_constant).abs() < 1e-9);
     let rows: Vec<usize> = problem.records.iter().map(Record::len).collect();
     assert_eq!(rows, [250, 190]);
+}
+
+#[test]
+fn a_gap_in_which_an_input_changes_is_not_held_through() {
+    // The heater changes at row 119.
+    let whole = record(&slow(), 0.0, 0.05, 1);
+    let cut = without(&whole, |k| (114..122).contains(&k) || k == 135);
+    let problem = problem(vec![cut]);
+    let gaps = problem.gaps.unwrap().gaps;
+    // One row is held through, although the heater changes at row 136.
+    assert_eq!((gaps.held, gaps.cut), (1, 1));
+    assert_eq!(problem.records.len(), 2);
 }
 
 #[test]

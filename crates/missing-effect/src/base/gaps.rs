@@ -27,15 +27,15 @@ impl Mended {
         let interval = problem.records.iter().map(Record::sample_interval);
         let first = FIRST_HOLD * interval.fold(0.0, f64::max);
         let trial = Problem {
-            records: parts::without_gaps(&problem.records, |_| first)?.0,
+            records: parts::without_gaps(&problem.records, |_| first.into())?.0,
             test: Vec::new(),
             ..problem.clone()
         };
         let (node, _) = base(&trial, options, FITTED)?;
         let time_constant = fastest_time_constant(&node)?;
         let limit = LONGEST_HOLD * time_constant;
-        let (records, gaps) = parts::without_gaps(&problem.records, |_| limit)?;
-        let (test, of_tests) = parts::without_gaps(&problem.test, |_| limit)?;
+        let (records, gaps) = parts::without_gaps(&problem.records, |_| limit.into())?;
+        let (test, of_tests) = parts::without_gaps(&problem.test, |_| limit.into())?;
         Ok(Some(Self {
             problem: Problem {
                 records,

@@ -64,7 +64,7 @@ pub struct Whole {
 
 /// What is known of the parameters of a model; names that are none of its parameters are ignored.
 #[derive(Debug, Clone, Copy)]
-pub struct Believes<'a> {
+pub struct PriorKnowledge<'a> {
     /// The model.
     pub model: &'a Model,
     /// Parameters that are not fitted, by name \[unit of the text\].
@@ -82,7 +82,7 @@ pub struct Believes<'a> {
 /// If a record is not sound, or no part of it has enough readings.
 pub fn mend(
     (records, test): (Vec<Record>, Vec<Record>),
-    believes: Believes,
+    prior: PriorKnowledge,
 ) -> Result<Whole, ct_signals::Error> {
     let lacks = |record: &Record| {
         record.has_gaps()
@@ -100,7 +100,7 @@ pub fn mend(
             gaps: None,
         });
     }
-    let time_constant = first_fit(&records, believes);
+    let time_constant = first_fit(&records, prior);
     let limit = |record: &Record| {
         let share = time_constant.map_or(0.0, |constant| constant.min(record.duration()));
         (LONGEST_HOLD * share).max(ONE_ROW * record.sample_interval())
@@ -139,15 +139,15 @@ fn cut(
 }
 
 /// The fastest time constant of a first fit \[s\]; `None` if the fit fails.
-fn first_fit(records: &[Record], believes: Believes) -> Option<f64> {
+fn first_fit(records: &[Record], prior: PriorKnowledge) -> Option<f64> {
     let is_parameter = |name: &str| {
-        let mut all = believes.model.spec().parameters.iter();
+        let mut all = prior.model.spec().parameters.iter();
         all.any(|parameter| parameter.about.name == name)
     };
-    let known = believes.known.iter();
+    let known = prior.known.iter();
     let known = known.filter(|(name, _)| is_parameter(name));
     let known = known.map(|(name, value)| (name.clone(), *value)).collect();
-    let priors = believes.priors.iter();
+    let priors = prior.priors.iter();
     let priors = priors.filter(|(name, _)| is_parameter(name));
     let priors = priors.map(|(name, value)| (name.clone(), *value)).collect();
     let mut rows = FIRST_ROWS;
@@ -157,7 +157,7 @@ fn first_fit(records: &[Record], believes: Believes) -> Option<f64> {
         (!part.is_empty()).then_some(part)
     });
     let first: Vec<Record> = first.collect();
-    let setup = ModelSetup::new(believes.model, &first, &known, believes.time_unit).ok()?;
+    let setup = ModelSetup::new(prior.model, &first, &known, prior.time_unit).ok()?;
     let setup = setup.with_priors(&priors).ok()?;
     let fit = setup.fit(&FIRST_FIT).ok()?;
     setup.fastest_time_constant(&fit.x)

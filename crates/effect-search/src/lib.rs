@@ -43,7 +43,7 @@ pub use diagnose::{Progress, diagnose};
 pub use error::Error;
 pub use failures::{Bin, Failure, FailureKind, Failures};
 pub use found_model::with_effects;
-pub use gaps::{Believes, FIRST_HOLD, LONGEST_HOLD, MendedGaps, Whole, mend};
+pub use gaps::{FIRST_HOLD, LONGEST_HOLD, MendedGaps, PriorKnowledge, Whole, mend};
 pub use held_out::{HeldOut, LATER_ROWS, MOST_OF_RECORD, held_out};
 pub use output_step::{HeldOutError, OutputStep, ResidualTests, output_steps};
 pub use problem::{Kept, Options, Problem};

@@ -8,7 +8,7 @@ use ct_model::{Model, ModelSpec};
 use ct_signals::Record;
 use greybox::{LoopController, ModelSetup, PriorValue};
 
-use crate::{Believes, Error, Kept, Problem, mend};
+use crate::{Error, Kept, PriorKnowledge, Problem, mend};
 
 /// Builds a [`Problem`]: required parts were given to [`Problem::builder`], the other parts have one method each.
 #[derive(Debug, Clone)]
@@ -136,13 +136,13 @@ impl ProblemBuilder {
         }
         let model = Model::new(problem.spec.clone());
         let records = (take(&mut problem.records), take(&mut problem.test));
-        let believes = Believes {
+        let prior = PriorKnowledge {
             model: &model,
             known: &problem.known,
             priors: &problem.priors,
             time_unit: seconds,
         };
-        let whole = mend(records, believes)?;
+        let whole = mend(records, prior)?;
         (problem.records, problem.test) = (whole.records, whole.test);
         problem.gaps = whole.gaps;
         let (none, no_priors) = (BTreeMap::new(), BTreeMap::new());

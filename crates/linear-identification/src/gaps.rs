@@ -11,7 +11,7 @@
 //! Missing readings of the output are no gaps: each method leaves them out in its own way.
 
 use ct_signals::Record;
-use missing_effect::{LONGEST_HOLD, MendedGaps};
+use missing_effect::{FIRST_HOLD, LONGEST_HOLD, MendedGaps};
 
 use crate::{
     Error, Method, Order, Request,
@@ -19,8 +19,6 @@ use crate::{
     refined,
 };
 
-/// For the first fit, inputs are held for this number of sampling intervals.
-const FIRST_HOLD: f64 = 20.0;
 /// A gap is forgotten when the plant's response to it has decayed to this share.
 const FORGOTTEN: f64 = 0.01;
 

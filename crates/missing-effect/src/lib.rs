@@ -21,6 +21,7 @@ pub use base::{Options, Problem, ProblemBuilder, Progress, TIME_LIMIT};
 pub use compare::compare;
 pub use diagnose::diagnose;
 pub use diagnostics::unknown::PLACE_MARGIN;
+pub use effect_search::FIRST_HOLD;
 pub use error::Error;
 pub use fit::criterion::GROUP_MARGIN;
 pub use fitted::{Fitted, fitted};

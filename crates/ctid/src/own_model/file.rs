@@ -11,7 +11,7 @@ use ct_signals::{
     Channel, ColumnFault, Columns, Conversion, Heading, Hold, Reading, Record, Unit, csv_header,
     quoted, read_csv, read_file,
 };
-use effect_search::{Believes, Diagnosis, Kept, MendedGaps, Whole, mend};
+use effect_search::{Diagnosis, Kept, MendedGaps, PriorKnowledge, Whole, mend};
 use greybox::PriorValue;
 use serde::{Deserialize, Serialize};
 
@@ -247,7 +247,7 @@ impl OwnModelFile {
         crate::input::on_one_clock(&mut all);
         crate::input::check_clocks(&all[..fitted], &summaries)?;
         let test = all.split_off(fitted);
-        let believes = Believes {
+        let prior = PriorKnowledge {
             model: &self.model,
             known: &self.known,
             priors: &self.priors,
@@ -257,7 +257,7 @@ impl OwnModelFile {
             records,
             test,
             gaps,
-        } = mend((all, test), believes)?;
+        } = mend((all, test), prior)?;
         Ok(Records {
             records,
             test,

@@ -34,6 +34,17 @@ fn single<'a>(found: &'a Diagnosis, effect: &str) -> &'a Single {
     singles.find(|single| single.effect == effect).unwrap()
 }
 
+/// The minimum detectable size, which is 3.858 standard errors of the fitted size.
+fn smallest_by_error(single: &Single) -> f64 {
+    let smallest = single.smallest_visible.unwrap();
+    let by_error = 3.858 * single.sizes[0].std_error.unwrap();
+    assert!(
+        (smallest / by_error - 1.0).abs() < 0.15,
+        "{smallest} {by_error}"
+    );
+    smallest
+}
+
 #[test]
 fn the_minimum_detectable_size_is_that_of_a_test_with_the_standard_error() {
     let noisy = found(&problem(BLOCK, drifting(0.0, 0.4, 3)));
@@ -42,13 +53,7 @@ fn the_minimum_detectable_size_is_that_of_a_test_with_the_standard_error() {
         let single = single(found, EFFECT);
         let visibility = single.visibility.unwrap();
         assert!(visibility > 0.05 && visibility < 1.0, "{visibility}");
-        let smallest = single.smallest_visible.unwrap();
-        let by_error = 3.858 * single.sizes[0].std_error.unwrap();
-        assert!(
-            (smallest / by_error - 1.0).abs() < 0.15,
-            "{smallest} {by_error}"
-        );
-        smallest
+        smallest_by_error(single)
     });
     assert!((twice / once - 2.0).abs() < 0.05, "{once} {twice}");
 
@@ -109,13 +114,7 @@ fn of_two_outputs_it_is_that_of_the_standard_error_in_coloured_noise() {
     );
     let [first, second] = drifts.map(|effect| {
         let single = single(&found, effect);
-        let smallest = single.smallest_visible.unwrap();
-        let by_error = 3.858 * single.sizes[0].std_error.unwrap();
-        assert!(
-            (smallest / by_error - 1.0).abs() < 0.15,
-            "{smallest} {by_error}"
-        );
-        smallest
+        smallest_by_error(single)
     });
     assert!(second > 3.0 * first, "{first} {second}");
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use ct_model::{Model, ModelSpec};
 use ct_signals::{Error, Record};
-use effect_search::{Believes, LONGEST_HOLD, Problem, mend};
+use effect_search::{LONGEST_HOLD, MendedGaps, PriorKnowledge, Problem, mend};
 
 use crate::records::{STEP, found, record};
 
@@ -25,6 +25,19 @@ fn without(record: &Record, lost: impl Fn(usize) -> bool) -> Record {
         channel.values = of(&channel.values);
     }
     less
+}
+
+/// Handling of the gaps of a record by a model.
+fn mended(text: &str, record: Record) -> MendedGaps {
+    let model = Model::new(ModelSpec::parse(text).unwrap());
+    let prior = PriorKnowledge {
+        model: &model,
+        known: &BTreeMap::new(),
+        priors: &BTreeMap::new(),
+        time_unit: 1.0,
+    };
+    let whole = mend((vec![record], Vec::new()), prior).unwrap();
+    whole.gaps.unwrap()
 }
 
 fn problem(records: Vec<Record>) -> Problem {
@@ -123,15 +136,7 @@ fn an_integrator_is_not_held_for_ever() {
     let cut = without(&whole, |k| {
         (100..150).contains(&k) || (300..460).contains(&k)
     });
-    let model = Model::new(ModelSpec::parse(text).unwrap());
-    let believes = Believes {
-        model: &model,
-        known: &BTreeMap::new(),
-        priors: &BTreeMap::new(),
-        time_unit: 1.0,
-    };
-    let found = mend((vec![cut], Vec::new()), believes).unwrap();
-    let gaps = found.gaps.unwrap();
+    let gaps = mended(text, cut);
     assert!(gaps.time_constant.is_infinite());
     let of_record = (whole.len() - 1) as f64 * STEP;
     assert!((gaps.limit - LONGEST_HOLD * of_record).abs() < 1e-9);
@@ -181,17 +186,7 @@ fn without_a_first_fit_only_one_row_is_held_through() {
     let whole = record(&slow(), 0.0, 0.05, 7);
     let mut cut = without(&whole, |k| (200..203).contains(&k));
     cut.inputs.truncate(1);
-    let model = Model::new(ModelSpec::parse(text).unwrap());
-    let believes = Believes {
-        model: &model,
-        known: &BTreeMap::new(),
-        priors: &BTreeMap::new(),
-        time_unit: 1.0,
-    };
-    let gaps = mend((vec![cut], Vec::new()), believes)
-        .unwrap()
-        .gaps
-        .unwrap();
+    let gaps = mended(text, cut);
     assert!(gaps.time_constant.is_nan());
     assert!((gaps.limit - 1.5 * STEP).abs() < 1e-9);
     assert_eq!((gaps.gaps.held, gaps.gaps.cut), (0, 1));

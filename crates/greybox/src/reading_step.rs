@@ -107,7 +107,7 @@ impl FirstLook {
         let count = ((most_steps - FEWEST_STEPS) / span / grid) as usize;
         let count = count.min(MOST_COSINES / some.len());
         let at = |k: usize| FEWEST_STEPS / span + grid * k as f64;
-        let coarse: Vec<f64> = (0..count).map(|k| aligned(at(k), &some)).collect();
+        let coarse = alignments(at(0), grid, count, &some);
         let maxima = (1..count.saturating_sub(1))
             .filter(|&k| coarse[k] >= coarse[k - 1] && coarse[k] >= coarse[k + 1])
             .map(|k| (coarse[k], at(k)));
@@ -124,6 +124,56 @@ fn aligned(steps: f64, readings: &[f64]) -> f64 {
     let turn = std::f64::consts::TAU * steps;
     let sum: f64 = readings.iter().map(|y| (turn * y).cos()).sum();
     sum / readings.len() as f64
+}
+
+/// Number of readings whose cosines are summed side by side.
+const BESIDE: usize = 8;
+
+/// Agreement of readings with multiples of one over `first`, `first + grid`, `first + 2 grid` and so on.
+///
+/// From one number to the next each reading's phase turns by the same angle: a rotation takes a tenth of the time of a cosine, and a million
+/// of them add up to an error of 1e-10.
+fn alignments(first: f64, grid: f64, count: usize, readings: &[f64]) -> Vec<f64> {
+    let phases = |steps: f64| {
+        readings
+            .iter()
+            .map(move |y| std::f64::consts::TAU * steps * y)
+    };
+    // Readings that fill the last group have no share in the sum.
+    let none = || {
+        std::iter::repeat_n(
+            (0.0, 0.0),
+            readings.len().next_multiple_of(BESIDE) - readings.len(),
+        )
+    };
+    let of = |steps: f64| -> (Vec<f64>, Vec<f64>) {
+        phases(steps)
+            .map(|phase| (phase.cos(), phase.sin()))
+            .chain(none())
+            .unzip()
+    };
+    let (mut cosines, mut sines) = of(first);
+    let (turn_cosines, turn_sines) = of(grid);
+    let mut found = Vec::with_capacity(count);
+    for _ in 0..count {
+        let mut sums = [0.0; BESIDE];
+        let now = cosines
+            .chunks_exact_mut(BESIDE)
+            .zip(sines.chunks_exact_mut(BESIDE));
+        let turns = turn_cosines
+            .chunks_exact(BESIDE)
+            .zip(turn_sines.chunks_exact(BESIDE));
+        for ((c, s), (turn_c, turn_s)) in now.zip(turns) {
+            for i in 0..BESIDE {
+                sums[i] += c[i];
+                let next = c[i] * turn_c[i] - s[i] * turn_s[i];
+                s[i] = c[i] * turn_s[i] + s[i] * turn_c[i];
+                c[i] = next;
+            }
+        }
+        found.push(sums.iter().sum::<f64>() / readings.len() as f64);
+    }
+    found
 }
 
 /// The best alignment near a number of steps, within `reach`.
@@ -187,6 +237,23 @@ mod tests {
             let possible = possible_reading_steps(&[wave], 0, 4);
             let near = |found: &f64| (found - step).abs() < 0.02 * step;
             assert!(possible.iter().any(near), "{possible:?} without {step}");
+        }
+    }
+
+    #[test]
+    fn rotated_phases_agree_with_cosines() {
+        let readings: Vec<f64> = (0..1003)
+            .map(|k| 3.0 + (0.7 * f64::from(k)).sin())
+            .collect();
+        let (first, grid, count) = (2.0, 0.03, 20_000);
+        let found = alignments(first, grid, count, &readings);
+        for k in (0..count).step_by(97).chain([count - 1]) {
+            let exact = aligned(first + grid * k as f64, &readings);
+            assert!(
+                (found[k] - exact).abs() < 1e-9,
+                "{k}: {} of {exact}",
+                found[k]
+            );
         }
     }
 

@@ -47,8 +47,8 @@ pub enum Function {
     Max,
     /// `play(x, b)`: backlash of half-width `b`; the result follows `x` from row to row at a distance of at most `b`.
     Play,
-    /// `stick_slip(x, b, j)`: stiction; the result stays until `x` is further than `b (1 + j)` from it, and then moves to a distance of `b (1 - j)`
-    /// from `x`: with `j = 0` a play, with `j = 1` it jumps to `x`.
+    /// `stick_slip(x, b, j, s)`: stiction; the result stays until `x` is further than `b (1 + j)` from it, and then moves to a distance of
+    /// `b (1 - j)` from `x`: with `j = 0` a play, with `j = 1` it jumps to `x`. It begins at `x + s b (1 + j)`.
     StickSlip,
     /// `stay_between(a, b)`: the result keeps its value of the row before while this is between `a` and `b`, and follows the nearer one
     /// otherwise. A play of `x` stays between `x - b` and `x + b`.
@@ -113,7 +113,7 @@ impl Function {
             | Self::Play
             | Self::StayBetween
             | Self::Quantise => 2,
-            Self::StickSlip => 3,
+            Self::StickSlip => 4,
             _ => 1,
         }
     }

@@ -189,8 +189,9 @@ impl Walk<'_> {
                     | Function::Quantise,
                     [a, b],
                 ) => self.together(a, b),
-                (Function::StickSlip, [a, b, share]) => {
-                    self.pure(*function, share);
+                (Function::StickSlip, [a, b, jump, begin]) => {
+                    self.pure(*function, jump);
+                    self.pure(*function, begin);
                     self.together(a, b)
                 }
                 (Function::Atan2, [a, b]) => {

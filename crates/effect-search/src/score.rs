@@ -63,6 +63,9 @@ const PERIODIC: &str = "periodic";
 pub(crate) const QUANTISATION: &str = "quantisation";
 /// The effect whose instant is refined between its starts.
 const STEP: &str = "step";
+/// The effect whose first position within its band is refined between its starts, and the positions that are scored.
+const BACKLASH: &str = "backlash";
+const BEGINS: [f64; 2] = [-0.8, 0.8];
 /// Distances from the best instants at which further starts are scored, round by round, as shares of the longest record.
 const BETWEEN: [f64; 2] = [0.05, 0.025];
 
@@ -268,6 +271,19 @@ impl Context<'_> {
         };
         let mut scored: Vec<Place> = starts.into_iter().filter_map(scored_at).collect();
         scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
+        if let Some(at) = own_place(BACKLASH, "begin") {
+            let best = scored.iter().take(self.thresholds.kept_starts);
+            let others = best.flat_map(|best| {
+                BEGINS.map(|begin| {
+                    let mut x = best.x.clone();
+                    x[at] = begin;
+                    x
+                })
+            });
+            let others: Vec<Vec<f64>> = others.collect();
+            scored.extend(others.into_iter().filter_map(scored_at));
+            scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
+        }
         if let Some(at) = own_place(STEP, "since") {
             let duration = self.longest_duration();
             for share in BETWEEN {

@@ -266,7 +266,7 @@ impl Compiler<'_> {
             Expression::Call(function, arguments) => {
                 let given: Vec<Register> = arguments.iter().map(|a| self.expression(a)).collect();
                 let given_at = |i: usize| given.get(i).copied().unwrap_or(0);
-                self.call(*function, given[0], given_at(1), given_at(2))
+                self.call(*function, [given[0], given_at(1), given_at(2), given_at(3)])
             }
             Expression::If(condition, a, b) => {
                 let branch = self.condition(condition);
@@ -286,7 +286,7 @@ impl Compiler<'_> {
         }
     }
 
-    fn call(&mut self, function: Function, a: Register, b: Register, c: Register) -> Register {
+    fn call(&mut self, function: Function, [a, b, c, d]: [Register; 4]) -> Register {
         match function {
             Function::Abs => {
                 let (zero, negative) = (self.number(0.0), self.operation(Operation::Negative(a)));
@@ -305,7 +305,7 @@ impl Compiler<'_> {
             Function::Max => self.larger(a, b),
             Function::Play => self.play(a, b),
             Function::StayBetween => self.stay_between(a, a, b),
-            Function::StickSlip => self.stick_slip(a, b, c),
+            Function::StickSlip => self.stick_slip(a, [b, c, d]),
             Function::Quantise => self.operation(Operation::Quantise(a, b)),
             Function::Sqrt => self.operation(Operation::Sqrt(a)),
             Function::Exp => self.operation(Operation::Exp(a)),

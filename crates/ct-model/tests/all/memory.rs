@@ -52,7 +52,7 @@ const STICK_SLIP: &str = "model Slip
   parameter Real b = 0.5;
   final parameter Real j = 1;
   input Real u;
-  output Real y = stick_slip(u, b, j);
+  output Real y = stick_slip(u, b, j, 0);
 end Slip;";
 const PLAY: &str = "model Play
   parameter Real b = 0.5;
@@ -74,6 +74,39 @@ fn stiction_moves_by_jumps() {
     assert_eq!(y, [2.0, 2.65, 2.65, 2.65, 2.65, 4.75, 4.75]);
     // ... and with width zero it is absent.
     assert_eq!(run(&model(STICK_SLIP), &[0.0, 1.0], &u, false).0, u);
+}
+
+/// It begins anywhere within its band, and up to its first move this shows.
+#[test]
+fn stiction_and_play_begin_within_their_band() {
+    let model = model(
+        "model Begins
+  parameter Real b = 0.5;
+  final parameter Real j = 1;
+  parameter Real s = 0;
+  input Real u;
+  output Real y = stick_slip(u, b, j, s);
+end Begins;",
+    );
+    let u = [2.0, 2.25, 3.125, 2.25];
+    // At the lower end of its band a rise moves it at once, at the upper end it stays.
+    let of = |j: f64, s: f64| run(&model, &[0.5, j, s], &u, false).0;
+    assert_eq!(of(1.0, -1.0), [1.0, 2.25, 2.25, 2.25]);
+    assert_eq!(of(1.0, 1.0), [3.0, 3.0, 3.0, 3.0]);
+    assert_eq!(of(0.0, -1.0), [1.5, 1.75, 2.625, 2.625]);
+    assert_eq!(of(0.0, 0.5), [2.25, 2.25, 2.625, 2.625]);
+    for (j, band) in [(0.0, 0.5), (1.0, 1.0)] {
+        let parameters = [
+            Dual::constant(0.5),
+            Dual::constant(j),
+            Dual::<2>::variable(0.5, 0),
+        ];
+        let (y, _) = run(&model, &parameters, &u, false);
+        let slopes: Vec<f64> = y.iter().map(|y| y.eps[0]).collect();
+        // A play moves at the third row, stiction not at all.
+        let later = if j == 0.0 { 0.0 } else { band };
+        assert_eq!(slopes, [band, band, later, later]);
+    }
 }
 
 #[test]
@@ -116,7 +149,7 @@ fn stiction_moves_within_an_interval() {
       input Real u;
       output Real x(start=0);
     equation
-      der(x) = stick_slip(u, b, j) + 0*x^2;
+      der(x) = stick_slip(u, b, j, 0) + 0*x^2;
     end Slip;";
     // From 0 to 5 in a straight line: it jumps at u = 2, after two fifths of the interval.
     let (x, _) = run(&model(text), &[1.0, 1.0], &[0.0, 5.0, 5.0], true);

@@ -199,7 +199,7 @@ fn expressions() {
     refuses(
         "  Real q = stick_slip(x, 1);",
         12,
-        "stick_slip takes three arguments",
+        "stick_slip takes four arguments",
         "2 are given here",
     );
     refuses(

@@ -86,12 +86,9 @@ fn expression(site: Site, of_time: bool) -> BoxedStrategy<Expression> {
             .prop_map(|(o, a, b)| Expression::Binary(o, a.into(), b.into()));
         let function = (
             proptest::sample::select(Function::ALL.to_vec()),
-            inner.clone(),
-            inner.clone(),
-            inner.clone(),
+            proptest::collection::vec(inner.clone(), 4),
         );
-        let call = function.prop_map(|(function, a, b, c)| {
-            let mut arguments = vec![a, b, c];
+        let call = function.prop_map(|(function, mut arguments)| {
             arguments.truncate(function.arguments());
             Expression::Call(function, arguments)
         });

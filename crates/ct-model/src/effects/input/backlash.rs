@@ -11,7 +11,8 @@ model backlash
   constant Real width(unit="signal") = 1;
   final parameter Real jump(min=0, max=1) = 0 "0: play; 1: stiction, which moves by steps of twice the half-width";
   parameter Real half_width(unit="port", min=0, max=0.5*width) = 0 "half of the play, or of the step by which it moves";
-  output Real v(unit="port") = stick_slip(u, half_width, jump);
+  parameter Real begin(min=-1, max=1) = 0 "position within the band when the record begins; 0: at the command, -1 and 1: at an end";
+  output Real v(unit="port") = stick_slip(u, half_width, jump, begin);
 end backlash;
 "#,
     parameters: &[
@@ -24,6 +25,7 @@ end backlash;
                 0.012, 0.016, 0.022, 0.03, 0.04, 0.054, 0.073, 0.098, 0.13, 0.18, 0.24, 0.33,
             ]),
         ),
+        ("begin", Role::Shape, Starts::Values(&[0.0])),
     ],
     physics: "After each reversal the command has to cross a backlash before the actuator follows (worn gears), or the actuator sticks until the command has moved far enough, and then jumps (a valve's stem).",
     confused_with: &["dead_zone(u)", "lag(u)", "hysteresis(y)"],

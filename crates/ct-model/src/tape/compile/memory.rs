@@ -9,9 +9,14 @@ const PERTURBATION: f64 = 0.05;
 
 impl Compiler<'_> {
     pub(super) fn play(&mut self, from: Register, half_width: Register) -> Register {
-        let low = self.operation(Operation::Subtract(from, half_width));
-        let high = self.operation(Operation::Add(from, half_width));
-        self.stay_between(from, low, high)
+        self.play_from(from, from, half_width)
+    }
+
+    /// A play whose first value is `first`.
+    fn play_from(&mut self, first: Register, of: Register, half_width: Register) -> Register {
+        let low = self.operation(Operation::Subtract(of, half_width));
+        let high = self.operation(Operation::Add(of, half_width));
+        self.stay_between(first, low, high)
     }
 
     /// A value that stays between two others and begins at `from`: a generalised play (Krasnosel'skii and Pokrovskii, Systems with
@@ -31,21 +36,23 @@ impl Compiler<'_> {
 
     /// Stiction, with a finite difference in place of its derivative by the half-width: a narrower and a wider element follow the same
     /// signal. The derivative itself is zero almost everywhere if the jump is complete: the result changes only where a jump occurs or no
-    /// longer occurs. Without a jump it is a play, with its exact derivative.
+    /// longer occurs. Without a jump it is a play, with its exact derivative. `begin`: the first position within the band, whose derivative
+    /// is that up to the first jump.
     pub(super) fn stick_slip(
         &mut self,
-        from: Register,
-        half_width: Register,
-        jump: Register,
+        of: Register,
+        [half_width, jump, begin]: [Register; 3],
     ) -> Register {
         let [zero, one, share] = [0.0, 1.0, PERTURBATION].map(|n| self.number(n));
-        let play = self.play(from, half_width);
+        let within = self.operation(Operation::Multiply(begin, half_width));
+        let first = self.operation(Operation::Add(of, within));
+        let play = self.play_from(first, of, half_width);
         let width = self.operation(Operation::Scale(one, half_width));
         let reach = self.operation(Operation::Multiply(share, width));
         let narrower = self.operation(Operation::Subtract(width, reach));
         let wider = self.operation(Operation::Add(width, reach));
         let [below, middle, above] =
-            [narrower, width, wider].map(|width| self.stick(from, width, jump));
+            [narrower, width, wider].map(|width| self.stick(of, [width, jump, begin]));
         let rise = self.operation(Operation::Subtract(above, below));
         let run = self.operation(Operation::Add(reach, reach));
         let slope = self.operation(Operation::Divide(rise, run));
@@ -61,14 +68,16 @@ impl Compiler<'_> {
 
     /// An element that sticks until its input is further from it than `half_width*(1 + jump)`, and then moves to a distance of
     /// `half_width*(1 - jump)`.
-    fn stick(&mut self, from: Register, half_width: Register, jump: Register) -> Register {
+    fn stick(&mut self, of: Register, [half_width, jump, begin]: [Register; 3]) -> Register {
         let jumped = self.operation(Operation::Multiply(half_width, jump));
         let band = self.operation(Operation::Add(half_width, jumped));
         let rest = self.operation(Operation::Subtract(half_width, jumped));
-        let low = self.operation(Operation::Subtract(from, band));
-        let high = self.operation(Operation::Add(from, band));
-        let from_below = self.operation(Operation::Subtract(from, rest));
-        let from_above = self.operation(Operation::Add(from, rest));
+        let low = self.operation(Operation::Subtract(of, band));
+        let high = self.operation(Operation::Add(of, band));
+        let from_below = self.operation(Operation::Subtract(of, rest));
+        let from_above = self.operation(Operation::Add(of, rest));
+        let within = self.operation(Operation::Multiply(begin, band));
+        let from = self.operation(Operation::Add(of, within));
         let held = self.first_play + self.plays.len();
         let rises = self.guard(Comparison::Less, held, low);
         let falls = self.guard(Comparison::Greater, held, high);

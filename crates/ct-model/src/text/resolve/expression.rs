@@ -169,7 +169,7 @@ impl Builder<'_> {
                     match function.arguments() {
                         1 => "one argument",
                         2 => "two arguments",
-                        _ => "three arguments",
+                        _ => "four arguments",
                     },
                 )?;
                 let arguments = arguments

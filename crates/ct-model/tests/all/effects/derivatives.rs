@@ -33,6 +33,8 @@ fn check_derivatives(driven: &Driven, candidate: &Candidate, at: &[f64], toleran
             .collect();
         let exact = driven.run(&model, &duals);
         let typical = own.starts.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        // The one start may be zero.
+        let typical = if typical > 0.0 { typical } else { own.bounds.1 };
         // Near a limit, a short step.
         let share = if own.role == Role::Threshold {
             1e-5

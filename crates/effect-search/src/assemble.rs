@@ -109,7 +109,7 @@ pub(crate) fn assemble(
             Some(Single {
                 effect: candidate.id.clone(),
                 sizes,
-                bic_gain: node.gain_over(&grown.base),
+                bic_gain: node.gain_over(&grown.of_singles),
                 rmse_per_output: named(&node.fit.rmse),
                 visibility: detectable.visibility,
                 smallest_visible: detectable.smallest,

@@ -180,7 +180,9 @@ impl<'a> Context<'a> {
             for (at, parameter) in parameters.enumerate() {
                 let mut own = self.candidates[i].parameters.iter();
                 let own = own.find(|own| own.name == parameter.about.name);
-                if let Some(value) = own.and_then(|own| kept.start.get(&own.short)) {
+                if let Some(value) = own.and_then(|own| kept.start.get(&own.short))
+                    && !self.problem.known.contains_key(&parameter.about.name)
+                {
                     start[at] = within(*value, bounds[at]);
                 }
             }

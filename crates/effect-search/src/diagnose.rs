@@ -115,6 +115,7 @@ pub fn diagnose(
                 noise = white.clone();
                 slowness = context.slowness(&own.noise);
                 (grown.singles, grown.base) = by_error_singles;
+                grown.of_singles = grown.base.clone();
                 not_noise = context.not_noise(&confirmed, &own)?;
             }
         } else if let Some(better) = context.better_in_own_noise(timeless, &own) {
@@ -123,7 +124,9 @@ pub fn diagnose(
             if let Ok(bare) = context.refitted(&grown.base, &noise, FINE) {
                 grown.base = bare;
             }
-            (own, confirmed) = (better.fit.clone(), better);
+            // The deviance of a fit with its own noise model is lower than that of a fit with the same model given.
+            own = better.fit.clone();
+            confirmed = context.refitted(&better, &noise, FINE).unwrap_or(better);
             not_noise = context.not_noise(&confirmed, &own)?;
         }
     }

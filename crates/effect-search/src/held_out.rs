@@ -156,10 +156,10 @@ fn states_are_known(setup: &ModelSetup, x: &[f64], first: usize, noise: &[f64]) 
             count += 1;
         }
     }
-    // A state without influence needs no estimate.
-    let ridge = 1e-9 * all.diagonal().max() / count.max(1) as f64;
+    // A state without influence needs no estimate. Each in its own unit.
     for i in 0..states {
-        information[(i, i)] += ridge;
+        let of_all = all[(i, i)] / count.max(1) as f64;
+        information[(i, i)] += if of_all > 0.0 { 1e-9 * of_all } else { 1.0 };
     }
     information.cholesky().is_some_and(|factor| {
         let moved = factor.solve(&all).trace();

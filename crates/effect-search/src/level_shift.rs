@@ -28,9 +28,21 @@ pub(crate) struct LevelShift {
 }
 
 impl Context<'_> {
-    /// A set with a level shift of a reading at the best instant, with the weighting of a noise model; `None` if no fit succeeds.
+    /// A set with a level shift of a reading at the best instant, with the weighting of a noise model; `None` if no fit succeeds, and for records
+    /// with clocks of their own.
     pub fn level_shift(&self, node: &Node, noise: &Noise) -> Result<Option<LevelShift>, Error> {
         let setup = self.setup(&node.model)?;
+        // The shift has one instant on the model's clock: records with clocks of their own would all have it.
+        let begins: Vec<f64> = (0..self.problem.records.len())
+            .filter_map(|record| setup.model_time(record).first().copied())
+            .collect();
+        if begins.len() > 1
+            && begins
+                .iter()
+                .any(|begin| begins.iter().filter(|b| *b == begin).count() > 1)
+        {
+            return Ok(None);
+        }
         let Some(residuals) = estimation::residuals(&setup, &node.fit.x) else {
             return Ok(None);
         };

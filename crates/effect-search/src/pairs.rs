@@ -36,10 +36,21 @@ pub(crate) fn joint_scores(
     // A parameter at a bound stays there.
     let mut chosen = base.fit.interior().to_vec();
     chosen.push(own.columns - 1);
-    let Some(believed) = whitened(&own, chosen, noise, weights, every) else {
+    let Some(samples) = whitened(&own, chosen.clone(), noise, weights, every) else {
         return Vec::new();
     };
-    let p = believed.ncols() - 1;
+    let p = samples.ncols() - 1;
+    // A prior holds its parameter: what only that parameter could imitate is not lost.
+    let mut priors = Vec::new();
+    let sigma = base.fit.prior_weight() / (every as f64).sqrt();
+    own.each_prior(&chosen, sigma, |row| priors.extend_from_slice(row));
+    let priors = DMatrix::from_row_slice(priors.len() / (p + 1), p + 1, &priors);
+    let all = samples.nrows() + priors.nrows();
+    let measured = samples.column(p).into_owned();
+    let mut believed = samples.resize_vertically(all, 0.0);
+    believed
+        .rows_mut(all - priors.nrows(), priors.nrows())
+        .copy_from(&priors);
     let basis = basis_of(&believed.columns(0, p).into_owned());
     let residual = believed.column(p).into_owned();
     let mut left = residual.clone();
@@ -47,8 +58,11 @@ pub(crate) fn joint_scores(
     let columns: Vec<Vec<DVector<f64>>> = trials
         .par_iter()
         .map(|trial| {
-            let columns = columns_of(context, base, trial, noise, weights, every, &residual);
-            let mut columns = columns.unwrap_or_default();
+            let columns = columns_of(context, base, trial, noise, weights, every, &measured);
+            let columns = columns.unwrap_or_default().into_iter();
+            let mut columns: Vec<_> = columns
+                .map(|column| column.resize_vertically(all, 0.0))
+                .collect();
             columns.retain_mut(|column| {
                 let before = column.norm();
                 project(&basis, column);
@@ -81,7 +95,7 @@ pub(crate) fn joint_scores(
         .map(|columns| explained(&columns.iter().collect::<Vec<_>>()))
         .collect();
     let total = left.norm_squared();
-    let rows = left.len() as f64;
+    let rows = measured.len() as f64;
     let mut pairs: Vec<(f64, usize, usize)> = (0..trials.len())
         .into_par_iter()
         .flat_map_iter(|a| (0..a).map(move |b| (a, b)))

@@ -17,7 +17,7 @@
 //! A larger set is taken where each further effect leaves at most a half of what a smaller set leaves, or two thirds of the squared error
 //! in the cross-validation.
 
-use ct_model::effects::EffectParameter;
+use ct_model::effects::{EffectParameter, Role};
 use ct_signals::{ArModel, Record};
 use estimation::{Fit, Noise, fit_from, prewhitened};
 use rayon::prelude::*;
@@ -180,12 +180,12 @@ impl Context<'_> {
     }
 
     /// Whether a parameter of these effects is at a bound that is not one of its starts: such a bound is a value like others, as that all
-    /// of a spill reaches the next tank.
+    /// of a spill reaches the next tank. A play may begin at an end of its band.
     fn at_a_bound(&self, node: &Node, effects: &[usize]) -> bool {
         let errors = node.fit.std_errors();
         let fitted = effects.iter().flat_map(|&i| {
             let own = self.candidates[i].parameters.iter();
-            own.filter(|p| p.role != ct_model::effects::Role::Choice)
+            own.filter(|p| !matches!(p.role, Role::Begin | Role::Choice))
         });
         let fitted: Vec<&EffectParameter> = fitted.collect();
         let values = node.fit.x.iter().zip(errors);

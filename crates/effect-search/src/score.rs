@@ -63,8 +63,7 @@ const PERIODIC: &str = "periodic";
 pub(crate) const QUANTISATION: &str = "quantisation";
 /// The effect whose instant is refined between its starts.
 const STEP: &str = "step";
-/// The effect whose first position within its band is refined between its starts, and the positions that are scored.
-const BACKLASH: &str = "backlash";
+/// First positions that are scored in addition to the start, as [`Role::Begin`] says.
 const BEGINS: [f64; 2] = [-0.8, 0.8];
 /// Distances from the best instants at which further starts are scored, round by round, as shares of the longest record.
 const BETWEEN: [f64; 2] = [0.05, 0.025];
@@ -177,10 +176,11 @@ impl Context<'_> {
             .parameters
             .iter()
             .map(|own| {
-                let all = model.spec().parameters.iter();
-                all.enumerate()
-                    .find(|(_, p)| p.about.name == own.name)
-                    .map(|(at, _)| at)
+                // A parameter that the model file fixes keeps its value.
+                let fixed = self.problem.known.contains_key(&own.name);
+                let mut all = model.spec().parameters.iter();
+                let at = all.position(|p| p.about.name == own.name);
+                at.filter(|_| !fixed)
             })
             .collect();
         let smooth = candidate.is_smooth();
@@ -229,7 +229,7 @@ impl Context<'_> {
             .parameters
             .iter()
             .zip(&places)
-            .filter(|(own, _)| smooth && own.role == Role::Shape)
+            .filter(|(own, _)| smooth && matches!(own.role, Role::Shape | Role::Begin))
             .filter_map(|(_, place)| *place)
             .collect();
         let place = |x: Vec<f64>, triangle: Triangle| {
@@ -271,17 +271,28 @@ impl Context<'_> {
         };
         let mut scored: Vec<Place> = starts.into_iter().filter_map(scored_at).collect();
         scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
-        if let Some(at) = own_place(BACKLASH, "begin") {
-            let best = scored.iter().take(self.thresholds.kept_starts);
-            let others = best.flat_map(|best| {
+        let choices: Vec<usize> = candidate
+            .parameters
+            .iter()
+            .zip(&places)
+            .filter(|(own, _)| own.role == Role::Choice)
+            .filter_map(|(_, place)| *place)
+            .collect();
+        let chosen = |x: &Vec<f64>| -> Vec<f64> { choices.iter().map(|&at| x[at]).collect() };
+        let choice = |place: &Place| chosen(&place.x);
+        let mut own = candidate.parameters.iter().zip(&places);
+        let begin = own.find(|(own, _)| own.role == Role::Begin);
+        if let Some(at) = begin.and_then(|(_, place)| *place) {
+            let all = scored.iter().map(|place| place.x.clone()).collect();
+            let best = best_of_each_choice(all, chosen, self.thresholds.kept_starts);
+            let others = best.into_iter().flat_map(|best| {
                 BEGINS.map(|begin| {
-                    let mut x = best.x.clone();
+                    let mut x = best.clone();
                     x[at] = begin;
                     x
                 })
             });
-            let others: Vec<Vec<f64>> = others.collect();
-            scored.extend(others.into_iter().filter_map(scored_at));
+            scored.extend(others.filter_map(scored_at));
             scored.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
         }
         if let Some(at) = own_place(STEP, "since") {
@@ -307,15 +318,6 @@ impl Context<'_> {
             let mut first = true;
             scored.retain(|place| std::mem::take(&mut first) || (place.x[at] - best).abs() >= near);
         }
-        let choices: Vec<usize> = candidate
-            .parameters
-            .iter()
-            .zip(&places)
-            .filter(|(own, _)| own.role == Role::Choice)
-            .filter_map(|(_, place)| *place)
-            .collect();
-        let choice =
-            |place: &Place| -> Vec<f64> { choices.iter().map(|&at| place.x[at]).collect() };
         // A start at which the effect is absent comes in addition to those at which it is present.
         let is_absent = |place: &Place| {
             let own = candidate.parameters.iter().zip(&places);

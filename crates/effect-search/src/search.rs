@@ -19,8 +19,10 @@ const LARGER: &str = "larger sets of effects";
 pub(crate) struct Grown {
     /// The first model of the search.
     pub base: Node,
-    /// Single effects, best first.
+    /// Single effects, best first, ...
     pub singles: Vec<Node>,
+    /// ... and the set that they were added to, with their weighting: [`Self::base`] may be fitted again with another one.
+    pub of_singles: Node,
     /// The set with the least criterion.
     pub best: Node,
     /// Candidates that are scored for sets of several effects: candidates with almost no influence on the believed model are left out.
@@ -149,6 +151,7 @@ impl Context<'_> {
             best: base.clone(),
             among,
             cut_short: self.limit.leaves_out(LARGER),
+            of_singles: base.clone(),
             base,
             fitted: singles.iter().chain(&beam[few..]).cloned().collect(),
             singles,
@@ -162,6 +165,7 @@ impl Context<'_> {
         let Grown {
             base,
             mut singles,
+            of_singles,
             mut best,
             among,
             mut beam,
@@ -226,6 +230,7 @@ impl Context<'_> {
         Ok(Grown {
             base,
             singles,
+            of_singles,
             best,
             among,
             beam,

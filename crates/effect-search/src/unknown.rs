@@ -99,8 +99,15 @@ impl Context<'_> {
         let is_course = |set: &Node| self.last_of(set).is_some_and(Candidate::follows_time);
         let (courses, shapes): (Vec<Node>, Vec<Node>) =
             fitted.into_iter().partition(|set| is_course(set));
-        let counts = base.fit.rmse.iter().zip(&base.fit.samples_per_output);
-        let before: Vec<f64> = counts.map(|(rmse, n)| rmse * rmse * *n as f64).collect();
+        // Of the same residuals as those of the parts that are left out: in a loop these are not those on the measured inputs.
+        let Some(residuals) = estimation::residuals(&self.setup(&base.model)?, &base.fit.x) else {
+            return Ok(None);
+        };
+        let mut before = vec![0.0; base.fit.rmse.len()];
+        for (i, series) in residuals.iter().enumerate() {
+            let present = series.iter().filter(|e| !e.is_nan());
+            before[i % base.fit.rmse.len()] += present.map(|e| e * e).sum::<f64>();
+        }
         let tested: Vec<Option<f64>> = shapes
             .par_iter()
             .take(self.thresholds.shape_left_out)

@@ -9,7 +9,7 @@ pub struct DescribedParameter {
     pub name: &'static str,
     /// Unit as in the text: `port`, `balance/port`; empty for a number.
     pub unit: &'static str,
-    /// Expression of the value at which the effect is absent: `high + width`. Empty for a [`Role::Shape`] and a [`Role::Choice`], whose
+    /// Expression of the value at which the effect is absent: `high + width`. Empty for a [`Role::Shape`], a [`Role::Begin`] and a [`Role::Choice`], whose
     /// values do not matter then.
     pub absent: &'static str,
     /// Description; may be empty.
@@ -127,7 +127,7 @@ impl Effect {
                 name: own.name,
                 unit: own.unit,
                 absent: match role {
-                    Some(Role::Shape | Role::Choice) => "",
+                    Some(Role::Shape | Role::Begin | Role::Choice) => "",
                     _ => own.value,
                 },
                 meaning: own.meaning,

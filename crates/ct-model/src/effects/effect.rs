@@ -51,6 +51,8 @@ pub enum Role {
     /// At the absent value the effect vanishes, but the outputs have no derivative with respect to the parameter there, or one that says
     /// little of larger values: a limit at the edge of the visited range, a quantisation step, a dead zone. A grid of starts is used.
     Threshold,
+    /// The parameter states in which position the effect begins. It says nothing of the time after the effect's first move.
+    Begin,
     /// The parameter takes one of its start values and no value in between: upper or lower. It is not fitted.
     Choice,
 }

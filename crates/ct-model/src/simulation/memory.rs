@@ -2,8 +2,8 @@
 //!
 //! Within a sampling interval the output is computed from its value at the last sample. For a play this is exact if its input is held or
 //! monotone in the interval, as every model input is. For stick-slip it is exact if the input is held; otherwise the output moves at most
-//! once in an interval, and then follows its input to the next sample. Before the record, the output is the input. A value that
-//! stays between two others begins at the first of them; inside an interval it is exact where both are monotone.
+//! once in an interval, and then follows its input to the next sample. Before the record, the output of a play is the input, that of
+//! stick-slip is where its fourth argument says. A value that stays between two others begins at the first of them; inside an interval it is exact where both are monotone.
 
 use super::SimulationState;
 use super::delays::{Delay, Delays};

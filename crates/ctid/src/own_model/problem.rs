@@ -209,7 +209,7 @@ impl OwnModelFile {
 fn own_start(parameter: &ct_model::effects::EffectParameter) -> f64 {
     let first = parameter.starts.first().copied();
     match parameter.role {
-        Role::Shape => parameter.absent,
+        Role::Shape | Role::Begin => parameter.absent,
         _ => first.unwrap_or(parameter.absent),
     }
 }

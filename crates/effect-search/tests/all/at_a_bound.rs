@@ -1,4 +1,4 @@
-//! Parameters of the believed model at a bound.
+//! Parameters of the believed model at a bound, and parameters that the model file fixes.
 
 use std::collections::BTreeMap;
 
@@ -39,4 +39,31 @@ fn a_parameter_at_its_bound_hides_no_effect() {
     };
     let found = diagnose(&problem, &options, &|_| {}).unwrap();
     assert_eq!(found.effects, ["less_loss"], "{:?}", found.groups);
+}
+
+/// A parameter of a listed effect that the model file fixes keeps its value, although another one fits better.
+#[test]
+fn a_fixed_parameter_of_an_effect_keeps_its_value() {
+    for (effect, parameter, value) in [
+        ("nonlinearity(u)", "nonlinearity_u_bend", 0.21),
+        ("dead_zone(u)", "dead_zone_u_threshold", 4.3),
+    ] {
+        let spec = ModelSpec::parse(BLOCK).unwrap();
+        let problem = Problem::builder(spec, [record(BLOCK, 0.0, 0.2, 8)])
+            .effects([effect])
+            .known(parameter, value)
+            .build()
+            .unwrap();
+        let options = Options {
+            max_effects: 1,
+            ..Options::default()
+        };
+        let found = diagnose(&problem, &options, &|_| {}).unwrap();
+        for step in &found.steps {
+            let mut parameters = step.parameters.iter();
+            let fixed = parameters.find(|p| p.name == parameter).unwrap();
+            assert!(fixed.known, "{effect}");
+            assert_eq!(fixed.value, value, "{effect}");
+        }
+    }
 }

@@ -265,7 +265,11 @@ impl Search<'_> {
         let known = since
             .zip(begin)
             .map(|(since, begin)| (since.name.clone(), *begin));
-        let known: BTreeMap<String, f64> = known.into_iter().collect();
+        // Until the onset the actuator followed its command.
+        let begins = candidate.parameters.iter();
+        let begins = begins.filter(|p| p.role == Role::Begin);
+        let begins = begins.map(|p| (p.name.clone(), 0.0));
+        let known: BTreeMap<String, f64> = known.into_iter().chain(begins).collect();
         let setup = self.setup(model, &window.records, &known)?;
         let own: Vec<(usize, &ct_model::effects::EffectParameter)> = candidate
             .parameters

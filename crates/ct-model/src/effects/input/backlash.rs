@@ -25,7 +25,7 @@ end backlash;
                 0.012, 0.016, 0.022, 0.03, 0.04, 0.054, 0.073, 0.098, 0.13, 0.18, 0.24, 0.33,
             ]),
         ),
-        ("begin", Role::Shape, Starts::Values(&[0.0])),
+        ("begin", Role::Begin, Starts::Values(&[0.0])),
     ],
     physics: "After each reversal the command has to cross a backlash before the actuator follows (worn gears), or the actuator sticks until the command has moved far enough, and then jumps (a valve's stem).",
     confused_with: &["dead_zone(u)", "lag(u)", "hysteresis(y)"],

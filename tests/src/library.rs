@@ -133,6 +133,7 @@ fn drawn(candidate: &Candidate, visited: &Visited, rng: &mut ChaCha8Rng) -> Vec<
                 }
             }
             Role::Choice => one,
+            Role::Begin => rng.random_range(-0.9..0.9),
             Role::Size => one * rng.random_range(-0.5_f64..1.0).exp(),
             Role::Threshold if parameter.short == "limit" || parameter.short == "bound" => {
                 let share = rng.random_range(0.05..0.35);

@@ -16,7 +16,7 @@ model leak_at_height
   parameter Real leak(unit="balance", min=0, max=20*balance) = 0 "outflow through it with the visited range above it";
   parameter Real height(unit="port", min=low - width, max=high) = 0.5*(low + high) "of the hole";
   Real head = max((x - height)/width, 0);
-  output Real v(unit="balance") = -leak*head/sqrt(head + 0.01);
+  output Real v(unit="balance") = -leak*head/sqrt(head + 0.0001);
 end leak_at_height;
 "#,
     parameters: &[

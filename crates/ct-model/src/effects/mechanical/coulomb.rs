@@ -10,9 +10,9 @@ model coulomb
   input Real x;
   constant Real balance(unit="balance") = 1;
   constant Real width(unit="signal") = 1;
-  constant Real slow(unit="signal") = 0.01*width "speed from which all of it is there";
+  constant Real slow(unit="signal") = 0.002*width "speed from which all of it is there";
   parameter Real friction(unit="balance", min=0, max=10*balance) = 0 "dry friction";
-  output Real v(unit="balance") = -friction*tanh(x/slow);
+  output Real v(unit="balance") = -friction*min(max(x/slow, -1), 1);
 end coulomb;
 "#,
     parameters: &[("friction", Role::Size, Starts::Balances(&[0.03, 0.2]))],

@@ -10,11 +10,11 @@ model stribeck
   input Real x;
   constant Real balance(unit="balance") = 1;
   constant Real width(unit="signal") = 1;
-  constant Real slow(unit="signal") = 0.01*width "speed from which all of it is there";
+  constant Real slow(unit="signal") = 0.002*width "speed from which all of it is there";
   parameter Real friction(unit="balance", min=0, max=10*balance) = 0 "dry friction at speed";
   parameter Real more_at_rest(unit="balance", min=0, max=10*balance) = 0 "by how much it is larger at rest";
-  parameter Real speed(unit="port", min=slow, max=width) = 0.1*width "speed at which the larger part is gone";
-  output Real v(unit="balance") = -(friction + more_at_rest*exp(-(x/speed)^2))*tanh(x/slow);
+  parameter Real speed(unit="port", min=0.01*width, max=width) = 0.1*width "speed at which the larger part is gone";
+  output Real v(unit="balance") = -(friction + more_at_rest*exp(-(x/speed)^2))*min(max(x/slow, -1), 1);
 end stribeck;
 "#,
     parameters: &[

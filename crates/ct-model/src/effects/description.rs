@@ -9,8 +9,8 @@ pub struct DescribedParameter {
     pub name: &'static str,
     /// Unit as in the text: `port`, `balance/port`; empty for a number.
     pub unit: &'static str,
-    /// Expression of the value at which the effect is absent: `high + width`. Empty for a [`Role::Shape`], a [`Role::Begin`] and a [`Role::Choice`], whose
-    /// values do not matter then.
+    /// Expression of the value at which the effect is absent: `high + width`. Empty for a [`Role::Shape`], a [`Role::Begin`]
+    /// and a [`Role::Choice`], whose values do not matter then.
     pub absent: &'static str,
     /// Description; may be empty.
     pub meaning: &'static str,

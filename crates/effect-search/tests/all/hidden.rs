@@ -12,40 +12,11 @@ use rand_chacha::ChaCha8Rng;
 use crate::records::{BLOCK, PAIR, ROWS, STEP, found, names, problem, record};
 
 /// The block with another equation and other parameters than the user believes.
-fn block(equation: &str) -> String {
+pub(crate) fn block(equation: &str) -> String {
     BLOCK
         .replace("= 0.8;", "= 0.6;")
         .replace("= 1.6;", "= 2.0;")
         .replace("g*u - k*(T - Ta)", equation)
-}
-
-#[test]
-fn an_actuator_that_sticks_and_jumps_is_named() {
-    let hidden = block("g*stick_slip(u, 3, 1, 0) - k*(T - Ta)");
-    let found = found(&problem(BLOCK, record(&hidden, 0.0, 0.3, 4)));
-    assert!(names(&found, "backlash(u)"), "{:?}", found.groups);
-    assert_eq!(found.effects, ["backlash(u)"]);
-    let last = found.steps.last().unwrap();
-    let jump = last.parameters.iter().find(|p| p.name == "backlash_u_jump");
-    assert_eq!(jump.unwrap().value, 1.0);
-}
-
-/// What is known of the command's past when a record begins is nothing: the actuator is anywhere within its band, and moves late at first.
-#[test]
-fn backlash_that_begins_at_an_end_of_its_band_is_one_effect() {
-    for begin in [-0.9, 0.9] {
-        let hidden = block(&format!("g*stick_slip(u, 5, 0, {begin}) - k*(T - Ta)"));
-        let found = found(&problem(BLOCK, record(&hidden, 0.0, 0.3, 4)));
-        assert_eq!(found.effects, ["backlash(u)"], "{begin}");
-        assert_eq!(found.verdict, Verdict::Effect, "{begin}");
-        let last = &found.steps.last().unwrap().parameters;
-        for (name, of) in [("half_width", 5.0), ("begin", begin)] {
-            let name = format!("backlash_u_{name}");
-            let parameter = last.iter().find(|p| p.name == name).unwrap();
-            let (value, error) = (parameter.value, parameter.std_error.unwrap());
-            assert!((value - of).abs() < 4.0 * error, "{name} {value} {error}");
-        }
-    }
 }
 
 /// The block after a sensor with a time constant of 25 s.

@@ -3,6 +3,7 @@
 
 mod absorbed;
 mod at_a_bound;
+mod backlash;
 mod design;
 mod detectable;
 mod failures;

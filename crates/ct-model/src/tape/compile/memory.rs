@@ -44,8 +44,7 @@ impl Compiler<'_> {
         [half_width, jump, begin]: [Register; 3],
     ) -> Register {
         let [zero, one, share] = [0.0, 1.0, PERTURBATION].map(|n| self.number(n));
-        let within = self.operation(Operation::Multiply(begin, half_width));
-        let first = self.operation(Operation::Add(of, within));
+        let first = self.within_band(of, begin, half_width);
         let play = self.play_from(first, of, half_width);
         let width = self.operation(Operation::Scale(one, half_width));
         let reach = self.operation(Operation::Multiply(share, width));
@@ -66,6 +65,12 @@ impl Compiler<'_> {
         self.select(both, stuck, play)
     }
 
+    /// The value at a position within a band around another value: -1 and 1 are its ends.
+    fn within_band(&mut self, of: Register, position: Register, half_band: Register) -> Register {
+        let apart = self.operation(Operation::Multiply(position, half_band));
+        self.operation(Operation::Add(of, apart))
+    }
+
     /// An element that sticks until its input is further from it than `half_width*(1 + jump)`, and then moves to a distance of
     /// `half_width*(1 - jump)`.
     fn stick(&mut self, of: Register, [half_width, jump, begin]: [Register; 3]) -> Register {
@@ -76,8 +81,7 @@ impl Compiler<'_> {
         let high = self.operation(Operation::Add(of, band));
         let from_below = self.operation(Operation::Subtract(of, rest));
         let from_above = self.operation(Operation::Add(of, rest));
-        let within = self.operation(Operation::Multiply(begin, band));
-        let from = self.operation(Operation::Add(of, within));
+        let from = self.within_band(of, begin, band);
         let held = self.first_play + self.plays.len();
         let rises = self.guard(Comparison::Less, held, low);
         let falls = self.guard(Comparison::Greater, held, high);

@@ -93,7 +93,7 @@ pub enum Error {
     },
     /// The input never moves.
     #[error(
-        "{file}, column \"{column}\": the input is {value} in all {rows} rows, so nothing can be learnt about the process; record an experiment in which it moves, or name another column with input = \"...\" under [columns]",
+        "{file}, column \"{column}\": the input is {value} in all {rows} rows, so nothing can be learnt about the process; record an experiment in which it moves, or name another column under [columns]",
         value = shown(*.value)
     )]
     ConstantInput {
@@ -108,7 +108,7 @@ pub enum Error {
     },
     /// The output never moves.
     #[error(
-        "{file}, column \"{column}\": the output is {value} in all {rows} rows; check the sensor, or name another column with output = \"...\" under [columns]",
+        "{file}, column \"{column}\": the output is {value} in all {rows} rows; check the sensor, or name another column under [columns]",
         value = shown(*.value)
     )]
     ConstantOutput {

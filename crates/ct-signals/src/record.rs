@@ -155,7 +155,7 @@ fn is_zero(part: &usize) -> bool {
 }
 
 impl Record {
-    /// A record of evenly sampled channels that starts at time zero; `interval` in seconds. It has as many samples as the first input.
+    /// A record of evenly sampled channels that starts at time zero; `interval` in seconds. It has as many samples as its first channel.
     #[must_use]
     pub fn sampled(
         name: impl Into<String>,
@@ -163,7 +163,8 @@ impl Record {
         inputs: Vec<Channel>,
         outputs: Vec<Channel>,
     ) -> Self {
-        let samples = inputs.first().map_or(0, |input| input.values.len());
+        let first = inputs.first().or(outputs.first());
+        let samples = first.map_or(0, |channel| channel.values.len());
         Self {
             name: name.into(),
             time: (0..samples).map(|k| interval * k as f64).collect(),

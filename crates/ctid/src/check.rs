@@ -38,10 +38,13 @@ pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
 
 /// How the model is simulated, and which parameters no record of it determines.
 pub(crate) fn ideal(spec: &ModelSpec, known: &BTreeMap<String, f64>, look: Look) -> String {
-    let mut text = format!(
-        "\n{}\n",
-        look.heading("With records without noise, all inputs stepped")
-    );
+    let driven = if spec.inputs.is_empty() {
+        "from displaced initial states"
+    } else {
+        "all inputs stepped"
+    };
+    let heading = format!("With records without noise, {driven}");
+    let mut text = format!("\n{}\n", look.heading(&heading));
     let found = match greybox::ideal_records(&Model::new(spec.clone()), known) {
         Ok(found) => found,
         Err(why) => return text + &look.paragraph("  ", &format!("not simulated: {why}")),
@@ -77,7 +80,12 @@ pub(crate) fn ideal(spec: &ModelSpec, known: &BTreeMap<String, f64>, look: Look)
     for together in &found.not_determined {
         let what = match together.as_slice() {
             [one] => format!(
-                "{one} has no effect of its own on the outputs of such records: fix it under [known], or let the inputs reach where it has one"
+                "{one} has no effect of its own on the outputs of such records: fix it under [known], or let the {} reach where it has one",
+                if spec.inputs.is_empty() {
+                    "states"
+                } else {
+                    "inputs"
+                }
             ),
             all => format!(
                 "such records determine only a combination of {}: fix one of them under [known], or give a [prior]",

@@ -8,11 +8,11 @@
 
 use std::collections::BTreeMap;
 
-use ct_model::{About, Method, Model};
+use ct_model::{About, Method, Model, ModelSpec, Simulation};
 use ct_signals::{Channel, Record, excitation};
-use estimation::{Residuals, Triangle};
+use estimation::{Residuals, Triangle, within};
 use nalgebra::DMatrix;
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::ModelSetup;
@@ -111,6 +111,7 @@ pub fn ideal_records(
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let mut method = Method::Exact;
     let mut records = Vec::new();
+    let mut begins = Vec::new();
     for i in 0..count {
         let share = i as f64 / (count - 1).max(1) as f64;
         let interval = shortest * (longest / shortest).powf(share) / PER_CONSTANT;
@@ -118,22 +119,20 @@ pub fn ideal_records(
             .iter()
             .map(|(low, high)| excitation::steps(SAMPLES, HELD, *low, *high, &mut rng).ok());
         let inputs: Vec<Vec<f64>> = inputs.collect::<Option<_>>().ok_or(NotIdeal::Simulation)?;
+        let begin = displaced(spec, &starts, &mut rng);
         let outputs;
-        let series: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-        (outputs, method) = model
-            .simulate_with_method(&parameters, interval, &series)
-            .map_err(|_| NotIdeal::Simulation)?;
+        (outputs, method) = outputs_of(model, &parameters, &begin, interval, &inputs)
+            .ok_or(NotIdeal::Simulation)?;
         let channel =
             |(about, values): (&About, Vec<f64>)| Channel::new(&about.name, &about.unit, values);
         let inputs = spec.about_inputs().zip(inputs).map(channel).collect();
         let outputs = spec.about_outputs().zip(outputs).map(channel).collect();
         records.push(Record::sampled("ideal", interval, inputs, outputs));
+        begins.push(begin);
     }
     let setup = ModelSetup::new(model, &records, known, 1.0).map_err(|_| NotIdeal::Simulation)?;
     let mut x = parameters;
-    for _ in &records {
-        x.extend_from_slice(&starts);
-    }
+    x.extend(begins.into_iter().flatten());
     let mut triangle = Triangle::new(setup.free().len() + 1);
     let rows = setup.each_row(&x, |_, row| {
         triangle.push(row);
@@ -173,6 +172,49 @@ pub fn ideal_records(
             .map(|about| (about.name.clone(), range(about)))
             .collect(),
     })
+}
+
+/// Initial states of a record: those of the text; without inputs the ones that are not fixed are displaced at random, as a model that starts
+/// at rest would stay there.
+fn displaced(spec: &ModelSpec, starts: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let mut begin = starts.to_vec();
+    if !spec.inputs.is_empty() {
+        return begin;
+    }
+    for (value, state) in begin.iter_mut().zip(&spec.states) {
+        if !state.fixed {
+            let scale = if *value == 0.0 { 1.0 } else { value.abs() };
+            let about = &state.about;
+            *value = within(
+                *value + scale * rng.random_range(-0.5..0.5),
+                (about.min, about.max),
+            );
+        }
+    }
+    begin
+}
+
+/// Outputs of a model without noise, and the method by which it was simulated; nothing if the simulation fails.
+fn outputs_of(
+    model: &Model,
+    parameters: &[f64],
+    starts: &[f64],
+    interval: f64,
+    inputs: &[Vec<f64>],
+) -> Option<(Vec<Vec<f64>>, Method)> {
+    let mut simulation = Simulation::new(model, parameters, starts, 0.0);
+    let mut read = vec![0.0; model.spec().outputs.len()];
+    let mut outputs = vec![Vec::with_capacity(SAMPLES); read.len()];
+    for k in 0..SAMPLES {
+        let row: Vec<f64> = inputs.iter().map(|input| input[k]).collect();
+        simulation.read(&row, &mut read);
+        for (output, reading) in outputs.iter_mut().zip(&read) {
+            output.push(*reading);
+        }
+        let next = interval * (k + 1) as f64;
+        simulation.advance(&row, &row, next).ok()?;
+    }
+    Some((outputs, simulation.method()))
 }
 
 /// Of the model about its start.

@@ -1,6 +1,6 @@
 //! A compiled model.
 
-use super::{Method, NoSolution, Simulation};
+use super::{NoSolution, Simulation};
 use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
 use crate::spec::ModelSpec;
@@ -63,7 +63,7 @@ impl Model {
     /// Simulates the model from its initial values, with evenly sampled, held inputs; returns a series for each output.
     ///
     /// `parameters`: in the order of [`ModelSpec::parameters`]. `interval` \[the model's unit of time\]. `inputs`: a series for each input,
-    /// of equal length.
+    /// of equal length, which is the number of samples: none for a model without inputs.
     ///
     /// # Errors
     /// If the simulation fails.
@@ -76,22 +76,6 @@ impl Model {
         interval: f64,
         inputs: &[&[f64]],
     ) -> Result<Vec<Vec<f64>>, NoSolution> {
-        Ok(self.simulate_with_method(parameters, interval, inputs)?.0)
-    }
-
-    /// [`Model::simulate`], and the integration method at the last sample.
-    ///
-    /// # Errors
-    /// If the simulation fails.
-    ///
-    /// # Panics
-    /// If the number of parameters or inputs is not that of the model.
-    pub fn simulate_with_method(
-        &self,
-        parameters: &[f64],
-        interval: f64,
-        inputs: &[&[f64]],
-    ) -> Result<(Vec<Vec<f64>>, Method), NoSolution> {
         assert_eq!(inputs.len(), self.spec.inputs.len(), "inputs");
         let samples = inputs.iter().map(|input| input.len()).min().unwrap_or(0);
         let mut simulation = Simulation::new(self, parameters, &self.starts(parameters), 0.0);
@@ -108,6 +92,6 @@ impl Model {
             }
             simulation.advance(&row, &row, interval * (k + 1) as f64)?;
         }
-        Ok((outputs, simulation.method()))
+        Ok(outputs)
     }
 }

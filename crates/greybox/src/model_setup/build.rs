@@ -10,7 +10,7 @@ use crate::Error;
 use crate::clock::Clock;
 
 /// If the text sets no bound, a parameter stays within this factor of its value in the text, ...
-const REACH: f64 = 30.0;
+const REACH: f64 = 1e4;
 
 /// The scales of the noise have converged if none changes by more than this share. Where a model lacks an effect, the errors of two outputs
 /// change by a few times the share by which their weights do.

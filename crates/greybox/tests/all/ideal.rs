@@ -91,3 +91,22 @@ end Gain;";
         Err(NotIdeal::Delay)
     );
 }
+
+#[test]
+fn a_model_without_inputs_is_moved_by_its_initial_states() {
+    let text = "model Pendulum
+  parameter Real w(min=0) = 4;
+  parameter Real d(min=0) = 0.1;
+  parameter Real unused = 1;
+  output Real y = x;
+  Real x(start=0);
+  Real v(start=0);
+equation
+  der(x) = v;
+  der(v) = -w^2*sin(x) - d*v + 0*unused*x;
+end Pendulum;";
+    assert_eq!(of(text, &[]).not_determined, [["unused"]]);
+    // At rest, with known initial states, no record tells anything.
+    let at_rest = text.replace("start=0", "start=0, fixed=true");
+    assert_eq!(of(&at_rest, &[]).not_determined, [["d"], ["unused"], ["w"]]);
+}

@@ -41,7 +41,8 @@
 //! - Everything else is refused ([`TextError`]). An unknown name is an error, never zero.
 //!
 //! [`ModelSpec`] prints as text that reads back as the same model ([`ModelSpec::parse`]). [`unit_warnings`] says where units do not fit
-//! together, [`check_units`] at which place of a text, and which units are unknown.
+//! together, [`check_units`] at which place of a text, and which units are unknown, [`implied_time_unit`] per which
+//! unit of time the units make `der()`.
 //!
 //! **Reference**: Modelica Association, Modelica - A Unified Object-Oriented Language for Systems Modeling, Language Specification 3.6,
 //! 2023: appendix A for the grammar of expressions.
@@ -55,6 +56,7 @@ mod simulation;
 mod spec;
 mod tape;
 mod text;
+mod time_unit;
 mod units;
 
 pub use expression::{Comparison, Condition, Expression, Function, Operator, Variable};
@@ -66,6 +68,7 @@ pub use simulation::{
 };
 pub use spec::{About, Flow, Given, Input, ModelSpec, Output, Parameter, State};
 pub use text::{Position, TextError, check_units};
+pub use time_unit::implied_time_unit;
 pub use units::{UnitWarning, unit_warnings};
 
 #[cfg(doctest)]

@@ -63,6 +63,7 @@ mod csv;
 mod error;
 pub mod excitation;
 mod gaps;
+mod isolated;
 mod limits;
 pub mod noise;
 pub mod parts;
@@ -88,6 +89,7 @@ pub use csv::{
 };
 pub use error::{Error, ReadError};
 pub use gaps::{Gaps, LongestHold};
+pub use isolated::{IsolatedReadings, isolated_readings};
 pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
 pub use quote::{escaped, quoted, shown};
 pub use record::{

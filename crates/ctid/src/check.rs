@@ -27,7 +27,10 @@ pub(crate) fn run(path: &Path, look: Look) -> Result<String, Error> {
     match AnyModelFile::read(path)?.with_effects()? {
         AnyModelFile::Own(file) => {
             let model = file.model.spec();
-            Ok(said(model, look) + &ideal(model, &file.known, look) + &file.unit_warnings(look))
+            let unit = file.declared_time_unit();
+            let of_time = unit.map_or(String::new(), |unit| file.time_unit_warning(unit, look));
+            let warnings = file.unit_warnings(look) + &of_time;
+            Ok(said(model, look) + &ideal(model, &file.known, look) + &warnings)
         }
         AnyModelFile::Plant(_) => Err(Error::file(
             path,

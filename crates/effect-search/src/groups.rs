@@ -97,6 +97,7 @@ impl Context<'_> {
                 || deviance < self.thresholds.same_deviance
                     && node.fit.parameters <= last.fit.parameters
                 || self.ends_in_own(node)
+                    && !(own_last.noise.order() == 0 && bic > self.thresholds.own_candidate_bic)
                     && self
                         .explains_most((node, last), &without, &own_last)
                         .unwrap_or(false)

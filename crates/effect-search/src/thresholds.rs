@@ -183,6 +183,8 @@ pub struct Thresholds {
     /// A user-defined candidate is an alternative if it explains this share of what the effect explains, and its residual may be noise (0
     /// to 1). Chosen.
     pub own_candidate_share: f64,
+    /// Where the better effect leaves white noise, such a candidate is left out if its criterion is higher by more than this.
+    pub own_candidate_bic: f64,
 
     // The shape of the error that no candidate explains.
     /// Number of smooth functions that are fitted, those with the best scores (1 or more). Chosen, for time.
@@ -257,6 +259,7 @@ impl Thresholds {
         group_predicted_margin: 10.0,
         same_effect: 0.1,
         own_candidate_share: 0.75,
+        own_candidate_bic: 100.0,
         shape_refits: 10,
         shape_left_out: 5,
         shape_least_share: 0.2,

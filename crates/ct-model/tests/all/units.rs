@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ct_model::{ModelSpec, check_units, unit_warnings};
+use ct_model::{ModelSpec, check_units, implied_time_unit, unit_warnings};
 
 /// Warnings for a heated block after a replacement in its text.
 fn said(from: &str, to: &str) -> Vec<String> {
@@ -106,6 +106,44 @@ end Tank;";
     );
 }
 
+fn implied(declarations: &str, equations: &str) -> Option<f64> {
+    let text = format!("model M\n{declarations}\nequation\n{equations}\nend M;");
+    let model = ModelSpec::parse(&text).unwrap_or_else(|error| panic!("{}", error.excerpt()));
+    implied_time_unit(&model)
+}
+
+#[test]
+fn units_of_the_text_imply_one_of_time() {
+    let block = |c: &str, k: &str, g: &str| {
+        let declarations = format!(
+            "parameter Real C(unit=\"{c}\") = 50;
+             parameter Real k(unit=\"{k}\") = 0.1;
+             parameter Real g(unit=\"{g}\") = 0.2;
+             input Real u(unit=\"%\");
+             output Real T(unit=\"degC\", start=20);"
+        );
+        implied(&declarations, "C*der(T) = g*u - k*(T - 20);")
+    };
+    assert_eq!(block("J/K", "W/K", "W"), Some(1.0));
+    assert_eq!(block("J/K", "W/K", "W/%"), Some(1.0));
+    assert_eq!(block("kW.h/K", "kW/K", "kW"), Some(3600.0));
+    // A sum of different units, a missing one, and one of no unit of time.
+    assert_eq!(block("J/K", "W/K", "kW"), None);
+    assert_eq!(block("J/K", "W/K", ""), None);
+    assert_eq!(block("kJ/K", "J/K", "J"), None);
+    let battery = "parameter Real Q(unit=\"A.h\") = 2; input Real i(unit=\"A\");
+        output Real soc(unit=\"1\", start=0.5);";
+    assert_eq!(implied(battery, "3600*Q*der(soc) = -i;"), Some(1.0));
+    assert_eq!(implied(battery, "Q*der(soc) = -i;"), Some(3600.0));
+    let mass =
+        "parameter Real m = 2; input Real F; output Real x(unit=\"mm\"); Real v(unit=\"m/s\");";
+    assert_eq!(implied(mass, "der(x) = v; m*der(v) = F;"), Some(1e-3));
+    assert_eq!(implied(mass, "der(x) = 1000*v; m*der(v) = F;"), Some(1.0));
+    // Two equations that contradict each other.
+    let two = "input Real u(unit=\"m/s\"); output Real x(unit=\"m\"); output Real z(unit=\"m\");";
+    assert_eq!(implied(two, "der(x) = u; der(z) = 60*u;"), None);
+}
+
 /// The models next to the checkout are read, written and read again, and their units are consistent.
 #[test]
 fn models_of_the_domains() {
@@ -124,6 +162,17 @@ fn models_of_the_domains() {
             .unwrap_or_else(|error| panic!("{}:{error}\n{}", path.display(), error.excerpt()));
         assert_eq!(ModelSpec::parse(&model.to_string()).as_ref(), Ok(&model));
         assert_eq!(unit_warnings(&model), [], "{}", path.display());
+        let model_file = std::fs::read_to_string(path.with_file_name("model.toml")).unwrap();
+        let unit = if model_file.contains("[h]") {
+            3600.0
+        } else {
+            1.0
+        };
+        assert!(
+            implied_time_unit(&model).is_none_or(|implied| implied == unit),
+            "{}",
+            path.display()
+        );
         count += 1;
     }
     println!("{count} models");

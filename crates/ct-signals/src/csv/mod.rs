@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 pub use self::summary::{Converted, MissingSamples, ReadSummary};
 use self::table::read_table;
-use self::text::{check_header, decode, line_number, read as next_row, reader};
+use self::text::{check_header, decode, is_before_header, line_number, read as next_row, reader};
 pub(crate) use self::{
     cells::{Cell, CellFault, Numbers, THOUSANDS, TIME_AS_NUMBER, says_missing},
     checks::constant,
@@ -158,7 +158,7 @@ pub fn csv_header(file: &str, content: &[u8]) -> Result<Vec<Heading>, Error> {
     let mut reader = reader(text);
     let mut record = StringRecord::new();
     while next_row(file, &mut reader, &mut record)? {
-        if !record.iter().all(str::is_empty) {
+        if !is_before_header(&record) {
             check_header(file, || line_number(text, end_of(&reader)), &record)?;
             return Ok(record.iter().map(Heading::of).collect());
         }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::{Calendar, duration};
+use crate::{Calendar, IsolatedReadings, duration};
 
 /// Samples of a column that are missing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -58,6 +58,8 @@ pub struct ReadSummary {
     pub missing: Vec<MissingSamples>,
     /// Columns that were converted.
     pub converted: Vec<Converted>,
+    /// Readings that are far from those before and after them.
+    pub isolated: Vec<IsolatedReadings>,
     /// Interval of the grid after resampling \[s\].
     pub resampled: Option<f64>,
 }

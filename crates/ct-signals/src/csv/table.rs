@@ -4,7 +4,7 @@ use csv::StringRecord;
 
 use super::cells::is_word;
 use super::place::Place;
-use super::text::{check_header, line_number, reader};
+use super::text::{check_header, is_before_header, line_number, reader};
 use super::time::Bounds;
 use super::{
     Cell, Converted, MissingSamples, Numbers, ReadOptions, ReadSummary, Reading, Times, delimiter,
@@ -12,7 +12,9 @@ use super::{
 };
 use crate::columns::{Columns, Found, Layout, Purpose};
 use crate::csv::text::read as next_row;
-use crate::{Calendar, Channel, Error, ReadError, Record, escaped, quoted, unit};
+use crate::{
+    Calendar, Channel, Error, ReadError, Record, escaped, isolated_readings, quoted, unit,
+};
 
 /// The columns in use, with where each row ends in the file.
 #[derive(Default)]
@@ -49,7 +51,8 @@ pub(super) fn read_table(
 
     while next_row(file, &mut reader, &mut record)? {
         let end = end_of(&reader);
-        if record.iter().all(str::is_empty) {
+        let is_before = header.is_none() && is_before_header(&record);
+        if is_before || record.iter().all(str::is_empty) {
             continue;
         }
         let Some((layout, fields)) = &header else {
@@ -244,6 +247,7 @@ impl Table {
             calendar: record.calendar.clone(),
             missing,
             converted: converted.collect(),
+            isolated: isolated_readings(&record),
             resampled: options.resample,
         };
         if let Some(interval) = options.resample {

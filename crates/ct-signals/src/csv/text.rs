@@ -63,6 +63,16 @@ pub(super) fn reader(text: &str) -> Reader<&[u8]> {
         .from_reader(text.as_bytes())
 }
 
+/// What spreadsheets write before the delimiter in a first line of its own: `sep=;`.
+const DELIMITER_KEY: &str = "sep=";
+
+/// Whether a row comes before the header: an empty one, or the one that names the delimiter.
+pub(super) fn is_before_header(row: &StringRecord) -> bool {
+    let mut cells = row.iter();
+    let first = cells.next().unwrap_or_default();
+    (first.is_empty() || first == DELIMITER_KEY) && cells.all(str::is_empty)
+}
+
 /// The next row, if there is one.
 pub(super) fn read(
     file: &str,
@@ -114,6 +124,12 @@ pub(super) fn check_header(
 
 /// The one of comma, semicolon and tab that the first row has most of.
 pub(crate) fn delimiter(text: &str) -> u8 {
+    let named = text.strip_prefix(DELIMITER_KEY);
+    if let Some(&named) = named.and_then(|named| named.as_bytes().first())
+        && b";\t,|".contains(&named)
+    {
+        return named;
+    }
     let header = text
         .split(['\n', '\r'])
         .find(|line| !line.trim().is_empty() && !line.starts_with('#'))
@@ -128,6 +144,7 @@ pub(crate) fn delimiter_name(delimiter: u8) -> &'static str {
     match delimiter {
         b';' => "semicolon",
         b'\t' => "tab",
+        b'|' => "bar",
         _ => "comma",
     }
 }

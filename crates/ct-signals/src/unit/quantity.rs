@@ -92,6 +92,12 @@ impl Unit {
         self.dimension
     }
 
+    /// The size in SI units; an angle in turns is measured in turns.
+    #[must_use]
+    pub fn size(&self) -> f64 {
+        self.size.0 / self.size.1
+    }
+
     /// The quantity in a word for people, such as `volume`, `flow` or `temperature`; `None` where it has no common name.
     #[must_use]
     pub fn kind(&self) -> Option<&'static str> {

@@ -140,6 +140,18 @@ fn semicolons_tabs_and_decimal_commas() {
 }
 
 #[test]
+fn a_first_line_may_name_the_delimiter() {
+    let plain = read(&text("t;u;y", &rows()).replace(',', ";")).unwrap();
+    let named = "sep=;\r\n".to_string() + &text("t;u;y", &rows()).replace(',', ";");
+    assert_eq!(read(&named).unwrap(), plain);
+    let bars = "\u{feff}sep=|\n".to_string() + &text("t|u|y", &rows()).replace(',', "|");
+    assert_eq!(read(&bars).unwrap(), plain);
+    // Lines are those of the file.
+    let error = read(&named.replacen("\n0;", "\nx;", 1)).unwrap_err();
+    says(&error, &["row 3"]);
+}
+
+#[test]
 fn quoted_headers_and_cells() {
     let plain = text(HEADER, &rows());
     let quoted: Vec<String> = plain

@@ -183,6 +183,7 @@ impl Compare {
         let comparison = own_model::compare(model, &records, &options);
         bar.clear();
         let notes = model.unit_warnings(look)
+            + &model.time_unit_warning(records.time_unit, look)
             + &input::notes(&records.summaries, look)
             + &unused(&model.unused, look);
         let comparison = comparison?;
@@ -246,6 +247,7 @@ impl Diagnose {
         bar.clear();
         let diagnosis = diagnosis?;
         let text = model.unit_warnings(look)
+            + &model.time_unit_warning(records.time_unit, look)
             + &input::notes(&records.summaries, look)
             + &not_kept(model, &diagnosis.record_numbers, look)
             + &own_model::diagnosis_said(model, &records, &diagnosis, look);

@@ -298,7 +298,7 @@ impl Arguments {
         let tell = |progress: effect_search::Progress| bar.phase(progress.phase);
         let design = own_model::design(model, &records, [first, second], &limits, &options, &tell);
         bar.clear();
-        let proposal = OwnProposal::new(design?, model, records.time_unit);
+        let proposal = OwnProposal::new(design?, model);
         if proposal.design.twins() && self.out.is_none() {
             outputs.retain(|output| output.kind() != Kind::Record);
         }

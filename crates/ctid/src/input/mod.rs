@@ -6,7 +6,10 @@ pub mod excitation;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use ct_signals::{Hold, ReadOptions, ReadSummary, Reading, Record, escaped, quoted, read_csv};
+use ct_signals::{
+    Hold, IsolatedReadings, ReadOptions, ReadSummary, Reading, Record, duration, escaped, quoted,
+    read_csv,
+};
 use missing_effect::Problem;
 
 use self::checks::{
@@ -16,7 +19,9 @@ use self::checks::{
 use crate::Error;
 use crate::look::Look;
 use crate::model_file::{self, ModelFile};
+use crate::numbers;
 use crate::output::same_file;
+use crate::sentences::with_unit;
 
 /// Error of a record whose file name suggests that it is a model.
 fn perhaps_a_model(path: &Path, error: ct_signals::Error) -> Error {
@@ -75,9 +80,43 @@ fn interval(text: &str) -> Result<f64, String> {
 pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
     let worth = |summary: &&ReadSummary| !summary.is_plain() || summary.calendar.is_some();
     let noted = summaries.iter().filter(worth);
-    noted
-        .map(|summary| look.paragraph("", &format!("note: {summary}")))
-        .collect()
+    let notes = noted.map(|summary| look.paragraph("", &format!("note: {summary}")));
+    let warnings = summaries.iter().flat_map(|summary| {
+        let far = summary.isolated.iter();
+        far.map(|far| look.warning(isolated(summary, far)) + "\n")
+    });
+    notes.chain(warnings).collect()
+}
+
+/// Warning about readings that are far from those before and after them, with the correction.
+fn isolated(summary: &ReadSummary, far: &IsolatedReadings) -> String {
+    let at = match &summary.calendar {
+        Some(calendar) => calendar.at(far.time).to_string(),
+        None => duration(far.time),
+    };
+    let shown = |value: f64| with_unit(&numbers::significant(value, 4), &far.unit);
+    let (before, after) = far.neighbours;
+    let what = match far.count {
+        1 => "one reading is".to_string(),
+        count if far.equal => format!("{count} readings of one value are"),
+        count => format!("{count} readings are"),
+    };
+    let correction = if far.equal && far.count > 1 {
+        format!(
+            "write missing = [\"{}\"] under [columns], with the number as the file has it",
+            ct_signals::shown(far.value)
+        )
+    } else {
+        "empty the cells".to_string()
+    };
+    format!(
+        "warning: {}, column {}: {what} far from the others, {} at {at} between {} and {}: if it is no measurement, {correction}",
+        summary.file,
+        quoted(&far.column),
+        shown(far.value),
+        shown(before),
+        shown(after)
+    )
 }
 
 impl ReadArguments {

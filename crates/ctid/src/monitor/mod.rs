@@ -205,8 +205,7 @@ impl<'a> Session<'a> {
             ),
             AnyModelFile::Own(file) => {
                 // If the model file gives no unit of the time, the header's unit is used.
-                let declared = file.columns.time.is_some();
-                let declared = declared.then(|| file.columns.time_header().1);
+                let declared = file.declared_time_unit();
                 let saved = state.as_ref().and_then(::monitor::State::time_unit);
                 let time_unit = declared.or(saved).unwrap_or(1.0);
                 let model = Believed::Own(file, candidates, time_unit);

@@ -65,8 +65,8 @@ pub(crate) struct OwnProposal {
 
 impl OwnProposal {
     /// A design whose experiment has the columns of the model file.
-    pub fn new(design: Design, file: &OwnModelFile, time_unit: f64) -> Self {
-        let record = (!design.twins()).then(|| csv(&design, file, time_unit));
+    pub fn new(design: Design, file: &OwnModelFile) -> Self {
+        let record = (!design.twins()).then(|| csv(&design, file));
         Self { design, record }
     }
 }
@@ -77,8 +77,8 @@ impl Found for OwnProposal {
     }
 }
 
-fn csv(design: &Design, file: &OwnModelFile, time_unit: f64) -> String {
-    let (time, _) = file.columns.time_header();
+fn csv(design: &Design, file: &OwnModelFile) -> String {
+    let (time, time_unit) = file.columns.time_header();
     let names = file
         .columns
         .inputs

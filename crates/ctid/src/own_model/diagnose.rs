@@ -286,18 +286,11 @@ fn errors(file: &OwnModelFile, diagnosis: &Diagnosis, look: Look) -> String {
         }
         rows.push(row);
     }
-    let noise: Vec<String> = diagnosis
-        .noise
-        .iter()
-        .flat_map(|noise| {
-            let own = numbers::significant(noise.level, 3);
-            if held_out {
-                vec![own, String::new()]
-            } else {
-                vec![own]
-            }
-        })
-        .collect();
+    let noise = first.rmse_per_output.keys().flat_map(|output| {
+        let own = diagnosis.noise.iter().find(|noise| noise.output == *output);
+        let own = own.map_or(String::new(), |noise| numbers::significant(noise.level, 3));
+        std::iter::once(own).chain(held_out.then(String::new))
+    });
     rows.push(std::iter::once("noise".to_string()).chain(noise).collect());
     let sides: Vec<Side> = (0..rows[0].len())
         .map(|i| if i == 0 { Side::Left } else { Side::Right })

@@ -41,6 +41,8 @@ pub struct OwnModelFile {
     pub text: PathBuf,
     /// Columns of the inputs and outputs, in the order of the model.
     pub columns: Columns,
+    /// Seconds in one unit of the model's time, if it is not that of the time column.
+    pub time_unit: Option<f64>,
     /// Parameters that are not fitted.
     pub known: BTreeMap<String, f64>,
     /// Side measurements of parameters.
@@ -60,6 +62,8 @@ pub struct OwnModelFile {
 pub struct OwnSettings {
     /// Columns of the inputs and outputs, in the order of the model; the time.
     pub columns: Columns,
+    /// Seconds in one unit of the model's time; `None`: that of the time column.
+    pub time_unit: Option<f64>,
     /// Parameters that are not fitted \[unit of the text\].
     pub known: BTreeMap<String, f64>,
     /// Side measurements of parameters.
@@ -166,6 +170,7 @@ impl OwnModelFile {
     pub fn settings(&self) -> OwnSettings {
         OwnSettings {
             columns: self.columns.clone(),
+            time_unit: self.time_unit,
             known: self.known.clone(),
             priors: self.priors.clone(),
             hold: self.hold,
@@ -317,32 +322,10 @@ impl OwnModelFile {
         let own = self.signals().find(|about| about.name == signal);
         own.map_or("", |about| about.unit.as_str())
     }
-
-    /// Seconds in one unit of the time column, as the model file declares it or, where it does not, the header of the first record.
-    ///
-    /// # Errors
-    /// Where the file of the record cannot be read.
-    pub fn time_unit(&self, first: &Path) -> Result<f64, Error> {
-        if self.columns.time.is_some() {
-            return Ok(self.columns.time_header().1);
-        }
-        Ok(self.time_unit_of(&headings(first)?))
-    }
-
-    /// Unit of the time, if the header of the first record is known.
-    pub fn time_unit_of(&self, headings: &[Heading]) -> f64 {
-        let guessed = || Columns::guessed(headings).time;
-        let time = self.columns.time.clone().or_else(guessed);
-        let columns = Columns {
-            time,
-            ..Columns::default()
-        };
-        columns.time_header().1
-    }
 }
 
 /// The columns of a record.
-fn headings(path: &Path) -> Result<Vec<Heading>, Error> {
+pub(super) fn headings(path: &Path) -> Result<Vec<Heading>, Error> {
     let content = read_file(path, ct_signals::LARGEST_RECORD)?;
     Ok(csv_header(&path.display().to_string(), &content)?)
 }

@@ -31,6 +31,7 @@ mod simulate;
 mod singles;
 pub(crate) mod term;
 mod text;
+mod time_unit;
 pub(crate) mod units;
 mod unknown;
 pub(crate) mod words;

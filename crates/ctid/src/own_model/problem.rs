@@ -8,6 +8,7 @@ use effect_search::{Believed, Options, Problem, all_candidates, believed, with_e
 
 use super::file::{OwnModelFile, Records};
 use super::fitted::blame;
+use super::time_unit::unit_of;
 use crate::effort::EffortLevel;
 use crate::{Error, interrupt, numbers};
 
@@ -133,10 +134,8 @@ impl OwnModelFile {
 
     /// All effects that can act in the model without records: with the values that the file keeps.
     fn every_kept_candidate(&self) -> Result<Vec<Candidate>, Error> {
-        let declared = self.columns.time.is_some();
-        let time_unit = declared.then(|| self.columns.time_header().1);
         let visited = Visited {
-            time_unit: unit_of(time_unit.unwrap_or(1.0)).to_string(),
+            time_unit: unit_of(self.declared_time_unit().unwrap_or(1.0)).to_string(),
             ..Visited::nominal(&self.base)
         };
         let (kept, own) = (&self.effects.kept, &self.candidates);
@@ -212,12 +211,4 @@ fn own_start(parameter: &ct_model::effects::EffectParameter) -> f64 {
         Role::Shape | Role::Begin => parameter.absent,
         _ => first.unwrap_or(parameter.absent),
     }
-}
-
-/// The unit of time with this number of seconds.
-fn unit_of(seconds: f64) -> &'static str {
-    [(0.001, "ms"), (60.0, "min"), (3600.0, "h"), (86_400.0, "d")]
-        .into_iter()
-        .find(|(unit, _)| (seconds / unit - 1.0).abs() < 1e-9)
-        .map_or("s", |(_, name)| name)
 }

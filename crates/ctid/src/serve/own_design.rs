@@ -54,10 +54,10 @@ pub(super) struct Designed {
 
 impl Designed {
     /// A design of records in this unit of time.
-    pub(super) fn new(id: u64, model: &OwnModelFile, design: &Design, time_unit: f64) -> Self {
+    pub(super) fn new(id: u64, model: &OwnModelFile, design: &Design) -> Self {
         Self {
             body: body(id, model, design),
-            record: OwnProposal::new(design.clone(), model, time_unit).record(),
+            record: OwnProposal::new(design.clone(), model).record(),
         }
     }
 

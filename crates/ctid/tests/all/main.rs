@@ -22,6 +22,7 @@ mod own_gaps;
 mod own_held_out;
 mod own_limits;
 mod own_loop;
+mod own_records;
 mod own_term;
 mod own_unknown;
 mod own_without_inputs;

@@ -103,6 +103,11 @@ fn a_pendulum_is_checked_fitted_simulated_and_written() {
     let place = place();
     place.write("a.csv", swing(800, 0.0, 1));
     let said = place.succeeds("check pendulum.mo");
+    assert!(
+        said.contains("from displaced initial states")
+            && said.contains("such records determine all parameters"),
+        "{said}"
+    );
     assert!(said.contains("2 states, 0 inputs, 1 output"), "{said}");
     assert!(!said.contains("warning"), "{said}");
     let fit = place.result("compare a.csv --model p.toml");

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
-use super::super::{candidates, controller, effects};
+use super::super::{candidates, controller, effects, time_unit};
 use super::{OwnModelFile, OwnSettings, read_model};
 use crate::model_file::Source;
 use crate::own_model::candidates::RawCandidates;
@@ -18,7 +18,7 @@ use crate::own_model::problem::RecordNumbers;
 use crate::{Error, names};
 
 /// The keys of `[columns]` that are no signals of the model.
-const OTHER_COLUMNS: [&str; 4] = ["time", "time_format", "time_zone", "missing"];
+const OTHER_COLUMNS: [&str; 5] = ["time", "time_unit", "time_format", "time_zone", "missing"];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -91,6 +91,7 @@ impl OwnModelFile {
             is_parameter(name.as_ref()).map_err(|what| source.at(name.span().start, what))?;
         }
         let columns = columns(&spec, &raw, &source)?;
+        let time_unit = declared_time_unit(&raw, &source)?;
         let own = |name: Spanned<String>| name.into_inner();
         let candidates = raw.candidates.keys().map(AsRef::as_ref);
         let candidates = candidates
@@ -112,6 +113,7 @@ impl OwnModelFile {
                 .unwrap_or(Path::new(""))
                 .join(raw.model.as_ref()),
             columns,
+            time_unit,
             known: known.chain(effects.fixed.clone()).collect(),
             priors: raw
                 .prior
@@ -134,6 +136,7 @@ impl OwnModelFile {
     pub fn new(name: &str, spec: ModelSpec, settings: OwnSettings) -> Result<Self, Error> {
         let OwnSettings {
             mut columns,
+            time_unit,
             known,
             priors,
             hold,
@@ -173,6 +176,7 @@ impl OwnModelFile {
             record_numbers: RecordNumbers::new(),
             text: PathBuf::from(name),
             columns,
+            time_unit,
             known,
             priors,
             hold,
@@ -211,6 +215,23 @@ fn is_parameter(spec: &ModelSpec, effects: &OwnEffects, name: &str) -> Result<()
         parameters.join(", "),
         names::suggestion(name, parameters.iter().copied())
     ))
+}
+
+/// Seconds in the unit of time that `[columns]` gives.
+fn declared_time_unit(raw: &Raw, source: &Source) -> Result<Option<f64>, Error> {
+    let mut columns = raw.columns.iter();
+    let Some((_, unit)) = columns.find(|(key, _)| key.as_ref() == "time_unit") else {
+        return Ok(None);
+    };
+    let seconds = match unit.as_ref() {
+        Column::Name(name) => time_unit::seconds(name),
+        Column::Words(_) => None,
+    };
+    let refused = || {
+        let what = "the unit of time of the model is none: write time_unit = \"s\", \"ms\", \"min\", \"h\" or \"d\"";
+        source.at(unit.span().start, what)
+    };
+    seconds.ok_or_else(refused).map(Some)
 }
 
 /// The columns of the model's signals: those named by `[columns]`, else columns with the signals' names.

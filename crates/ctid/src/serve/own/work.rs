@@ -163,7 +163,7 @@ impl Work {
     /// Stores a design for the page.
     pub(crate) fn settle_design(self, session: &mut Session, design: &Design) {
         let id = session.number();
-        let designed = Designed::new(id, &self.model, design, self.records.time_unit);
+        let designed = Designed::new(id, &self.model, design);
         if let Some(own) = &mut session.own {
             own.design = Some(designed);
         }

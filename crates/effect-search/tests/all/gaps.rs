@@ -219,7 +219,7 @@ fn residual_tests_are_of_the_longest_part() {
     // A model without the heater; the first part has only 15 rows.
     let whole = record(&slow(), 0.0, 0.05, 9);
     let cut = without(&whole, |k| (15..90).contains(&k));
-    let wrong = slow().replace("g*u - k*(T - Ta)", "0.001*g*u - k*(T - Ta)");
+    let wrong = slow().replace("g*u - k*(T - Ta)", "1e-9*g*u - k*(T - Ta)");
     let problem = Problem::builder(ModelSpec::parse(&wrong).unwrap(), [cut])
         .build()
         .unwrap();

@@ -34,18 +34,29 @@ impl Context<'_> {
         chance * looks < self.thresholds.false_claim
     }
 
-    /// Backward elimination: removes effects that the noise explains as well, the least significant first.
+    /// Backward elimination: removes effects that the noise explains as well, the least significant first. An effect beside a rounding has
+    /// to be significant with a smooth staircase too.
     pub fn confirm(&self, mut node: Node, base: &Node, noise: &Noise) -> Result<Node, Error> {
+        let mut smooth = self.smooth_rounding(&node, noise);
         loop {
             let lacking = self.each_lacking(&node, base, noise);
+            let is_chance = |lacking: &Node| {
+                let without = |smooth: &Node| self.gain_of_smooth(smooth, lacking, noise);
+                let gain = smooth.as_ref().and_then(without);
+                gain.is_some_and(|gain| gain <= self.thresholds.bic_margin)
+            };
             let doubtful = lacking.into_iter().filter(|lacking| {
                 node.gain_over(lacking) <= self.thresholds.bic_margin
                     || !self.beyond_chance((&node, &node.fit), (lacking, &lacking.fit))
                     || self.rests_on_one_reading(&node, lacking, noise)
+                    || is_chance(lacking)
             });
             let Some(least) = doubtful.min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())) else {
-                return Ok(node);
+                return Ok(smooth
+                    .filter(|smooth| smooth.fit.cost < node.fit.cost)
+                    .unwrap_or(node));
             };
+            smooth = smooth.and_then(|smooth| self.of_smooth(&smooth, &least, noise));
             node = least;
         }
     }

@@ -245,6 +245,9 @@ fn step(
         );
         robust.map_or_else(|_| node.fit.std_errors(), |robust| robust.std_errors)
     };
+    let scatter = context.scatter(node).sqrt();
+    let wider = |error: f64| error * scatter;
+    let errors: Vec<Option<f64>> = errors.into_iter().map(|e| e.map(wider)).collect();
     let errors = if ControlLoop::widens(context.control_loop.as_ref()) {
         let order = context.thresholds.noise_order;
         let moved = moved_by_weighting(&setup, &node.fit, order, FINE)?;

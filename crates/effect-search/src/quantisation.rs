@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use ct_model::effects::{Candidate, Port};
 use ct_model::{Expression, Function, Model, ModelSpec};
-use estimation::{Fit, Residuals, within};
+use estimation::{Fit, Noise, Residuals, within};
 use greybox::exact_reading_step;
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +26,11 @@ const SHARE: RangeInclusive<f64> = 1.0 / 3.0..=1.1;
 const ROUNDING: &str = "the rounding of readings";
 /// Least noise before the rounding, as a share of the step: with less, the effect does not depend on it.
 const LEAST_DITHER: f64 = 0.1;
+
+/// Noise before the rounding of smooth staircases, as shares of the step.
+const DITHERS: [f64; 3] = [0.1, 0.2, 0.3];
+/// See [`Context::scatter`].
+const SCATTER: f64 = 0.32;
 
 /// Rounding of an output's readings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -66,8 +71,13 @@ pub(crate) fn quantisation(context: &Context, node: &Node) -> Vec<Quantisation> 
 
 /// Whether a candidate rounds the readings of an output.
 fn rounds(candidate: &Candidate, output: usize) -> bool {
+    is_rounding(candidate) && candidate.port == Port::Output(output)
+}
+
+/// Whether a candidate rounds readings.
+fn is_rounding(candidate: &Candidate) -> bool {
     let effect = candidate.effect;
-    effect.is_some_and(|effect| effect.id == QUANTISATION) && candidate.port == Port::Output(output)
+    effect.is_some_and(|effect| effect.id == QUANTISATION)
 }
 
 /// Whether a model rounds by itself.
@@ -107,6 +117,57 @@ impl Context<'_> {
             }
         }
         (node, own)
+    }
+
+    /// A set that rounds, with the smooth staircase of noise before the rounding that fits best; `None` for a set that does not round. The
+    /// cost of hard steps depends on single readings next to the steps, so other effects may lower it by chance.
+    pub fn smooth_rounding(&self, node: &Node, noise: &Noise) -> Option<Node> {
+        let (at, _) = self.dither(node)?;
+        let of = |dither: f64| {
+            let mut x = node.fit.x.clone();
+            x[at] = dither;
+            let (added, model) = (node.added.clone(), node.model.clone());
+            self.fitted(added, model, vec![x], noise, FINE).ok()
+        };
+        let all = DITHERS.into_iter().filter_map(of);
+        all.min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost))
+    }
+
+    /// Ratio of a fall of the deviance by chance to that in noise of constant variance: with a smooth staircase the readings scatter only next to
+    /// steps, where the model's output has the largest slope. For normal noise of `d` steps it is 0.32/d, with the mean square slope
+    /// `1/(2 sqrt(pi) d)` and the mean variance `d/sqrt(pi)`; 1 for other sets.
+    pub fn scatter(&self, node: &Node) -> f64 {
+        let dither = self.dither(node).map(|(_, value)| value);
+        let dither = dither.filter(|value| *value > 0.0);
+        dither.map_or(1.0, |dither| (SCATTER / dither).max(1.0))
+    }
+
+    /// Fall of the criterion from a part of a set with a smooth staircase to the whole set, corrected for the scatter; `None` if the part does
+    /// not round.
+    pub fn gain_of_smooth(&self, smooth: &Node, part: &Node, noise: &Noise) -> Option<f64> {
+        let part = self.of_smooth(smooth, part, noise)?;
+        let fall = (part.fit.deviance - smooth.fit.deviance) / self.scatter(smooth);
+        let more = smooth.fit.parameters as f64 - part.fit.parameters as f64;
+        Some(fall - more * self.samples().ln())
+    }
+
+    /// Position and value of the noise before the rounding of a set, as a share of the step; `None` for a set that does not round.
+    fn dither(&self, node: &Node) -> Option<(usize, f64)> {
+        let mut added = node.added.iter();
+        let i = *added.find(|&&i| is_rounding(&self.candidates[i]))?;
+        let mut own = self.candidates[i].parameters.iter();
+        let name = &own.find(|own| own.short == "dither")?.name;
+        let mut parameters = node.spec().parameters.iter();
+        let at = parameters.position(|p| p.about.name == *name)?;
+        Some((at, node.fit.x[at]))
+    }
+
+    /// A part of a set with a smooth staircase; `None` if the part does not round.
+    pub fn of_smooth(&self, smooth: &Node, part: &Node, noise: &Noise) -> Option<Node> {
+        if !part.added.iter().any(|&i| is_rounding(&self.candidates[i])) {
+            return None;
+        }
+        self.subset(smooth, part.added.clone(), noise, FINE).ok()
     }
 
     /// The set with a rounding effect, fitted from what the readings show.

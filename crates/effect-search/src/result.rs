@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use ct_signals::ArModel;
 use serde::{Deserialize, Serialize};
 
 use crate::control_loop::ControlLoop;
@@ -126,6 +127,17 @@ pub struct NoiseFloor {
     pub innovation: f64,
     /// Autoregressive coefficients; empty for white noise.
     pub coefficients: Vec<f64>,
+}
+
+impl NoiseFloor {
+    /// The share of the noise's variance that follows from the readings before (0 to 1): 0 for white noise.
+    #[must_use]
+    pub fn predictable(&self) -> f64 {
+        let noise = ArModel::from_coefficients(&self.coefficients, self.innovation);
+        noise.map_or(0.0, |noise| {
+            1.0 - (noise.sigma() / noise.stationary_std()).powi(2)
+        })
+    }
 }
 
 /// A diagnosis.

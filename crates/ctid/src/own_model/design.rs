@@ -23,6 +23,8 @@ use crate::{Error, numbers};
 
 /// A significant effect lowers the criterion by this much.
 const NEEDED: f64 = 6.0;
+/// Records decide between two effects if the criteria of their models differ by more than this.
+const DECIDED: f64 = 10.0;
 
 /// Searches the experiments.
 ///
@@ -257,6 +259,25 @@ fn sequence_words(design: &Design, applied: &InputSequenceKind) -> String {
     )
 }
 
+/// Sentence about which of the two effects the existing records show; `None` if they leave it open.
+fn decided(design: &Design) -> Option<String> {
+    let [first, second] = &design.between;
+    let (better, other) = if design.bic_ahead > 0.0 {
+        (first, second)
+    } else {
+        (second, first)
+    };
+    let ahead = design.bic_ahead.abs();
+    (ahead > DECIDED && better.bic_gain > NEEDED).then(|| {
+        format!(
+            "These records decide already: {} lowers the criterion by {} more than {} does.",
+            better.effect,
+            numbers::significant(ahead, 3),
+            other.effect
+        )
+    })
+}
+
 /// Sentences: the experiment to apply, and the expected result.
 pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) -> Vec<String> {
     let words = EffectWords::of(file);
@@ -278,6 +299,12 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         Reader::Page => ("", "", ""),
     };
     let decides = 100.0 * best.power.decides;
+    let decided = decided(design);
+    let is_decided = decided.is_some();
+    all.extend(decided);
+    if is_decided && design.twins() {
+        return all;
+    }
     all.push(match design.prospect {
         Prospect::Twins => format!(
             "{} and {} give the same response in every experiment that was tried within these limits: no experiment of this kind distinguishes them. Another sensor, or an inspection of the plant, may.",

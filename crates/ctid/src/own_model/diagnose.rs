@@ -18,6 +18,9 @@ use crate::sentences::remarks::{absorbed, rounding};
 use crate::sentences::with_unit;
 use crate::terminal::without_50;
 
+/// Noise of which this share of the variance follows from the readings before is called correlated.
+const CORRELATED: f64 = 0.25;
+
 /// Searches the candidates.
 ///
 /// # Errors
@@ -147,10 +150,12 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
         )),
         (None, Verdict::Adequate) => {
             all.push("The residual of the model looks like noise.".to_string());
+            all.extend(correlated(diagnosis));
             all.extend(singles::would_have_shown(diagnosis));
         }
         (None, _) => {
-            all.push("The residual of the model with these effects looks like noise.".to_string())
+            all.push("The residual of the model with these effects looks like noise.".to_string());
+            all.extend(correlated(diagnosis));
         }
     }
     all.extend(diagnosis.quantisation.iter().map(|rounded| {
@@ -160,11 +165,20 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
     let many = Thresholds::DEFAULT.many_effects;
     // Rounding, which the readings show, compensates for nothing.
     let effects = diagnosis.effects.iter();
-    let searched = effects.filter(|id| !id.starts_with("quantisation("));
-    if searched.count() >= many {
+    let searched = effects
+        .filter(|id| !id.starts_with("quantisation("))
+        .count();
+    if searched >= many {
         all.push(format!(
             "{many} effects or more together may compensate for an effect that is not among the candidates: treat them as a description of the records until each is confirmed."
         ));
+    }
+    let is_open = diagnosis.verdict == Verdict::Partial && diagnosis.not_noise.is_none();
+    if is_open && searched < many {
+        all.push(
+            "The search was cut short, so this noise may contain effects that were not tried."
+                .to_string(),
+        );
     }
     all.extend(held_out::rises(file, &diagnosis.steps));
     all.extend(diagnosis.absorbed.iter().map(absorbed));
@@ -182,6 +196,26 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
         ));
     }
     all
+}
+
+/// Outputs with correlated noise, which may be more than noise.
+fn correlated(diagnosis: &Diagnosis) -> Option<String> {
+    let correlated = diagnosis.noise.iter().filter_map(|noise| {
+        let predictable = noise.predictable();
+        let share = format!(
+            "{:.0} % of its variance at {}",
+            100.0 * predictable,
+            noise.output
+        );
+        (predictable >= CORRELATED).then_some(share)
+    });
+    let correlated: Vec<String> = correlated.collect();
+    (!correlated.is_empty()).then(|| {
+        format!(
+            "The noise is correlated: {} follows from the readings before. A slow disturbance, or an effect of another shape, would look like that too.",
+            correlated.join(", ")
+        )
+    })
 }
 
 /// The sizes of an effect in the last model, each with its standard error and unit.

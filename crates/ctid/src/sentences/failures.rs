@@ -5,6 +5,9 @@ use effect_search::{Failure, FailureKind, OutputStep};
 use missing_effect::Diagnosis;
 use plants::Plant;
 
+use super::{interval, with_unit};
+use crate::numbers;
+
 /// Names and units of a result, for sentences about one of its outputs.
 #[derive(Debug, Clone)]
 pub struct FailureWords<'a> {
@@ -65,9 +68,10 @@ impl FailureWords<'_> {
         let Failure { by, bin, .. } = failure;
         let unit = self.unit;
         let range = |name: &str, unit: &str| {
-            format!("at {name} of {:.3} to {:.3} {unit}", bin.from, bin.to)
-                .trim_end()
-                .to_string()
+            format!(
+                "at {name} of {}",
+                interval((bin.from, bin.to), " to ", unit)
+            )
         };
         let place = match by {
             FailureKind::Time => {
@@ -97,14 +101,14 @@ impl FailureWords<'_> {
             }
             FailureKind::Frequency => {
                 return format!(
-                    "most at periods of {}: {:.3} {unit} rms",
+                    "most at periods of {}: {} rms",
                     self.clock.lengths(1.0 / bin.to, 1.0 / bin.from),
-                    bin.rms
+                    with_unit(&numbers::significant(bin.rms, 2), unit)
                 );
             }
         };
         format!(
-            "{place}: {:.0} % of the squared error in {:.0} % of the samples; the model reads {} by {:.3} {unit} there on average",
+            "{place}: {:.0} % of the squared error in {:.0} % of the samples; the model reads {} by {} there on average",
             100.0 * failure.error_share,
             100.0 * failure.sample_share,
             if bin.mean > 0.0 {
@@ -112,7 +116,7 @@ impl FailureWords<'_> {
             } else {
                 "too high"
             },
-            bin.mean.abs(),
+            with_unit(&numbers::significant(bin.mean.abs(), 2), unit),
         )
     }
 }

@@ -124,7 +124,10 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
         lowest = lowest.min(step);
         // Positive and negative frequency are counted.
         let part = 2.0 / samples as f64;
-        // Missing samples are left out, and the other samples are scaled accordingly.
+        // Missing samples are left out, and the other samples are scaled accordingly. The spectrum of an output that is read every few rows
+        // repeats above half the frequency of its readings.
+        let stride = stride(one.residual);
+        let part = part * stride as f64;
         let present = present(one);
         let zeroed: Vec<f64> = one
             .residual
@@ -135,6 +138,7 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
             .iter()
             .zip(&expected.lines)
             .enumerate()
+            .take(n / (2 * stride) + 1)
             .skip(1)
         {
             let own = line.norm_sqr() / present.max(1) as f64;
@@ -171,6 +175,22 @@ fn by_frequency(series: &[Series], expected: &[Expected]) -> Vec<Bin> {
         from *= 2.0;
     }
     bands
+}
+
+/// The largest number of rows of which all distances between readings are multiples.
+fn stride(residual: &[f64]) -> usize {
+    let rows = residual.iter().enumerate().filter(|(_, e)| !e.is_nan());
+    let rows: Vec<usize> = rows.map(|(row, _)| row).collect();
+    let distances = rows.windows(2).map(|pair| pair[1] - pair[0]);
+    distances
+        .fold(0, |all, distance| {
+            let (mut a, mut b) = (all, distance);
+            while b > 0 {
+                (a, b) = (b, a % b);
+            }
+            a
+        })
+        .max(1)
 }
 
 /// Regions where a model fails at one output: windows record by record, the others over all records together. `series`: at least one record;

@@ -170,6 +170,8 @@ impl Context<'_> {
             }));
         }
         let level = self.thresholds.not_noise / residuals.len() as f64;
+        // The other tests of a series take the scatter as constant.
+        let scatters = self.scatter(node) > 1.0;
         for (i, residual) in residuals.iter().enumerate() {
             if samples(residual) < 8 {
                 continue;
@@ -182,6 +184,9 @@ impl Context<'_> {
                     output: name(i),
                     period: record.duration() / cycles as f64,
                 }));
+            }
+            if scatters {
+                continue;
             }
             let noise = own.noise.of_series(i);
             let white = standardised(noise, residual);
@@ -234,6 +239,7 @@ impl Context<'_> {
         };
         let trials = with_shapes.trials_among(&node, &of, &own.noise);
         let samples = self.samples();
+        let scatter = self.scatter(&node);
         let least = trials
             .iter()
             .filter_map(|trial| {
@@ -241,7 +247,8 @@ impl Context<'_> {
                 let functions = candidate.fitted() as f64;
                 let rest = samples - own.parameters as f64 - functions;
                 // In a short record the fall is not chi-square distributed: the ratio of the variances has an F distribution.
-                let ratio = (trial.fall.max(0.0) / samples).exp_m1() * rest / functions;
+                let fall = trial.fall.max(0.0) / scatter;
+                let ratio = (fall / samples).exp_m1() * rest / functions;
                 let p = FisherSnedecor::new(functions, rest).ok()?.sf(ratio);
                 Some((p, candidate))
             })

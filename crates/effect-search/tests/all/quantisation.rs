@@ -78,6 +78,18 @@ fn a_model_that_rounds_by_itself_lacks_no_rounding() {
     assert!(!names(&found, "quantisation(y)"), "{:?}", found.groups);
 }
 
+/// Readings scatter only next to the steps, which other effects may fit by chance.
+#[test]
+fn a_step_of_ten_times_the_noise_brings_no_other_effect() {
+    for seed in 1..=4 {
+        let mut record = record(BLOCK, 0.0, 0.05, seed);
+        rounded(&mut record, 0.5);
+        let diagnosis = found(&problem(BLOCK, record));
+        assert_eq!(diagnosis.verdict, Verdict::Effect, "seed {seed}");
+        assert_eq!(diagnosis.groups, [["quantisation(y)"]], "seed {seed}");
+    }
+}
+
 /// Of a model file, without the values that a diagnosis found.
 #[test]
 fn a_listed_rounding_begins_with_what_the_readings_show() {

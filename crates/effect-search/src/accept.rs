@@ -1,5 +1,6 @@
 //! Acceptance test: backward elimination of effects that the noise may explain as well.
 
+use ct_model::effects::Role;
 use ct_signals::{ArModel, Record};
 use estimation::{Fit, Noise, coloured};
 use rayon::prelude::*;
@@ -39,6 +40,9 @@ impl Context<'_> {
     pub fn confirm(&self, mut node: Node, base: &Node, noise: &Noise) -> Result<Node, Error> {
         let mut smooth = self.smooth_rounding(&node, noise);
         loop {
+            if self.limit.passed() {
+                return self.confirm_by_sizes(node, base, noise);
+            }
             let lacking = self.each_lacking(&node, base, noise);
             let is_chance = |lacking: &Node| {
                 let without = |smooth: &Node| self.gain_of_smooth(smooth, lacking, noise);
@@ -58,6 +62,37 @@ impl Context<'_> {
             };
             smooth = smooth.and_then(|smooth| self.of_smooth(&smooth, &least, noise));
             node = least;
+        }
+    }
+
+    /// Backward elimination without refits, if the time is over: by the Wald statistic of each effect's sizes, which equals the fall of the
+    /// deviance to first order. Sizes without a standard error say nothing.
+    fn confirm_by_sizes(&self, mut node: Node, base: &Node, noise: &Noise) -> Result<Node, Error> {
+        let context = Context {
+            limit: self.limit.afterwards(),
+            ..self.clone()
+        };
+        loop {
+            let errors = node.fit.std_errors();
+            let added = (base.added.len()..node.added.len()).filter_map(|position| {
+                let candidate = &self.candidates[node.added[position]];
+                // A term of the user's own may have no size.
+                let own = candidate.effect.map(|_| &candidate.parameters)?;
+                let sizes = own.iter().filter(|p| p.role == Role::Size);
+                let squares = sizes.map(|size| {
+                    let mut parameters = node.spec().parameters.iter();
+                    let at = parameters.position(|p| p.about.name == size.name)?;
+                    Some(((node.fit.x[at] - size.absent) / errors[at]?).powi(2))
+                });
+                let squares = squares.collect::<Option<Vec<f64>>>()?;
+                let gain = squares.iter().sum::<f64>() - squares.len() as f64 * self.samples().ln();
+                (!squares.is_empty() && gain <= self.thresholds.bic_margin)
+                    .then_some((position, gain))
+            });
+            let Some((least, _)) = added.min_by(|a, b| a.1.total_cmp(&b.1)) else {
+                return Ok(node);
+            };
+            node = context.without(&node, least, noise, FINE)?;
         }
     }
 

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod clock;
+mod dynamics;
 mod error;
 mod feedback;
 mod fit;

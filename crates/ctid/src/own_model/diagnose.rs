@@ -14,7 +14,7 @@ use crate::Error;
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::sentences::of_gaps;
-use crate::sentences::remarks::{absorbed, rounding};
+use crate::sentences::remarks::{absorbed, rounding, single_minimum};
 use crate::sentences::with_unit;
 use crate::terminal::without_50;
 
@@ -180,6 +180,11 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
                 .to_string(),
         );
     }
+    let base = diagnosis.steps.first();
+    all.extend(base.and_then(|base| {
+        let minimum = "the minimum of the model that the search begins with";
+        single_minimum(base.starts, base.starts_agree, minimum)
+    }));
     all.extend(held_out::rises(file, &diagnosis.steps));
     all.extend(diagnosis.absorbed.iter().map(absorbed));
     all.extend(diagnosis.gaps.as_ref().and_then(of_gaps));

@@ -101,11 +101,15 @@ pub(super) fn of_rankings(rankings: &Rankings) -> Option<String> {
 /// Remark: the minimum of the last model was not found twice.
 pub(super) fn of_a_minimum(diagnosis: &Diagnosis) -> Option<String> {
     let step = diagnosis.steps.last()?;
-    (step.starts_agree < 2 && step.starts > 0).then(|| {
+    single_minimum(step.starts, step.starts_agree, "the minimum that is shown")
+}
+
+/// Remark: fewer than two starts of a fit ended in `minimum`.
+pub(crate) fn single_minimum(starts: usize, agree: usize, minimum: &str) -> Option<String> {
+    (agree < 2 && starts > 1).then(|| {
         format!(
-            "Of {} starts {} the minimum that is shown: there may be a better one with other parameter values.",
-            step.starts,
-            if step.starts_agree == 0 {
+            "Of {starts} starts {} {minimum}: there may be a better one with other parameter values.",
+            if agree == 0 {
                 "none reached"
             } else {
                 "only one reached"

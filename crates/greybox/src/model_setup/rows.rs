@@ -1,22 +1,13 @@
 //! Simulates the records: rows of residuals and their derivatives.
 
 use ct_model::{Dual, Model, Output, Simulation, SimulationNumber, Variable};
-use ct_signals::Hold;
+use ct_signals::{Hold, Record};
 use estimation::{Prior, Residuals, Sample};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::ModelSetup;
-use super::simulated_loop::Regulators;
-
-/// A row of a record in all simulations: those of the first derivatives come first.
-struct Instant<'a, T> {
-    record: usize,
-    row: usize,
-    /// The outputs of each simulation.
-    read: &'a [T],
-    /// The commands of each simulation, in the order of the controllers; empty without a loop.
-    commands: &'a [T],
-}
+use super::simulated_loop::{LoopController, Regulators, SimulatedLoop};
+use crate::dynamics::{Dynamics, Entries, Instant};
 
 impl<'a> ModelSetup<'a> {
     /// The outputs that the model gives, a series for each record and output; `None` where the simulation cannot go on.
@@ -38,7 +29,10 @@ impl<'a> ModelSetup<'a> {
             return Some(model.collect());
         }
         let mut all = vec![Vec::new(); self.records.len() * self.samples.len()];
-        self.each_instant::<f64>(x, &[], |Instant { record, read, .. }| {
+        let begin =
+            |r: usize, theta: &[f64], states: &[f64]| Some(self.simulation(r, theta, states));
+        let entries = self.entries(x, &[]);
+        entries.each_instant(begin, |Instant { record, read, .. }| {
             for (o, y) in read.iter().enumerate() {
                 all[record * self.samples.len() + o].push(*y);
             }
@@ -64,7 +58,10 @@ impl<'a> ModelSetup<'a> {
         };
         let mut all = vec![Vec::new(); self.records.len() * states];
         if states > 0 {
-            shown.each_instant::<f64>(x, &[], |Instant { record, read, .. }| {
+            let begin =
+                |r: usize, theta: &[f64], states: &[f64]| Some(shown.simulation(r, theta, states));
+            let entries = shown.entries(x, &[]);
+            entries.each_instant(begin, |Instant { record, read, .. }| {
                 for (i, value) in read.iter().enumerate() {
                     all[record * states + i].push(*value);
                 }
@@ -82,104 +79,40 @@ impl<'a> ModelSetup<'a> {
         }
     }
 
-    /// Simulates all records with derivatives with respect to some entries, and passes the outputs row by row to a function: the outputs and
-    /// commands of as many simulations as the derivatives need.
-    fn each_instant<T: SimulationNumber>(
-        &self,
-        x: &[f64],
-        by: &[usize],
-        mut each: impl FnMut(Instant<'_, T>) -> Option<()>,
-    ) -> Option<()> {
-        let (count, states) = (self.parameter_count(), self.model.spec().states.len());
-        let outputs = self.samples.len();
-        let mut inputs = vec![0.0; self.model.spec().inputs.len()];
-        let mut to = inputs.clone();
-        let simulated_loop = self.simulated_loop.as_deref();
-        for (r, record) in self.records.iter().enumerate() {
-            let own = count + r * states..count + (r + 1) * states;
-            let lanes: Vec<usize> = by
-                .iter()
-                .copied()
-                .filter(|i| *i < count || own.contains(i))
-                .collect();
-            let mut chunks: Vec<&[usize]> = lanes.chunks(T::LANES.max(1)).collect();
-            if chunks.is_empty() {
-                chunks.push(&[]);
-            }
-            let begin = self.clock.begins[r] / self.time_unit;
-            let mut simulations: Vec<Simulation<'_, T>> = chunks
-                .iter()
-                .map(|chunk| {
-                    let dual = |i: usize| {
-                        let lane = chunk.iter().position(|own| *own == i).unwrap_or(T::LANES);
-                        T::variable(x[i], lane)
-                    };
-                    let parameters: Vec<_> = (0..count).map(dual).collect();
-                    let initial: Vec<_> = own.clone().map(dual).collect();
-                    Simulation::new(self.model, &parameters, &initial, begin)
-                        .with_tolerance(self.tolerance)
-                })
-                .collect();
-            let mut read = vec![T::constant(0.0); outputs * chunks.len()];
-            let mut regulators: Vec<Regulators<'_, T>> = simulated_loop
-                .iter()
-                .flat_map(|of| {
-                    simulations
-                        .iter()
-                        .map(|_| Regulators::new(of, r, inputs.len()))
-                })
-                .collect();
-            let mut commands = Vec::new();
-            for k in 0..record.len() {
-                for (i, input) in record.inputs.iter().enumerate() {
-                    inputs[i] = input.values[k];
-                    to[i] = match input.hold {
-                        Hold::First if k + 1 < record.len() => input.values[k + 1],
-                        _ => input.values[k],
-                    };
-                }
-                for (simulation, read) in simulations.iter_mut().zip(read.chunks_exact_mut(outputs))
-                {
-                    simulation.read(&inputs, read);
-                }
-                commands.clear();
-                let of_simulations = simulations.iter_mut().zip(read.chunks_exact_mut(outputs));
-                for (regulators, (simulation, read)) in regulators.iter_mut().zip(of_simulations) {
-                    let controllers = || simulated_loop.iter().flat_map(|of| of.controllers());
-                    if self.reads_driven {
-                        // The outputs contain the present commands, which do not depend on these outputs.
-                        let mut ahead = regulators.clone();
-                        let driven = ahead.commands(record, k, read);
-                        simulation.drive(driven);
-                        for i in controllers().map(|controller| controller.input) {
-                            inputs[i] = driven[i].map_or(inputs[i], |driven| driven.value());
-                        }
-                        simulation.read(&inputs, read);
-                    }
-                    let driven = regulators.commands(record, k, read);
-                    simulation.drive(driven);
-                    for i in controllers().map(|controller| controller.input) {
-                        if let Some(driven) = driven[i] {
-                            (inputs[i], to[i]) = (driven.value(), driven.value());
-                            commands.push(driven);
-                        }
-                    }
-                }
-                each(Instant {
-                    record: r,
-                    row: k,
-                    read: &read,
-                    commands: &commands,
-                })?;
-                if k + 1 < record.len() {
-                    let until = begin + (record.time[k + 1] - record.time[0]) / self.time_unit;
-                    for simulation in &mut simulations {
-                        simulation.advance(&inputs, &to, until).ok()?;
-                    }
-                }
-            }
+    /// The entries of a vector, and those whose derivatives are computed.
+    fn entries<'b>(&'b self, x: &'b [f64], by: &'b [usize]) -> Entries<'b> {
+        Entries {
+            records: self.records,
+            x,
+            parameters: self.parameter_count(),
+            states: self.model.spec().states.len(),
+            outputs: self.samples.len(),
+            by,
         }
-        Some(())
+    }
+
+    /// The simulation of a record, before its first row.
+    fn simulation<T: SimulationNumber>(
+        &self,
+        r: usize,
+        parameters: &[T],
+        initial: &[T],
+    ) -> InLoop<'_, T> {
+        let inputs = vec![0.0; self.model.spec().inputs.len()];
+        let begin = self.clock.begins[r] / self.time_unit;
+        let simulated_loop = self.simulated_loop.as_deref();
+        InLoop {
+            record: &self.records[r],
+            begin,
+            time_unit: self.time_unit,
+            simulation: Simulation::new(self.model, parameters, initial, begin)
+                .with_tolerance(self.tolerance),
+            regulators: simulated_loop.map(|of| Regulators::new(of, r, inputs.len())),
+            controllers: simulated_loop.map_or(&[], SimulatedLoop::controllers),
+            reads_driven: self.reads_driven,
+            to: inputs.clone(),
+            inputs,
+        }
     }
 
     /// [`Residuals::each_row`]; not a generic function, so that simulations with derivatives are compiled only in this crate.
@@ -219,73 +152,71 @@ impl<'a> ModelSetup<'a> {
         by: &[usize],
         each: &mut dyn FnMut(Sample, &mut [f64]) -> bool,
     ) -> Option<()> {
-        let (count, states) = (self.parameter_count(), self.model.spec().states.len());
-        let columns = by.len() + 1;
-        let outputs = self.samples.len();
-        let mut row = vec![0.0; columns];
-        let in_loop = self.simulated_loop.as_deref();
-        let mut response = in_loop.map(|of| (of, of.response(columns)));
-        let driven = in_loop.map_or(0, |of| of.controllers().len());
-        let mut driven_columns = vec![0.0; driven * columns];
-        self.each_instant::<T>(x, by, |instant| {
-            let Instant {
-                record: r,
-                row: k,
-                read,
-                commands,
-            } = instant;
-            if let Some((_, response)) = &mut response
-                && k == 0
-            {
-                response.reset();
+        let response = self.simulated_loop.as_deref().map(|of| {
+            let driven = of.controllers().iter().map(|controller| controller.input);
+            (of.response(by.len() + 1), driven.collect())
+        });
+        let begin = |r: usize, theta: &[T], states: &[T]| Some(self.simulation(r, theta, states));
+        self.entries(x, by).each_row(response, begin, each)
+    }
+}
+
+/// The simulation of a model's text on one record, with the controllers of its loop if that is simulated.
+struct InLoop<'a, T> {
+    record: &'a Record,
+    /// Time of the first row \[the model's unit of time\].
+    begin: f64,
+    /// Seconds in the model's unit of time.
+    time_unit: f64,
+    simulation: Simulation<'a, T>,
+    regulators: Option<Regulators<'a, T>>,
+    controllers: &'a [LoopController],
+    /// The outputs contain the present commands.
+    reads_driven: bool,
+    /// The inputs at the beginning and at the end of the present interval.
+    inputs: Vec<f64>,
+    to: Vec<f64>,
+}
+
+impl<T: SimulationNumber> Dynamics<T> for InLoop<'_, T> {
+    fn read(&mut self, row: usize, outputs: &mut [T], commands: &mut Vec<T>) {
+        let record = self.record;
+        for (i, input) in record.inputs.iter().enumerate() {
+            self.inputs[i] = input.values[row];
+            self.to[i] = match input.hold {
+                Hold::First if row + 1 < record.len() => input.values[row + 1],
+                _ => input.values[row],
+            };
+        }
+        self.simulation.read(&self.inputs, outputs);
+        let Some(regulators) = &mut self.regulators else {
+            return;
+        };
+        let driven_inputs = self.controllers.iter().map(|controller| controller.input);
+        if self.reads_driven {
+            // These commands do not depend on these outputs.
+            let mut ahead = regulators.clone();
+            let driven = ahead.commands(record, row, outputs);
+            self.simulation.drive(driven);
+            for i in driven_inputs.clone() {
+                self.inputs[i] = driven[i].map_or(self.inputs[i], |driven| driven.value());
             }
-            let own = count + r * states..count + (r + 1) * states;
-            for output in 0..outputs {
-                row.fill(0.0);
-                let mine = (0..by.len()).filter(|&c| by[c] < count || own.contains(&by[c]));
-                for (lane, column) in mine.enumerate() {
-                    row[column] =
-                        read[lane / T::LANES * outputs + output].slopes()[lane % T::LANES];
-                }
-                let model = read[output].value();
-                let measured = self.records[r].outputs[output].values[k];
-                row[columns - 1] = measured - model;
-                if let Some((_, response)) = &response {
-                    response.add_to(output, &mut row);
-                }
-                let sample = Sample {
-                    output,
-                    first: k == 0,
-                    missing: measured.is_nan(),
-                };
-                let derivatives = row[..columns - 1].iter().all(|v| v.is_finite());
-                let residual = row[columns - 1].is_finite() || sample.missing;
-                let finite = derivatives && residual && model.is_finite();
-                if !(finite && each(sample, &mut row)) {
-                    return None;
-                }
+            self.simulation.read(&self.inputs, outputs);
+        }
+        let driven = regulators.commands(record, row, outputs);
+        self.simulation.drive(driven);
+        for i in driven_inputs {
+            if let Some(driven) = driven[i] {
+                (self.inputs[i], self.to[i]) = (driven.value(), driven.value());
+                commands.push(driven);
             }
-            if let Some((of, response)) = &mut response {
-                driven_columns.fill(0.0);
-                let all = of
-                    .controllers()
-                    .iter()
-                    .zip(driven_columns.chunks_exact_mut(columns));
-                for (d, (of, columns)) in all.enumerate() {
-                    let mine = (0..by.len()).filter(|&c| by[c] < count || own.contains(&by[c]));
-                    for (lane, column) in mine.enumerate() {
-                        let command = commands[lane / T::LANES * driven + d];
-                        columns[column] = -command.slopes()[lane % T::LANES];
-                    }
-                    let measured = self.records[r].inputs[of.input].values[k];
-                    if let Some(last) = columns.last_mut() {
-                        *last = commands[d].value() - measured;
-                    }
-                }
-                response.advance(&driven_columns);
-            }
-            Some(())
-        })
+        }
+    }
+
+    fn advance(&mut self, row: usize) -> Option<()> {
+        let since = self.record.time[row + 1] - self.record.time[0];
+        let until = self.begin + since / self.time_unit;
+        self.simulation.advance(&self.inputs, &self.to, until).ok()
     }
 }
 

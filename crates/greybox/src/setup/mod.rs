@@ -287,12 +287,6 @@ impl<'a> Setup<'a> {
         &self.samples
     }
 
-    /// Whether the controller uses this output.
-    fn reads(&self, output: usize) -> bool {
-        let controller = self.feedback.as_ref().map(|f| f.controller.output());
-        controller == Some(output)
-    }
-
     /// Number of outputs.
     #[must_use]
     pub fn outputs(&self) -> usize {

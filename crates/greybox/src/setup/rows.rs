@@ -1,10 +1,13 @@
 //! Derivatives of a simulation, sample by sample.
 
+use ct_signals::Record;
 use estimation::{Noise, Prior, Residuals, Rows, Sample, Triangle};
+use plants::controller::Regulator;
 use plants::{Dual, Simulator, SimulatorNumber};
 
 use super::{Setup, at_rest, commands, reference, second_command};
-use crate::feedback::Response;
+use crate::dynamics::{Dynamics, Entries};
+use crate::feedback::step;
 
 impl Residuals for Setup<'_> {
     fn free(&self) -> &[usize] {
@@ -107,119 +110,92 @@ impl Setup<'_> {
         if self.stopped() {
             return None;
         }
-        let columns = by.len() + 1;
-        let outputs = self.outputs();
-        // The rows of all outputs at one sample.
-        let mut rows = vec![0.0; columns * outputs];
-        let mut models = vec![f64::NAN; outputs];
-        let count = self.parameter_count();
-        // Response of the linearised plant to commands of the loop. Its input is, for the derivatives, minus the derivatives of the
-        // simulated command and, for the residual, the simulated command minus the measured one.
-        let mut response: Option<(Response, Vec<f64>)> = self
-            .feedback
-            .as_ref()
-            .map(|feedback| (feedback.response(columns), vec![0.0; columns]));
-        for (r, record) in self.records.iter().enumerate() {
-            let own = self.states_of(r);
-            let plant = self.plant_states_of(r);
-            if let Some((response, commands)) = &mut response {
-                response.reset();
-                commands.fill(0.0);
+        let entries = Entries {
+            records: self.records,
+            x,
+            parameters: self.parameter_count(),
+            states: self.states(),
+            outputs: self.outputs(),
+            by,
+        };
+        let response = self.feedback.as_ref();
+        let response = response.map(|feedback| (feedback.response(by.len() + 1), vec![0]));
+        entries.each_row(
+            response,
+            |r: usize, theta: &[T], states: &[T]| self.kernel(r, theta, states),
+            each,
+        )
+    }
+
+    /// The kernel of a record, before its first row.
+    fn kernel<T: SimulatorNumber>(
+        &self,
+        r: usize,
+        theta: &[T],
+        states: &[T],
+    ) -> Option<Kernel<'_, T>> {
+        let record = &self.records[r];
+        let (levels, of_controller) = states.split_at(self.plant_states_of(r).len());
+        let begin = self.clock.begins[r];
+        let rest = at_rest(record);
+        let simulator = Simulator::starting_at(begin, &self.structure, theta, levels, rest);
+        let mut simulator = simulator.ok()?;
+        simulator.set_substeps(self.substeps);
+        let controlled = self.feedback.as_ref().map(|feedback| Controlled {
+            regulator: feedback.controller.start(of_controller),
+            output: feedback.controller.output(),
+            beside: &feedback.replays[r].beside,
+            command: T::constant(0.0),
+        });
+        Some(Kernel {
+            record,
+            simulator,
+            controlled,
+        })
+    }
+}
+
+/// The kernel of a plant with its controller, on one record.
+struct Kernel<'a, T: SimulatorNumber> {
+    record: &'a Record,
+    simulator: Simulator<T>,
+    controlled: Option<Controlled<'a, T>>,
+}
+
+/// The controller of a simulated loop.
+struct Controlled<'a, T> {
+    regulator: Regulator<T>,
+    /// The output that it reads.
+    output: usize,
+    beside: &'a [f64],
+    /// Its present command.
+    command: T,
+}
+
+impl<T: SimulatorNumber> Dynamics<T> for Kernel<'_, T> {
+    fn read(&mut self, row: usize, outputs: &mut [T], commands: &mut Vec<T>) {
+        for (o, output) in outputs.iter_mut().enumerate() {
+            *output = self.simulator.read(o);
+        }
+        if let Some(of) = &mut self.controlled {
+            let (reference, h) = (reference(self.record, row), step(self.record, row));
+            let read = outputs[of.output];
+            of.command = of
+                .regulator
+                .command_beside(reference, read, of.beside[row], h);
+            commands.push(of.command);
+        }
+    }
+
+    fn advance(&mut self, row: usize) -> Option<()> {
+        let record = self.record;
+        let h = record.time[row + 1] - record.time[row];
+        match &self.controlled {
+            Some(of) => {
+                let second = second_command(record, row);
+                self.simulator.advance_held(of.command, second, h);
             }
-            // Columns of this record: the free parameters and its own initial states. They are the derivatives of one simulator or, if
-            // there are too many, of several simulators that run in parallel.
-            let lanes: Vec<usize> = (0..by.len())
-                .filter(|&column| by[column] < count || own.contains(&by[column]))
-                .collect();
-            let mut chunks: Vec<&[usize]> = lanes.chunks(T::LANES.max(1)).collect();
-            if chunks.is_empty() {
-                chunks.push(&[]);
-            }
-            let mut simulators = Vec::with_capacity(chunks.len());
-            for chunk in &chunks {
-                let dual = |i: usize| {
-                    let lane = chunk
-                        .iter()
-                        .position(|&column| by[column] == i)
-                        .unwrap_or(T::LANES);
-                    T::variable(x[i], lane)
-                };
-                let theta: Vec<_> = (0..count).map(dual).collect();
-                let levels: Vec<_> = plant.clone().map(dual).collect();
-                let begin = self.clock.begins[r];
-                let mut simulator = Simulator::starting_at(
-                    begin,
-                    &self.structure,
-                    &theta,
-                    &levels,
-                    at_rest(record),
-                )
-                .ok()?;
-                simulator.set_substeps(self.substeps);
-                let regulator = self.feedback.as_ref().map(|feedback| {
-                    let states: Vec<_> = (plant.end..own.end).map(dual).collect();
-                    feedback.controller.start(&states)
-                });
-                simulators.push((simulator, regulator));
-            }
-            let n = record.len();
-            for k in 0..n {
-                rows.fill(0.0);
-                for ((simulator, regulator), chunk) in simulators.iter_mut().zip(&chunks) {
-                    let mut controlled = None;
-                    for (o, model) in models.iter_mut().enumerate() {
-                        let y = simulator.read(o);
-                        *model = y.value();
-                        let row = &mut rows[o * columns..][..columns];
-                        for (lane, &column) in chunk.iter().enumerate() {
-                            row[column] = y.slopes()[lane];
-                        }
-                        if self.reads(o) {
-                            controlled = Some(y);
-                        }
-                    }
-                    if k + 1 == n {
-                        continue;
-                    }
-                    let h = record.time[k + 1] - record.time[k];
-                    match (regulator, &self.feedback, controlled) {
-                        (Some(regulator), Some(feedback), Some(y)) => {
-                            let beside = feedback.replays[r].beside[k];
-                            let u = regulator.command_beside(reference(record, k), y, beside, h);
-                            if let Some((_, commands)) = &mut response {
-                                for (lane, &column) in chunk.iter().enumerate() {
-                                    commands[column] = -u.slopes()[lane];
-                                }
-                                commands[columns - 1] = u.value() - record.inputs[0].values[k];
-                            }
-                            simulator.advance_held(u, second_command(record, k), h);
-                        }
-                        _ => simulator.advance_both(commands(record, k), h),
-                    }
-                }
-                for (output, (row, model)) in
-                    rows.chunks_exact_mut(columns).zip(&models).enumerate()
-                {
-                    let measured = record.outputs[output].values[k];
-                    row[columns - 1] = measured - model;
-                    if let Some((response, _)) = &response {
-                        response.add_to(output, row);
-                    }
-                    let sample = Sample {
-                        output,
-                        first: k == 0,
-                        missing: measured.is_nan(),
-                    };
-                    let derivatives = row[..columns - 1].iter().all(|value| value.is_finite());
-                    let residual = row[columns - 1].is_finite() || sample.missing;
-                    if !(derivatives && residual && model.is_finite() && each(sample, row)) {
-                        return None;
-                    }
-                }
-                if let Some((response, commands)) = &mut response {
-                    response.advance(commands);
-                }
-            }
+            None => self.simulator.advance_both(commands(record, row), h),
         }
         Some(())
     }

@@ -45,9 +45,8 @@ impl Context<'_> {
             }
             let lacking = self.each_lacking(&node, base, noise);
             let is_chance = |lacking: &Node| {
-                let without = |smooth: &Node| self.gain_of_smooth(smooth, lacking, noise);
-                let gain = smooth.as_ref().and_then(without);
-                gain.is_some_and(|gain| gain <= self.thresholds.bic_margin)
+                let without = |smooth: &Node| self.is_chance_in_smooth(smooth, lacking, noise);
+                smooth.as_ref().and_then(without).unwrap_or(false)
             };
             let doubtful = lacking.into_iter().filter(|lacking| {
                 node.gain_over(lacking) <= self.thresholds.bic_margin
@@ -56,9 +55,10 @@ impl Context<'_> {
                     || is_chance(lacking)
             });
             let Some(least) = doubtful.min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())) else {
-                return Ok(smooth
-                    .filter(|smooth| smooth.fit.cost < node.fit.cost)
-                    .unwrap_or(node));
+                // Hard steps may fit single readings by chance.
+                let is_smooth =
+                    |smooth: &Node| node.gain_over(smooth) <= self.thresholds.bic_margin;
+                return Ok(smooth.filter(is_smooth).unwrap_or(node));
             };
             smooth = smooth.and_then(|smooth| self.of_smooth(&smooth, &least, noise));
             node = least;

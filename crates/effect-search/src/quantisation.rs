@@ -30,7 +30,9 @@ const LEAST_DITHER: f64 = 0.1;
 /// Noise before the rounding of smooth staircases, as shares of the step.
 const DITHERS: [f64; 3] = [0.1, 0.2, 0.3];
 /// See [`Context::scatter`].
-const SCATTER: f64 = 0.32;
+const SCATTER: f64 = 0.347;
+/// Largest error of a reading in steps, with noise of 0.3 steps before the rounding.
+const LARGEST_ERROR: f64 = 2.0;
 
 /// Rounding of an output's readings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,6 +45,13 @@ pub struct Quantisation {
     pub step: f64,
     /// Variance of the rounding error, as a share of the mean squared residual.
     pub share: f64,
+}
+
+/// The rounding of an output in a set: positions of its parameters.
+struct Rounding {
+    output: usize,
+    dither: usize,
+    step: usize,
 }
 
 /// Outputs whose rounded readings cause a large part of a model's residual, except those that are rounded in the model too.
@@ -122,10 +131,15 @@ impl Context<'_> {
     /// A set that rounds, with the smooth staircase of noise before the rounding that fits best; `None` for a set that does not round. The
     /// cost of hard steps depends on single readings next to the steps, so other effects may lower it by chance.
     pub fn smooth_rounding(&self, node: &Node, noise: &Noise) -> Option<Node> {
-        let (at, _) = self.dither(node)?;
+        let roundings = self.roundings(node);
+        if roundings.is_empty() {
+            return None;
+        }
         let of = |dither: f64| {
             let mut x = node.fit.x.clone();
-            x[at] = dither;
+            for rounding in &roundings {
+                x[rounding.dither] = dither;
+            }
             let (added, model) = (node.added.clone(), node.model.clone());
             self.fitted(added, model, vec![x], noise, FINE).ok()
         };
@@ -133,33 +147,59 @@ impl Context<'_> {
         all.min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost))
     }
 
-    /// Ratio of a fall of the deviance by chance to that in noise of constant variance: with a smooth staircase the readings scatter only next to
-    /// steps, where the model's output has the largest slope. For normal noise of `d` steps it is 0.32/d, with the mean square slope
-    /// `1/(2 sqrt(pi) d)` and the mean variance `d/sqrt(pi)`; 1 for other sets.
-    pub fn scatter(&self, node: &Node) -> f64 {
-        let dither = self.dither(node).map(|(_, value)| value);
-        let dither = dither.filter(|value| *value > 0.0);
-        dither.map_or(1.0, |dither| (SCATTER / dither).max(1.0))
+    /// The rounding of each output in a set.
+    fn roundings(&self, node: &Node) -> Vec<Rounding> {
+        let at = |candidate: &Candidate, short: &str| {
+            let mut own = candidate.parameters.iter();
+            let name = &own.find(|own| own.short == short)?.name;
+            let mut all = node.spec().parameters.iter();
+            all.position(|p| p.about.name == *name)
+        };
+        let added = node.added.iter().map(|&i| &self.candidates[i]);
+        let roundings = added.filter_map(|candidate| match candidate.port {
+            Port::Output(output) if is_rounding(candidate) => Some(Rounding {
+                output,
+                dither: at(candidate, "dither")?,
+                step: at(candidate, "step")?,
+            }),
+            _ => None,
+        });
+        roundings.collect()
     }
 
-    /// Fall of the criterion from a part of a set with a smooth staircase to the whole set, corrected for the scatter; `None` if the part does
-    /// not round.
-    pub fn gain_of_smooth(&self, smooth: &Node, part: &Node, noise: &Noise) -> Option<f64> {
+    /// Largest error that the rounding of an output and its noise can cause \[unit of the output\]; `None` if the set does not round it.
+    pub fn largest_rounding_error(&self, node: &Node, output: usize) -> Option<f64> {
+        let roundings = self.roundings(node);
+        let of = roundings.iter().find(|of| of.output == output)?;
+        Some(LARGEST_ERROR * node.fit.x[of.step])
+    }
+
+    /// Ratio of a fall of the deviance by chance to that in noise of constant variance: with a smooth staircase the readings scatter only next to
+    /// steps, where the model's output has the largest slope. For normal noise of `d` steps it is 0.347/d: the mean of the squared slope times the
+    /// variance, `0.1959/(2 sqrt(pi) d)`, over the mean squared slope `1/(2 sqrt(pi) d)` and the mean variance `d/sqrt(pi)`. The largest of all
+    /// outputs; 1 for sets that do not round.
+    pub fn scatter(&self, node: &Node) -> f64 {
+        let of = |rounding: &Rounding| {
+            let dither = node.fit.x[rounding.dither];
+            (dither > 0.0).then(|| SCATTER / dither)
+        };
+        let all = self.roundings(node);
+        all.iter().filter_map(of).fold(1.0, f64::max)
+    }
+
+    /// Whether a part of a set with a smooth staircase explains the records as well, where a fall of the deviance by chance is larger than in
+    /// noise of constant variance ([`Context::scatter`]); `None` if the part does not round.
+    pub fn is_chance_in_smooth(&self, smooth: &Node, part: &Node, noise: &Noise) -> Option<bool> {
         let part = self.of_smooth(smooth, part, noise)?;
         let fall = (part.fit.deviance - smooth.fit.deviance) / self.scatter(smooth);
-        let more = smooth.fit.parameters as f64 - part.fit.parameters as f64;
-        Some(fall - more * self.samples().ln())
-    }
-
-    /// Position and value of the noise before the rounding of a set, as a share of the step; `None` for a set that does not round.
-    fn dither(&self, node: &Node) -> Option<(usize, f64)> {
-        let mut added = node.added.iter();
-        let i = *added.find(|&&i| is_rounding(&self.candidates[i]))?;
-        let mut own = self.candidates[i].parameters.iter();
-        let name = &own.find(|own| own.short == "dither")?.name;
-        let mut parameters = node.spec().parameters.iter();
-        let at = parameters.position(|p| p.about.name == *name)?;
-        Some((at, node.fit.x[at]))
+        let mut lacking = part.fit.clone();
+        lacking.deviance = smooth.fit.deviance + fall;
+        let more = smooth.fit.parameters as f64 - lacking.parameters as f64;
+        let gain = fall - more * self.samples().ln();
+        Some(
+            gain <= self.thresholds.bic_margin
+                || !self.beyond_chance((smooth, &smooth.fit), (&part, &lacking)),
+        )
     }
 
     /// A part of a set with a smooth staircase; `None` if the part does not round.

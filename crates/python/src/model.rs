@@ -76,7 +76,8 @@ pub fn records(
     let read = |frame: &Content| frame.record(&file.columns, &options);
     let all = frames.iter().map(read);
     let all = all.collect::<Result<Vec<Reading>, _>>()?;
-    file.gathered(all, fitted, time_unit(frames))
+    let unit = file.time_unit.unwrap_or_else(|| time_unit(frames));
+    file.gathered(all, fitted, unit)
 }
 
 /// Seconds in one unit of the time of at least one frame.
@@ -220,6 +221,7 @@ impl Model {
         rows_between_false_alarms: f64,
         learning_rows: usize,
     ) -> PyResult<Monitor> {
+        let time_unit = self.0.file.time_unit.unwrap_or(time_unit);
         Monitor::of_model(&self.0, time_unit, rows_between_false_alarms, learning_rows)
     }
 

@@ -139,6 +139,39 @@ fn units_of_the_text_imply_one_of_time() {
         "parameter Real m = 2; input Real F; output Real x(unit=\"mm\"); Real v(unit=\"m/s\");";
     assert_eq!(implied(mass, "der(x) = v; m*der(v) = F;"), Some(1e-3));
     assert_eq!(implied(mass, "der(x) = 1000*v; m*der(v) = F;"), Some(1.0));
+    // Constants of nature in the text, and factors that convert shares and angles, are no conversions of time.
+    for (declarations, equation) in [
+        (
+            "parameter Real V(unit=\"l\") = 1; input Real P(unit=\"kW\"); output Real T(unit=\"degC\");",
+            "4.186*V*der(T) = P;",
+        ),
+        (
+            "parameter Real m(unit=\"g\") = 1; input Real P(unit=\"W\"); output Real T(unit=\"degC\");",
+            "4.186*m*der(T) = P;",
+        ),
+        (
+            "input Real u(unit=\"V\"); output Real x(unit=\"V\");",
+            "1000*der(x) = u - x;",
+        ),
+        (
+            "input Real u(unit=\"V\"); output Real x(unit=\"V\");",
+            "der(x) = 0.001*(u - x);",
+        ),
+        (
+            "parameter Real Q(unit=\"A.h\") = 2; input Real i(unit=\"A\"); output Real soc(unit=\"%\");",
+            "der(soc) = -i/(36*Q);",
+        ),
+        (
+            "input Real n(unit=\"rpm\"); output Real phi(unit=\"deg\");",
+            "der(phi) = 6*n;",
+        ),
+        (
+            "input Real n(unit=\"rpm\"); output Real phi(unit=\"rad\");",
+            "der(phi) = 0.10472*n;",
+        ),
+    ] {
+        assert_eq!(implied(declarations, equation), None, "{equation}");
+    }
     // Two equations that contradict each other.
     let two = "input Real u(unit=\"m/s\"); output Real x(unit=\"m\"); output Real z(unit=\"m\");";
     assert_eq!(implied(two, "der(x) = u; der(z) = 60*u;"), None);

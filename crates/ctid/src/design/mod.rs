@@ -302,7 +302,8 @@ impl Arguments {
         if proposal.design.twins() && self.out.is_none() {
             outputs.retain(|output| output.kind() != Kind::Record);
         }
-        let notes = input::notes(&records.summaries, look);
+        let notes = model.time_unit_warning(records.time_unit, look)
+            + &input::notes(&records.summaries, look);
         let text = notes + &own_model::design_said(model, &proposal.design, look);
         finish(&proposal, &text, &outputs, out, look)
     }

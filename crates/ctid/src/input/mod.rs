@@ -82,14 +82,19 @@ pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
     let noted = summaries.iter().filter(worth);
     let notes = noted.map(|summary| look.paragraph("", &format!("note: {summary}")));
     let warnings = summaries.iter().flat_map(|summary| {
-        let far = summary.isolated.iter();
-        far.map(|far| look.warning(isolated(summary, far)) + "\n")
+        let lines = isolated(summary);
+        lines.map(|line| look.warning(format!("warning: {line}")) + "\n")
     });
     notes.chain(warnings).collect()
 }
 
-/// Warning about readings that are far from those before and after them, with the correction.
-fn isolated(summary: &ReadSummary, far: &IsolatedReadings) -> String {
+/// Sentences about readings that are far from the others, with the correction.
+pub(crate) fn isolated(summary: &ReadSummary) -> impl Iterator<Item = String> {
+    let far = summary.isolated.iter();
+    far.map(|far| of_isolated(summary, far))
+}
+
+fn of_isolated(summary: &ReadSummary, far: &IsolatedReadings) -> String {
     let at = match &summary.calendar {
         Some(calendar) => calendar.at(far.time).to_string(),
         None => duration(far.time),
@@ -98,10 +103,10 @@ fn isolated(summary: &ReadSummary, far: &IsolatedReadings) -> String {
     let (before, after) = far.neighbours;
     let what = match far.count {
         1 => "one reading is".to_string(),
-        count if far.equal => format!("{count} readings of one value are"),
+        count if far.is_code => format!("{count} readings of one value are"),
         count => format!("{count} readings are"),
     };
-    let correction = if far.equal && far.count > 1 {
+    let correction = if far.is_code {
         format!(
             "write missing = [\"{}\"] under [columns], with the number as the file has it",
             ct_signals::shown(far.value)
@@ -110,7 +115,7 @@ fn isolated(summary: &ReadSummary, far: &IsolatedReadings) -> String {
         "empty the cells".to_string()
     };
     format!(
-        "warning: {}, column {}: {what} far from the others, {} at {at} between {} and {}: if it is no measurement, {correction}",
+        "{}, column {}: {what} far from the others, {} at {at} between {} and {}: if it is no measurement, {correction}",
         summary.file,
         quoted(&far.column),
         shown(far.value),

@@ -165,6 +165,8 @@ pub(crate) fn export(
         outputs: output_names.zip(output_units).collect(),
         records: FittedRecord::all(own, &model, (files, &file.columns))?,
     });
+    let unit = records.time_unit;
+    exported.warnings.extend(file.other_time_unit(unit));
     Ok((exported, records.summaries.clone()))
 }
 

@@ -61,6 +61,7 @@ pub(crate) fn simulate(
     };
     let of = (model, fitted.as_ref(), time_unit);
     let mut found = simulated(of, (&read, name, inputs.first), LEVEL, options)?;
+    found.warnings.extend(file.other_time_unit(time_unit));
     if let Some(fitted) = &fitted {
         found.warnings.extend(fitted.warnings());
     }

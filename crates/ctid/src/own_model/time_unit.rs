@@ -66,17 +66,24 @@ impl OwnModelFile {
         columns.time_header().1
     }
 
-    /// Warning that the units of the text imply another unit of time than the model has; empty if they do not. `unit`: seconds in one unit of
-    /// the model's time.
+    /// [`Self::other_time_unit`] as a line of text; empty if there is nothing to say.
     pub(crate) fn time_unit_warning(&self, unit: f64, look: Look) -> String {
-        let implied = implied_time_unit(&self.base);
-        let Some(implied) = implied.filter(|implied| (implied / unit - 1.0).abs() > 1e-9) else {
-            return String::new();
-        };
+        let what = self.other_time_unit(unit);
+        what.map_or(String::new(), |what| {
+            look.warning(format!("warning: {what}")) + "\n"
+        })
+    }
+
+    /// Says that the units of the text imply another unit of time than the model has; `None` if they do not. `unit`: seconds in one unit of the
+    /// model's time.
+    pub(crate) fn other_time_unit(&self, unit: f64) -> Option<String> {
+        let implied = implied_time_unit(&self.base)?;
+        if (implied / unit - 1.0).abs() < 1e-9 {
+            return None;
+        }
         let (of_text, own) = (unit_of(implied), unit_of(unit));
-        let what = format!(
-            "warning: by the units of its text, the model's der() is per {of_text}, but it is taken per {own}, so values of parameters do not have their units: write time_unit = \"{of_text}\" under [columns]"
-        );
-        look.warning(what) + "\n"
+        Some(format!(
+            "by the units of its text, the model's der() is per {of_text}, but it is taken per {own}, so values of parameters do not have their units: write time_unit = \"{of_text}\" under [columns]"
+        ))
     }
 }

@@ -216,6 +216,11 @@ impl Own {
                 json!(found.text == self.text && found.file == self.file && found.data == data);
             body
         });
+        let of_time = model.as_ref().ok().and_then(|model| {
+            let unit = model.declared_time_unit()?;
+            Some(model.time_unit_warning(unit, Look::plain()))
+        });
+        let of_time = of_time.unwrap_or_default();
         json!({
             "text": self.text,
             "file": self.file,
@@ -225,6 +230,7 @@ impl Own {
                 let look = Look::plain();
                 check::said(spec, look)
                     + &units::warnings(None, &self.text, spec, look)
+                    + &of_time
             }),
             "time": columns.and_then(|columns| columns.time.clone()),
             "signals": signals,

@@ -9,6 +9,7 @@ use ct_signals::{
 
 use super::guard::Refusal;
 use super::held::of_record;
+use crate::input;
 
 /// Largest number of columns of a file: the page offers them for choice.
 const MOST_COLUMNS: usize = 500;
@@ -72,7 +73,9 @@ impl Upload {
     pub(super) fn remark(&self) -> Option<String> {
         let (_, _, read) = self.read.as_ref()?;
         let (_, summary) = read.as_ref().ok()?;
-        (!summary.is_plain()).then(|| summary.to_string())
+        let note = (!summary.is_plain()).then(|| summary.to_string());
+        let said: Vec<String> = note.into_iter().chain(input::isolated(summary)).collect();
+        (!said.is_empty()).then(|| said.join("; "))
     }
 
     /// The record with a note on missing samples, read again only after a change of the columns.

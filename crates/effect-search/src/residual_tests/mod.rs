@@ -170,8 +170,6 @@ impl Context<'_> {
             }));
         }
         let level = self.thresholds.not_noise / residuals.len() as f64;
-        // The other tests of a series take the scatter as constant.
-        let scatters = self.scatter(node) > 1.0;
         for (i, residual) in residuals.iter().enumerate() {
             if samples(residual) < 8 {
                 continue;
@@ -185,7 +183,16 @@ impl Context<'_> {
                     period: record.duration() / cycles as f64,
                 }));
             }
-            if scatters {
+            if let Some(largest) = self.largest_rounding_error(node, i % outputs) {
+                // The other tests take the scatter as constant.
+                if let Some(row) = residual.iter().position(|e| e.abs() > largest) {
+                    return Ok(Some(NotNoise::Instant {
+                        output: name(i),
+                        record: record.name.clone(),
+                        from: record.time[row],
+                        to: record.time[row],
+                    }));
+                }
                 continue;
             }
             let noise = own.noise.of_series(i);

@@ -90,6 +90,19 @@ fn a_step_of_ten_times_the_noise_brings_no_other_effect() {
     }
 }
 
+/// Rounding does not explain errors of several steps.
+#[test]
+fn a_disturbance_of_several_steps_beside_rounding_is_no_noise() {
+    let mut record = record(BLOCK, 0.0, 0.05, 1);
+    for y in &mut record.outputs[0].values[300..306] {
+        *y += 2.0;
+    }
+    rounded(&mut record, 0.5);
+    let diagnosis = found(&problem(BLOCK, record));
+    assert!(diagnosis.not_noise.is_some(), "{:?}", diagnosis.groups);
+    assert_ne!(diagnosis.verdict, Verdict::Effect);
+}
+
 /// Of a model file, without the values that a diagnosis found.
 #[test]
 fn a_listed_rounding_begins_with_what_the_readings_show() {

@@ -11,6 +11,11 @@ use crate::clock::Clock;
 
 /// If the text sets no bound, a parameter stays within this factor of its value in the text, ...
 const REACH: f64 = 1e4;
+/// ... and within this one where it suffices.
+const NEAR: f64 = 30.0;
+
+/// A value closer to a bound than this share of the width of the bounds is at it.
+const NEAR_BOUND: f64 = 1e-3;
 
 /// The scales of the noise have converged if none changes by more than this share. Where a model lacks an effect, the errors of two outputs
 /// change by a few times the share by which their weights do.
@@ -44,6 +49,28 @@ pub(super) fn samples_of(records: &[Record], outputs: usize) -> Vec<usize> {
         outputs.map(|y| y.values.len() - y.missing()).sum()
     };
     (0..outputs).map(present).collect()
+}
+
+impl ModelSetup<'_> {
+    /// The same setup, whose parameters without bounds in the text stay near their start values.
+    pub(super) fn near_starts(&self) -> Self {
+        let mut near = self.clone();
+        let parameters = self.model.spec().parameters.iter();
+        for (bounds, parameter) in near.bounds.iter_mut().zip(parameters) {
+            *bounds = bounds_of(&parameter.about, parameter.value, NEAR);
+        }
+        near
+    }
+
+    /// Whether a vector ends at a bound of this setup that another one does not have.
+    pub(super) fn is_narrower_at(&self, other: &Self, x: &[f64]) -> bool {
+        let mut free = self.free.iter();
+        free.any(|&i| {
+            let ((low, high), wide) = (self.bounds[i], other.bounds[i]);
+            let near = NEAR_BOUND * (high - low);
+            low > wide.0 && x[i] < low + near || high < wide.1 && x[i] > high - near
+        })
+    }
 }
 
 impl<'a> ModelSetup<'a> {

@@ -134,7 +134,7 @@ impl<'a> Session<'a> {
         };
         self.conversions = signals.map(conversion).collect::<Result<_, Error>>()?;
         let seconds = rows.seconds();
-        if file.columns.time.is_none() && seconds != time_unit {
+        if file.declared_time_unit().is_none() && seconds != time_unit {
             if self.restored {
                 return Err(Error::Usage(format!(
                     "the saved state has a time in units of {time_unit} s, but the rows have one of {seconds} s; convert the rows, or use another state file with --state FILE"

@@ -1,7 +1,8 @@
 //! Readings that are no measurements: a spike of one row, or a code for a missing sample, such as -999.
 //!
 //! A spike is far from the readings before and after it, compared with the typical distance in the column. A code is one value far outside the
-//! range of all others, in several rows. Neither is reported if an input moves shortly before each of them, as a process may follow it.
+//! range of all others, in several rows. Neither is reported if an input moves shortly before each of them, as a process may follow it; usual
+//! codes are.
 
 use serde::Serialize;
 
@@ -17,7 +18,7 @@ const NEIGHBOURS: f64 = 0.2;
 const QUANTILE: f64 = 0.02;
 /// Largest share of spikes: with more of them they are a property of the signal.
 const MOST: f64 = 0.02;
-/// A code is so many times the range of the other readings away from them, ...
+/// A code is so many times the range of the other readings away from them (a usual one once), ...
 const CODE: f64 = 3.0;
 /// ... and stands in no larger share of the rows.
 const MOST_OF_CODE: f64 = 0.5;
@@ -66,8 +67,10 @@ pub fn isolated_readings(record: &Record) -> Vec<IsolatedReadings> {
             codes
         };
         let rows = rows.into_iter().filter(|rows| !rows.is_empty());
-        let unexplained =
-            rows.filter(|rows| !rows.iter().all(|&row| follows(record, channel, row)));
+        let unexplained = rows.filter(|rows| {
+            let is_code = rows.len() > 1 && is_usual_code(channel.values[rows[0]]);
+            is_code || !rows.iter().all(|&row| follows(record, channel, row))
+        });
         found.extend(unexplained.map(|rows| said(record, channel, &rows)));
     }
     found
@@ -150,7 +153,8 @@ fn codes(channel: &Channel) -> Vec<Vec<usize>> {
         let (low, high) = crate::range_of(others());
         let is_far = |code: &f64| {
             let gap = if *code < low { low - code } else { code - high };
-            gap > CODE * (high - low)
+            let times = if is_usual_code(*code) { 1.0 } else { CODE };
+            gap > times * (high - low)
         };
         let share = 1.0 - others().count() as f64 / sorted.len() as f64;
         if high > low && share <= MOST_OF_CODE && codes.iter().all(is_far) {
@@ -261,6 +265,12 @@ mod tests {
         }
         let zeros = found(still.clone(), zeros);
         assert_eq!((zeros[0].count, zeros[0].is_code), (2, false));
+        // A usual code that begins as an input moves.
+        let mut steps = vec![0.0; 400];
+        steps[100..].fill(1.0);
+        let mut off = wave(400);
+        off[100..110].fill(-999.0);
+        assert_eq!(found(steps, off).len(), 1);
         // Of an input.
         let mut input: Vec<f64> = (0..400).map(|k| f64::from(k / 40 % 2)).collect();
         assert!(found(input.clone(), wave(400)).is_empty());

@@ -111,12 +111,12 @@ fn codes_and_single_spikes_are_told_with_their_correction() {
     assert!(!said.contains("warning"), "{said}");
 
     let spike = record(300, |k, y| {
-        format!("{:.4}", if k == 200 { y + 40.0 } else { y })
+        format!("{:.4}", if k == 215 { y + 40.0 } else { y })
     });
     let said = place(BLOCK, "time_unit = \"s\"\n", spike).succeeds("diagnose a.csv --model m.toml");
     let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
-        said.contains("one reading is far from the others") && said.contains("at 3.33 h between"),
+        said.contains("one reading is far from the others") && said.contains("at 3.58 h between"),
         "{said}"
     );
 }

@@ -8,14 +8,19 @@ use crate::Error;
 
 /// Beginnings of words with the same meaning at a plant; the first one names the family.
 const FAMILIES: [&[&str]; 12] = [
-    &["clog", "foul", "block", "plug", "dirt", "lodged", "narrow"],
+    &[
+        "clog", "foul", "block", "plug", "dirt", "lodged", "narrow", "scal", "corro", "rust",
+        "deposit", "frozen", "ice",
+    ],
     &[
         "drift",
         "creep",
         "wander",
         "ages",
         "aging",
-        "wears",
+        "wear",
+        "worn",
+        "degrad",
         "over time",
     ],
     &["leak", "loses", "loss", "hole", "escape", "spill"],
@@ -72,7 +77,15 @@ const FAMILIES: [&[&str]; 12] = [
     ],
     &["offset", "zero", "shift", "calibrat"],
     &["bend", "bent", "nonlinear", "curved", "operating point"],
-    &["hot", "heat", "temperature", "steam"],
+    &[
+        "hot",
+        "heat",
+        "temperature",
+        "steam",
+        "condens",
+        "evaporat",
+        "insulat",
+    ],
 ];
 
 /// Words that say nothing of a symptom.

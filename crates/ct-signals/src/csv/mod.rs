@@ -1,14 +1,16 @@
 //! Reads a record from a CSV file, says in one line what it read, what was missing and what it did, and in one line what is wrong with
 //! one that it refuses.
 //!
-//! Understood: commas, semicolons or tabs (found from the header); a decimal comma where commas do not separate; a byte-order mark, CRLF,
-//! blank lines, lines that begin with `#`, and blanks around a cell; times as numbers in a unit, or as dates and times; words such as `Bad`
-//! and `null`, and empty cells, where a sample is missing; rows that are missing; units that are not those of the model. Only the columns
-//! in use are read. Nothing is ever written.
+//! Understood: UTF-8, UTF-16 with a byte-order mark, and Latin-1; commas, semicolons or tabs (found from the header); a decimal comma where
+//! commas do not separate; CRLF, blank lines, lines that begin with `#`, lines of text above the header, a row of units below it, and blanks
+//! around a cell; times as numbers in a unit, or as dates and times; words such as `Bad` and `null`, and empty cells, where a sample is
+//! missing; rows that are missing; units that are not those of the model. Only the columns in use are read. Nothing is ever written.
 
 mod cells;
 mod checks;
 mod place;
+mod rows;
+mod start;
 mod summary;
 mod table;
 mod text;
@@ -16,12 +18,12 @@ mod time;
 
 use std::path::Path;
 
-use csv::StringRecord;
 use serde::{Deserialize, Serialize};
 
+use self::rows::Rows;
 pub use self::summary::{Converted, MissingSamples, ReadSummary};
 use self::table::read_table;
-use self::text::{check_header, decode, is_before_header, line_number, read as next_row, reader};
+use self::text::decode;
 pub(crate) use self::{
     cells::{Cell, CellFault, Numbers, THOUSANDS, TIME_AS_NUMBER, says_missing},
     checks::constant,
@@ -29,7 +31,7 @@ pub(crate) use self::{
     time::Times,
 };
 use crate::columns::{Columns, Heading, Purpose};
-use crate::{Error, Hold, LARGEST_RECORD, MIN_ROWS, ReadError, Record, read_file};
+use crate::{Error, Hold, LARGEST_RECORD, MIN_ROWS, Record, read_file};
 
 /// Options for reading a record.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -143,10 +145,10 @@ fn parse(
     columns: &Columns,
     (options, purpose): (&ReadOptions, Purpose),
 ) -> Result<Reading, Error> {
-    let text = decode(file, content)?;
-    let (layout, table) = read_table(file, text, columns, (options, purpose))?;
-    table.check(file, text, &layout, (options, purpose))?;
-    table.into_reading(file, text, layout, (options, purpose))
+    let decoded = decode(file, content)?;
+    let (layout, table) = read_table(file, &decoded.text, columns, (options, purpose))?;
+    table.check(file, &decoded.text, &layout, (options, purpose))?;
+    table.into_reading(file, &decoded, layout, (options, purpose))
 }
 
 /// The header of a file, with the available columns, before the record is read.
@@ -154,16 +156,9 @@ fn parse(
 /// # Errors
 /// Where the file is not text, is empty, or has no header.
 pub fn csv_header(file: &str, content: &[u8]) -> Result<Vec<Heading>, Error> {
-    let text = decode(file, content)?;
-    let mut reader = reader(text);
-    let mut record = StringRecord::new();
-    while next_row(file, &mut reader, &mut record)? {
-        if !is_before_header(&record) {
-            check_header(file, || line_number(text, end_of(&reader)), &record)?;
-            return Ok(record.iter().map(Heading::of).collect());
-        }
-    }
-    Err(Error::Read(ReadError::EmptyFile { file: file.into() }))
+    let decoded = decode(file, content)?;
+    let header = Rows::new(file, &decoded.text).header()?;
+    Ok(header.names.iter().map(|name| Heading::of(name)).collect())
 }
 
 /// The fewest rows of a record.
@@ -172,8 +167,4 @@ fn fewest_rows(purpose: Purpose) -> usize {
         Purpose::Fit => MIN_ROWS,
         Purpose::Simulation => 2,
     }
-}
-
-fn end_of(reader: &csv::Reader<&[u8]>) -> usize {
-    usize::try_from(reader.position().byte()).unwrap_or(usize::MAX)
 }

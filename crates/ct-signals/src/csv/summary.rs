@@ -33,6 +33,12 @@ pub struct Converted {
 pub struct ReadSummary {
     /// The file.
     pub file: String,
+    /// Its encoding, where it is not UTF-8.
+    pub encoding: Option<&'static str>,
+    /// Lines of text above the header, which are not used.
+    pub above_header: usize,
+    /// Whether the units are in a row below the header.
+    pub units_below_header: bool,
     /// Rows in use.
     pub rows: usize,
     /// Line number of the first row in use.
@@ -41,6 +47,8 @@ pub struct ReadSummary {
     /// The header of the time.
     #[serde(skip)]
     pub time_header: String,
+    /// Whether the times are in seconds for want of a unit, and look like days: the numbers that spreadsheets have for dates.
+    pub looks_like_days: bool,
     /// Rows outside the required range of time.
     pub outside: usize,
     /// Rows without a time, which are not used.
@@ -68,7 +76,10 @@ impl ReadSummary {
     /// Whether the file was read unchanged: no sample was missing, left out or converted.
     #[must_use]
     pub fn is_plain(&self) -> bool {
-        self.outside == 0
+        self.encoding.is_none()
+            && self.above_header == 0
+            && !self.units_below_header
+            && self.outside == 0
             && self.without_time == 0
             && self.missing_rows == 0
             && self.missing.is_empty()
@@ -94,6 +105,17 @@ impl fmt::Display for ReadSummary {
             write!(f, " over {}", duration(self.duration))?;
         }
         write!(f, ", every {}", duration(self.interval))?;
+        if let Some(encoding) = self.encoding {
+            write!(f, "; read as {encoding}")?;
+        }
+        match self.above_header {
+            0 => {}
+            1 => write!(f, "; the line above the header left out")?,
+            lines => write!(f, "; the {lines} lines above the header left out")?,
+        }
+        if self.units_below_header {
+            write!(f, "; units from the row below the header")?;
+        }
         if self.outside > 0 {
             write!(
                 f,

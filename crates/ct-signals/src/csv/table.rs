@@ -4,21 +4,22 @@ use csv::StringRecord;
 
 use super::cells::is_word;
 use super::place::Place;
-use super::text::{check_header, is_before_header, line_number, reader};
+use super::rows::Rows;
+use super::start::Start;
+use super::text::{Decoded, line_number};
 use super::time::Bounds;
 use super::{
-    Cell, Converted, MissingSamples, Numbers, ReadOptions, ReadSummary, Reading, Times, delimiter,
-    delimiter_name, end_of, fewest_rows, says_missing, time,
+    Cell, Converted, MissingSamples, Numbers, ReadOptions, ReadSummary, Reading, Times,
+    delimiter_name, fewest_rows, says_missing, time,
 };
 use crate::columns::{Columns, Found, Layout, Purpose};
-use crate::csv::text::read as next_row;
 use crate::{
     Calendar, Channel, Error, ReadError, Record, escaped, isolated_readings, quoted, unit,
 };
 
 /// The columns in use, with where each row ends in the file.
-#[derive(Default)]
 pub(super) struct Table {
+    pub(super) start: Start,
     pub(super) ends: Vec<usize>,
     /// \[s\], from zero of the column, or from the first row where these are dates.
     pub(super) time: Vec<f64>,
@@ -41,36 +42,38 @@ pub(super) fn read_table(
     columns: &Columns,
     (options, purpose): (&ReadOptions, Purpose),
 ) -> Result<(Layout, Table), Error> {
-    let delimiter = delimiter(text);
-    let mut reader = reader(text);
+    let mut rows = Rows::new(file, text);
+    let start = rows.start();
+    let delimiter = start.delimiter;
+    let header = rows.header()?;
+    let fields = header.names.len();
+    let layout = columns.resolve(file, header.row, &header.names, purpose)?;
+    let channels = layout.channels().count();
     let mut record = StringRecord::new();
-    let mut header: Option<(Layout, usize)> = None;
     let mut times: Option<(Times, Bounds)> = None;
     let mut numbers = Numbers::new(delimiter != b',', options.strict, &columns.missing);
-    let mut table = Table::default();
+    let mut table = Table {
+        start,
+        ends: Vec::new(),
+        time: Vec::new(),
+        values: vec![Vec::new(); channels],
+        missing: vec![Vec::new(); channels],
+        calendar: None,
+        outside: 0,
+        without_time: 0,
+        untimed: (0, Vec::new()),
+    };
 
-    while next_row(file, &mut reader, &mut record)? {
-        let end = end_of(&reader);
-        let is_before = header.is_none() && is_before_header(&record);
-        if is_before || record.iter().all(str::is_empty) {
+    while rows.next(&mut record)? {
+        let end = rows.end();
+        if record.iter().all(str::is_empty) {
             continue;
         }
-        let Some((layout, fields)) = &header else {
-            let row = || line_number(text, end);
-            check_header(file, row, &record)?;
-            let headers: Vec<String> = record.iter().map(str::to_string).collect();
-            let layout = columns.resolve(file, row(), &headers, purpose)?;
-            let channels = layout.channels().count();
-            table.values.resize_with(channels, Vec::new);
-            table.missing.resize_with(channels, Vec::new);
-            header = Some((layout, record.len()));
-            continue;
-        };
-        if record.len() != *fields {
+        if record.len() != fields {
             return Err(Error::Read(ReadError::WrongFieldCount {
                 file: file.into(),
                 row: line_number(text, end),
-                expected: *fields,
+                expected: fields,
                 found: record.len(),
                 delimiter: delimiter_name(delimiter),
             }));
@@ -143,10 +146,7 @@ pub(super) fn read_table(
         }
     }
     table.calendar = times.and_then(|(times, _)| times.calendar());
-    match header {
-        Some((layout, _)) => Ok((layout, table)),
-        None => Err(Error::Read(ReadError::EmptyFile { file: file.into() })),
-    }
+    Ok((layout, table))
 }
 
 /// Whether a row below the header contains units: words only, and no mark of a missing sample.
@@ -180,7 +180,7 @@ impl Table {
     pub(super) fn into_reading(
         mut self,
         file: &str,
-        text: &str,
+        Decoded { text, encoding }: &Decoded,
         layout: Layout,
         (options, purpose): (&ReadOptions, Purpose),
     ) -> Result<Reading, Error> {
@@ -236,9 +236,15 @@ impl Table {
         });
         let summary = ReadSummary {
             file: file.into(),
+            encoding: *encoding,
+            above_header: self.start.above,
+            units_below_header: self.start.units,
             rows: record.len(),
             first_row: self.ends.first().map_or(0, |&end| line_number(text, end)),
             time_header: printable(&layout.time.header),
+            looks_like_days: layout.time.unit.is_empty()
+                && record.calendar.is_none()
+                && time::looks_like_days(record.time[0], record.sample_interval()),
             outside: self.outside,
             without_time: self.without_time,
             missing_rows: record.missing_rows(),

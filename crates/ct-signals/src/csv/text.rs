@@ -1,39 +1,69 @@
-//! The text of a CSV file: its encoding, its delimiter, its rows, and the line numbers of these.
+//! The text of a CSV file: its encoding, its delimiter, and the line numbers of its rows.
 
-use csv::{Reader, ReaderBuilder, StringRecord, Trim};
+use std::borrow::Cow;
+
+use csv::StringRecord;
 
 use crate::{Error, LONGEST_LINE, MOST_COLUMNS, ReadError, quoted};
 
-/// The content of a file as text, without a byte-order mark.
-pub(super) fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<&'a str, Error> {
+/// The content of a file.
+pub(super) struct Decoded<'a> {
+    /// Without a byte-order mark.
+    pub text: Cow<'a, str>,
+    /// Its encoding, where it is not UTF-8.
+    pub encoding: Option<&'static str>,
+}
+
+/// The content of a file as text: UTF-8, UTF-16 with a byte-order mark, or, as spreadsheets in western Europe write it, Latin-1.
+pub(super) fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<Decoded<'a>, Error> {
     let not_text = |found| {
         Error::Read(ReadError::NotText {
             file: file.into(),
             found,
         })
     };
-    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return Err(not_text("UTF-16"));
-    }
     if bytes.starts_with(b"PK\x03\x04") {
         return Err(not_text("a zip archive or a spreadsheet"));
     }
-    if bytes.contains(&0) {
+    let wide = match bytes {
+        [0xff, 0xfe, wide @ ..] => Some((wide, u16::from_le_bytes as fn([u8; 2]) -> u16)),
+        [0xfe, 0xff, wide @ ..] => Some((wide, u16::from_be_bytes as fn([u8; 2]) -> u16)),
+        _ => None,
+    };
+    let (text, encoding) = if let Some((wide, unit)) = wide {
+        let (units, _) = wide.as_chunks();
+        let units: Vec<u16> = units.iter().map(|pair| unit(*pair)).collect();
+        let text = String::from_utf16(&units).map_err(|_| not_text("binary data"))?;
+        (Cow::Owned(text), Some("UTF-16"))
+    } else if let Ok(text) = std::str::from_utf8(bytes) {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        (Cow::Borrowed(text), None)
+    } else {
+        // The characters of Latin-1 are the first 256 of Unicode.
+        let text = bytes.iter().copied().map(char::from).collect();
+        (Cow::Owned(text), Some("Latin-1"))
+    };
+    let is_binary = |byte: u8| byte == 0 || encoding == Some("Latin-1") && is_control(byte);
+    if text.bytes().any(is_binary) {
         return Err(not_text("binary data"));
     }
-    let text = std::str::from_utf8(bytes).map_err(|_| not_text("in another encoding"))?;
     let mut begin = 0;
-    for line in bytes.split(|byte| *byte == b'\n' || *byte == b'\r') {
+    for line in text.as_bytes().split(|byte| b"\r\n".contains(byte)) {
         if line.len() > LONGEST_LINE {
             return Err(Error::Read(ReadError::LongLine {
                 file: file.into(),
-                row: line_number(text, begin + line.len()),
+                row: line_number(&text, begin + line.len()),
                 longest: LONGEST_LINE,
             }));
         }
         begin += line.len() + 1;
     }
-    Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
+    Ok(Decoded { text, encoding })
+}
+
+/// Whether a byte is a control character that no text file has.
+fn is_control(byte: u8) -> bool {
+    byte.is_ascii_control() && !b"\t\r\n\x0c\x1a".contains(&byte)
 }
 
 /// The line number of the row that the reader finished at the byte `end`. A line ends as it does for the reader: at a line feed, a carriage
@@ -53,16 +83,6 @@ pub(super) fn line_number(text: &str, end: usize) -> u64 {
     ends + 1
 }
 
-pub(super) fn reader(text: &str) -> Reader<&[u8]> {
-    ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .delimiter(delimiter(text))
-        .comment(Some(b'#'))
-        .trim(Trim::All)
-        .from_reader(text.as_bytes())
-}
-
 /// What spreadsheets write before the delimiter in a first line of its own: `sep=;`.
 const DELIMITER_KEY: &str = "sep=";
 
@@ -71,20 +91,6 @@ pub(super) fn is_before_header(row: &StringRecord) -> bool {
     let mut cells = row.iter();
     let first = cells.next().unwrap_or_default();
     (first.is_empty() || first == DELIMITER_KEY) && cells.all(str::is_empty)
-}
-
-/// The next row, if there is one.
-pub(super) fn read(
-    file: &str,
-    reader: &mut Reader<&[u8]>,
-    row: &mut StringRecord,
-) -> Result<bool, Error> {
-    reader.read_record(row).map_err(|error| {
-        Error::Read(ReadError::CannotOpen {
-            file: file.into(),
-            source: error.into(),
-        })
-    })
 }
 
 /// A header names so many columns at most.
@@ -106,16 +112,12 @@ pub(crate) fn is_number(cell: &str) -> bool {
 }
 
 /// Numbers alone are no header, and neither are too many columns.
-pub(super) fn check_header(
-    file: &str,
-    row: impl Fn() -> u64,
-    record: &StringRecord,
-) -> Result<(), Error> {
-    check_width(file, row(), record.len())?;
+pub(super) fn check_header(file: &str, row: u64, record: &StringRecord) -> Result<(), Error> {
+    check_width(file, row, record.len())?;
     if record.iter().all(is_number) {
         return Err(Error::Read(ReadError::NoHeader {
             file: file.into(),
-            row: row(),
+            row,
             first: quoted(&record.iter().collect::<Vec<_>>().join(", ")),
         }));
     }

@@ -7,7 +7,7 @@ use super::{
     cells::{CellFault, Numbers},
     checks::rounded,
     place::Place,
-    text::{read, reader},
+    rows::Rows,
 };
 use crate::columns::Columns;
 use crate::{Calendar, Error, ReadError, Timestamp, TimestampError, TimestampReader, Zone, quoted};
@@ -117,6 +117,15 @@ impl Times {
     }
 }
 
+/// Whether numbers look like dates as spreadsheets count them, in days since 1900: they begin in the years 1954 to 2119, and the step is whole
+/// seconds but no decimal number of few digits.
+pub(super) fn looks_like_days(first: f64, step: f64) -> bool {
+    const YEARS: std::ops::Range<f64> = 20_000.0..80_000.0;
+    let is_whole = |number: f64| number >= 0.5 && (number - number.round()).abs() < 0.02;
+    // The digits that a spreadsheet writes let a step of 1 s err by a percent or two.
+    YEARS.contains(&first) && is_whole(86_400.0 * step) && step < 1.0 && !is_whole(1e4 * step)
+}
+
 /// The offset from UTC at the end of a date: `+01:00`.
 fn offset_of(cell: &str) -> Option<&str> {
     let cell = cell.trim();
@@ -137,14 +146,14 @@ fn refused(error: TimestampError) -> CellFault {
 
 /// The cells of a column.
 pub(super) fn cells(place: Place, column: usize) -> Vec<String> {
-    let mut reader = reader(place.text);
+    let mut rows = Rows::new(place.name, place.text);
     let mut row = StringRecord::new();
     let mut cells = Vec::new();
-    while let Ok(true) = read(place.name, &mut reader, &mut row) {
-        cells.extend(row.get(column).map(str::to_string));
+    if rows.header().is_ok() {
+        while let Ok(true) = rows.next(&mut row) {
+            cells.extend(row.get(column).map(str::to_string));
+        }
     }
-    // The first is the header.
-    cells.drain(..1.min(cells.len()));
     cells
 }
 
@@ -196,5 +205,21 @@ impl Bounds {
 
     pub fn contain(&self, time: f64) -> bool {
         (self.from..=self.to).contains(&time)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::looks_like_days;
+
+    #[test]
+    fn days_of_a_spreadsheet_are_told_from_seconds() {
+        for step in [1.0, 10.0, 60.0, 300.0, 3600.0, 2400.0] {
+            assert!(looks_like_days(45_260.3, step / 86_400.0), "{step} s");
+        }
+        for step in [0.001, 0.05, 0.1, 0.25, 0.5, 1.0, 60.0] {
+            assert!(!looks_like_days(45_260.3, step), "{step}");
+        }
+        assert!(!looks_like_days(0.0, 1.0 / 86_400.0));
     }
 }

@@ -62,8 +62,8 @@ pub enum ReadError {
         /// The path as it was given.
         file: String,
     },
-    /// The file is not text in an encoding that is understood.
-    #[error("{file}: this is not a UTF-8 text file but {found}; export it as CSV (UTF-8)")]
+    /// The file is not text.
+    #[error("{file}: this is not a text file but {found}; export it as CSV (UTF-8)")]
     NotText {
         /// The path as it was given.
         file: String,

@@ -2,6 +2,7 @@
 
 mod refused;
 mod signals;
+mod start;
 
 use approx::assert_relative_eq;
 use ct_signals::{ColumnFault, Columns, Error, ReadError, ReadOptions, Record, read_csv};

@@ -82,10 +82,22 @@ pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
     let noted = summaries.iter().filter(worth);
     let notes = noted.map(|summary| look.paragraph("", &format!("note: {summary}")));
     let warnings = summaries.iter().flat_map(|summary| {
-        let lines = isolated(summary);
+        let lines = days(summary).into_iter().chain(isolated(summary));
         lines.map(|line| look.warning(format!("warning: {line}")) + "\n")
     });
     notes.chain(warnings).collect()
+}
+
+/// A sentence about times that look like days, with the correction.
+pub(crate) fn days(summary: &ReadSummary) -> Option<String> {
+    summary.looks_like_days.then(|| {
+        format!(
+            "{}, column \"{time}\": the times look like dates that a spreadsheet wrote as days, and are taken as seconds; write the unit into \
+             the header, \"{time} [d]\"",
+            summary.file,
+            time = summary.time_header
+        )
+    })
 }
 
 /// Sentences about readings that are far from the others, with the correction.

@@ -74,7 +74,10 @@ impl Upload {
         let (_, _, read) = self.read.as_ref()?;
         let (_, summary) = read.as_ref().ok()?;
         let note = (!summary.is_plain()).then(|| summary.to_string());
-        let said: Vec<String> = note.into_iter().chain(input::isolated(summary)).collect();
+        let warnings = input::days(summary)
+            .into_iter()
+            .chain(input::isolated(summary));
+        let said: Vec<String> = note.into_iter().chain(warnings).collect();
         (!said.is_empty()).then(|| said.join("; "))
     }
 

@@ -58,15 +58,6 @@ fn a_binary_record() {
         *b"PK\x03\x04\x14\x00",
         &["bad.csv: ", "spreadsheet", "export it as CSV"],
     );
-    let wide: Vec<u8> = "\u{feff}t,u,y\n1,2,3\n"
-        .encode_utf16()
-        .flat_map(u16::to_le_bytes)
-        .collect();
-    record_refused(wide, &["bad.csv: ", "UTF-16", "export it as CSV"]);
-    record_refused(
-        b"t [s],u [V],T [\xb0C]\n",
-        &["bad.csv: ", "another encoding", "UTF-8"],
-    );
 }
 
 #[test]

@@ -1,0 +1,90 @@
+//! The rows of a CSV file, from its header on.
+
+use csv::{Reader, ReaderBuilder, StringRecord, Trim};
+
+use super::start::{Start, unit_of};
+use super::text::{check_header, is_before_header, line_number};
+use crate::{Error, ReadError, unit};
+
+/// Reads rows, and knows where each of them ends in the file.
+pub(super) struct Rows<'a> {
+    file: &'a str,
+    text: &'a str,
+    reader: Reader<&'a [u8]>,
+    start: Start,
+}
+
+/// The header of a file.
+pub(super) struct HeaderRow {
+    /// Line number.
+    pub row: u64,
+    /// Names, with the units that the row below gives.
+    pub names: Vec<String>,
+}
+
+impl<'a> Rows<'a> {
+    pub fn new(file: &'a str, text: &'a str) -> Self {
+        let start = Start::of(text);
+        Self {
+            file,
+            text,
+            reader: reader(&text[start.begin..], start.delimiter),
+            start,
+        }
+    }
+
+    pub fn start(&self) -> Start {
+        self.start
+    }
+
+    /// Reads the header, and the row of units below it if there is one.
+    pub fn header(&mut self) -> Result<HeaderRow, Error> {
+        let mut record = StringRecord::new();
+        while self.next(&mut record)? {
+            if is_before_header(&record) {
+                continue;
+            }
+            let row = line_number(self.text, self.end());
+            check_header(self.file, row, &record)?;
+            let mut names: Vec<String> = record.iter().map(str::to_string).collect();
+            if self.start.units && self.next(&mut record)? {
+                for (name, below) in names.iter_mut().zip(&record) {
+                    let below = unit_of(below).unwrap_or_default();
+                    if !below.is_empty() && unit::split(name).1.is_empty() {
+                        *name = format!("{name} [{below}]");
+                    }
+                }
+            }
+            return Ok(HeaderRow { row, names });
+        }
+        Err(Error::Read(ReadError::EmptyFile {
+            file: self.file.into(),
+        }))
+    }
+
+    /// The next row, if there is one.
+    pub fn next(&mut self, row: &mut StringRecord) -> Result<bool, Error> {
+        self.reader.read_record(row).map_err(|error| {
+            Error::Read(ReadError::CannotOpen {
+                file: self.file.into(),
+                source: error.into(),
+            })
+        })
+    }
+
+    /// Byte of the file at which the last row ended.
+    pub fn end(&self) -> usize {
+        let read = usize::try_from(self.reader.position().byte());
+        read.map_or(usize::MAX, |read| read.saturating_add(self.start.begin))
+    }
+}
+
+pub(super) fn reader(text: &str, delimiter: u8) -> Reader<&[u8]> {
+    ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(delimiter)
+        .comment(Some(b'#'))
+        .trim(Trim::All)
+        .from_reader(text.as_bytes())
+}

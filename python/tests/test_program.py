@@ -138,3 +138,15 @@ def test_a_linear_model(program, tmp_path, tour, method):
 
 def test_a_table(program, tmp_path):
     assert own(ctid.tables.baysse(runs=10, seed=2)) == results(program, tmp_path, "tables", "baysse", "--runs", "10", "--seed", "2")
+
+
+def test_the_time_unit_of_a_model_file(tmp_path):
+    toml, csv = MODELS / "heated-block.toml", MODELS / "heated-block.csv"
+    per_second = ctid.Model.from_file(toml).fit(read(csv, "t [s]"))
+    (tmp_path / "heated-block.mo").write_text((MODELS / "heated-block.mo").read_text(encoding="utf-8"), encoding="utf-8")
+    text = toml.read_text(encoding="utf-8").replace('time = "t [s]"', 'time = "t [min]"\ntime_unit = "s"')
+    (tmp_path / "m.toml").write_text(text, encoding="utf-8")
+    minutes = read(csv, "t [s]")
+    minutes.index = pd.Index(minutes.index / 60.0, name="t [min]")
+    fit = ctid.Model.from_file(tmp_path / "m.toml").fit(minutes)
+    np.testing.assert_allclose(fit.params, per_second.params, rtol=1e-5)

@@ -93,6 +93,27 @@ fn a_model_of_ones_own_is_watched() {
     assert!((since - onset).abs() < 20.0 * 3600.0, "{since} {onset}");
 }
 
+/// With `time_unit` the model's time is in hours, whatever unit the column of the time has.
+#[test]
+fn a_time_unit_of_the_model_file_is_that_of_the_estimates() {
+    let estimates = |model: &str| -> Value {
+        let place = own_place();
+        place.write("m.toml", model);
+        let outcome = fed(&place, "--estimates", block_rows(1500, 1500));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+        let events = events(&outcome.out);
+        let estimates = events.iter().find(|e| e["event"] == "estimates");
+        estimates.unwrap()["parameters"].clone()
+    };
+    let per_hour = estimates(OWN);
+    let declared = OWN.replace("time = \"t [h]\"", "time = \"t [min]\"\ntime_unit = \"h\"");
+    assert_eq!(estimates(&declared), per_hour);
+    let per_minute = estimates(&OWN.replace("t [h]", "t [min]"));
+    let k = |found: &Value| found[0]["value"].as_f64().unwrap();
+    assert_eq!(per_hour[0]["name"], "k");
+    assert!((60.0 * k(&per_minute) / k(&per_hour) - 1.0).abs() < 0.05, "{per_minute}");
+}
+
 #[test]
 fn a_model_of_ones_own_is_watched_with_its_effects() {
     let place = own_place();

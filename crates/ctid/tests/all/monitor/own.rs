@@ -111,7 +111,10 @@ fn a_time_unit_of_the_model_file_is_that_of_the_estimates() {
     let per_minute = estimates(&OWN.replace("t [h]", "t [min]"));
     let k = |found: &Value| found[0]["value"].as_f64().unwrap();
     assert_eq!(per_hour[0]["name"], "k");
-    assert!((60.0 * k(&per_minute) / k(&per_hour) - 1.0).abs() < 0.05, "{per_minute}");
+    assert!(
+        (60.0 * k(&per_minute) / k(&per_hour) - 1.0).abs() < 0.05,
+        "{per_minute}"
+    );
 }
 
 #[test]

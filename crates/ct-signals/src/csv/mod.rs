@@ -31,7 +31,7 @@ pub(crate) use self::{
     time::Times,
 };
 use crate::columns::{Columns, Heading, Purpose};
-use crate::{Error, Hold, LARGEST_RECORD, MIN_ROWS, Record, read_file};
+use crate::{Error, Hold, LARGEST_RECORD, MIN_ROWS, ReadError, Record, read_file};
 
 /// Options for reading a record.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -159,6 +159,11 @@ pub fn csv_header(file: &str, content: &[u8]) -> Result<Vec<Heading>, Error> {
     let decoded = decode(file, content)?;
     let header = Rows::new(file, &decoded.text).header()?;
     Ok(header.names.iter().map(|name| Heading::of(name)).collect())
+}
+
+/// The error of a file without a header.
+fn empty(file: &str) -> Error {
+    Error::Read(ReadError::EmptyFile { file: file.into() })
 }
 
 /// The fewest rows of a record.

@@ -2,6 +2,7 @@
 
 use csv::{Reader, ReaderBuilder, StringRecord, Trim};
 
+use super::empty;
 use super::start::{Start, unit_of};
 use super::text::{check_header, is_before_header, line_number};
 use crate::{Error, ReadError, unit};
@@ -57,9 +58,7 @@ impl<'a> Rows<'a> {
             }
             return Ok(HeaderRow { row, names });
         }
-        Err(Error::Read(ReadError::EmptyFile {
-            file: self.file.into(),
-        }))
+        Err(empty(self.file))
     }
 
     /// The next row, if there is one.

@@ -9,8 +9,19 @@ use crate::Error;
 /// Beginnings of words with the same meaning at a plant; the first one names the family.
 const FAMILIES: [&[&str]; 12] = [
     &[
-        "clog", "foul", "block", "plug", "dirt", "lodged", "narrow", "scal", "corro", "rust",
-        "deposit", "frozen", "ice",
+        "clog",
+        "foul",
+        "block",
+        "plug",
+        "dirt",
+        "lodged",
+        "narrow",
+        "scaling",
+        "limescale",
+        "corro",
+        "rust",
+        "deposit",
+        "ice",
     ],
     &[
         "drift",

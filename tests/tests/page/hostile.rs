@@ -161,7 +161,7 @@ fn unfortunate_files_are_refused_with_the_mend() {
     assert!(answer.error().contains("a single line"), "{answer:?}");
     for (bytes, needle) in [
         (b"PK\x03\x04 a spreadsheet".as_slice(), "spreadsheet"),
-        (&[0xff, 0xfe, 0, 1], "UTF-16"),
+        (&[0xff, 0xfe, 0, 0xd8, b't', 0], "binary data"),
         (b"", "empty"),
         (b"1,2,3\n4,5,6\n", "header"),
     ] {

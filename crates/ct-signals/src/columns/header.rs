@@ -63,6 +63,15 @@ impl Header<'_> {
             [_, _, ..] => return Err(self.ambiguous(role, &exact)),
             [] => {}
         }
+        // A name with brackets that are no unit: `T (inlet)` of `T (inlet) [degC]`.
+        let whole = self.indices(|header| {
+            unit::split_bracket(header)
+                .is_some_and(|(name, unit)| name == wanted && !unit.is_empty())
+        });
+        if let [index] = whole[..] {
+            let (_, unit) = unit::split(&self.names[index]);
+            return Ok(self.found(index, unit));
+        }
         let (name, model_unit) = unit::split(wanted);
         // The unit that the file gives: none where the header is, as a whole, the model's name.
         let file_unit = |header: &str| {

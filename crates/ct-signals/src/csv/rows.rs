@@ -5,7 +5,7 @@ use csv::{Reader, ReaderBuilder, StringRecord, Trim};
 use super::empty;
 use super::start::{Start, unit_of};
 use super::text::{check_header, is_before_header, line_number};
-use crate::{Error, ReadError, unit};
+use crate::{Error, ReadError, Unit, quoted, unit};
 
 /// Reads rows, and knows where each of them ends in the file.
 pub(super) struct Rows<'a> {
@@ -48,17 +48,32 @@ impl<'a> Rows<'a> {
             let row = line_number(self.text, self.end());
             check_header(self.file, row, &record)?;
             let mut names: Vec<String> = record.iter().map(str::to_string).collect();
-            if self.start.units && self.next(&mut record)? {
+            if self.start.units {
+                while self.next(&mut record)? && record.iter().all(str::is_empty) {}
                 for (name, below) in names.iter_mut().zip(&record) {
-                    let below = unit_of(below).unwrap_or_default();
-                    if !below.is_empty() && unit::split(name).1.is_empty() {
-                        *name = format!("{name} [{below}]");
-                    }
+                    *name = self.with_unit(name, unit_of(below).unwrap_or_default())?;
                 }
             }
             return Ok(HeaderRow { row, names });
         }
         Err(empty(self.file))
+    }
+
+    /// A name with the unit of the row below the header. What stands in brackets in the header and is no unit belongs to the name.
+    fn with_unit(&self, name: &str, below: &str) -> Result<String, Error> {
+        let bracketed = unit::split_bracket(name).map_or("", |(_, unit)| unit);
+        let own = Some(bracketed).filter(|unit| Unit::parse(unit).is_some());
+        match own {
+            _ if below.is_empty() => Ok(name.to_string()),
+            None => Ok(format!("{name} [{below}]")),
+            Some(own) if Unit::parse(own) == Unit::parse(below) => Ok(name.to_string()),
+            Some(_) => Err(Error::Read(ReadError::TwoUnits {
+                file: self.file.into(),
+                row: line_number(self.text, self.end()),
+                column: quoted(name),
+                below: quoted(below),
+            })),
+        }
     }
 
     /// The next row, if there is one.

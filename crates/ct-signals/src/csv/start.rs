@@ -5,10 +5,11 @@ use csv::StringRecord;
 use super::cells::says_missing;
 use super::rows::reader;
 use super::text::{delimiter, is_before_header};
-use crate::{TimestampReader, Unit};
+use crate::{MOST_COLUMNS, TimestampReader, Unit};
 
-/// Rows in which the header is looked for.
+/// Rows in which the header is looked for, and bytes.
 const LONGEST_PREAMBLE: usize = 60;
+const MOST_BYTES: usize = 1 << 20;
 
 /// Rows above the header with more numbers than words, at most: a longer table is a table of its own, and is not skipped.
 const MOST_NUMBERS_ABOVE: usize = 3;
@@ -19,17 +20,18 @@ pub(super) struct Start {
     /// Byte at which the lines before the header end.
     pub begin: usize,
     pub delimiter: u8,
-    /// Lines of text above the header.
+    /// Rows above the header.
     pub above: usize,
     /// The row below the header has units.
     pub units: bool,
 }
 
 impl Start {
-    /// Finds the header: the first row with as many fields as the first row of numbers below it. Where there is none it is the first row,
-    /// and what is wrong there is said of that row.
+    /// Finds the header: the first row of words with as many fields as the first row of numbers below it. Where there is none it is the
+    /// first row, and what is wrong there is said of that row.
     pub fn of(text: &str) -> Self {
         let usual = delimiter(text);
+        let text = beginning(text);
         let found = find(text, usual);
         if let Some((start, _)) = found.filter(|(start, _)| start.above == 0) {
             return start;
@@ -51,6 +53,17 @@ impl Start {
     }
 }
 
+/// Whole lines at the beginning of a text.
+fn beginning(text: &str) -> &str {
+    match text.as_bytes().get(..MOST_BYTES) {
+        None => text,
+        Some(first) => {
+            let end = first.iter().rposition(|byte| b"\r\n".contains(byte));
+            &text[..end.map_or(0, |end| end + 1)]
+        }
+    }
+}
+
 /// A row at the beginning of a file.
 struct Line {
     begin: usize,
@@ -59,6 +72,8 @@ struct Line {
     filled: usize,
     is_data: bool,
     is_units: bool,
+    /// No cell is a number, a date or the mark of a missing sample.
+    is_words: bool,
 }
 
 /// The header by one delimiter, with the number of its fields.
@@ -75,6 +90,9 @@ fn find(text: &str, delimiter: u8) -> Option<(Start, usize)> {
         if record.iter().all(str::is_empty) || lines.is_empty() && is_before_header(&record) {
             continue;
         }
+        if record.len() > MOST_COLUMNS {
+            return None;
+        }
         let line = Line::of(&record, begin);
         if line.is_data && !lines.is_empty() {
             if let Some(header) = header_above(&lines, &line) {
@@ -83,7 +101,7 @@ fn find(text: &str, delimiter: u8) -> Option<(Start, usize)> {
                     begin: above.begin,
                     delimiter,
                     above: header,
-                    units: lines.len() == header + 2 && lines[header + 1].is_units,
+                    units: lines.get(header + 1).is_some_and(|line| line.is_units),
                 };
                 return Some((start, above.fields));
             }
@@ -97,15 +115,18 @@ fn find(text: &str, delimiter: u8) -> Option<(Start, usize)> {
     None
 }
 
-/// The first of the rows directly above a row of numbers that have as many fields.
+/// The first of the rows directly above a row of numbers that have as many fields. The first row of a file may be a header of any content;
+/// a later one has words alone: it is no row in which samples are missing.
 fn header_above(lines: &[Line], data: &Line) -> Option<usize> {
     let like = |line: &&Line| line.fields == data.fields && !line.is_data;
-    let header = lines.len() - lines.iter().rev().take_while(like).count();
-    let header = header
-        + lines[header..]
-            .iter()
-            .position(|l| l.filled >= data.filled)?;
-    (data.fields >= 2).then_some(header)
+    let first = lines.len() - lines.iter().rev().take_while(like).count();
+    let names = |at: &usize| {
+        let line = &lines[*at];
+        line.filled >= data.filled && (*at == 0 || line.is_words && !line.is_units)
+    };
+    (first..lines.len())
+        .find(names)
+        .filter(|_| data.fields >= 2)
 }
 
 impl Line {
@@ -118,9 +139,24 @@ impl Line {
             fields: record.len(),
             filled: filled.map_or(0, |last| last + 1),
             is_data: 2 * numbers > used,
-            is_units: record.iter().all(|cell| unit_of(cell).is_some()) && 2 * used >= record.len(),
+            is_units: are_units(record) && 2 * used >= record.len(),
+            is_words: numbers == 0
+                && !record
+                    .iter()
+                    .any(|cell| !cell.is_empty() && says_missing(cell)),
         }
     }
+}
+
+/// Whether the cells are units, at least one of them of a quantity: `1,-,-` is a row in which samples are missing.
+fn are_units(record: &StringRecord) -> bool {
+    let is_number = |cell: &str| cell.parse::<f64>().is_ok();
+    record
+        .iter()
+        .all(|cell| unit_of(cell).is_some() && !is_number(cell))
+        && record
+            .iter()
+            .any(|cell| unit_of(cell).is_some_and(|unit| !unit.is_empty()))
 }
 
 fn is_number_or_date(cell: &str) -> bool {

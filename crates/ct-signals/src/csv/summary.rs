@@ -35,8 +35,11 @@ pub struct ReadSummary {
     pub file: String,
     /// Its encoding, where it is not UTF-8.
     pub encoding: Option<&'static str>,
-    /// Lines of text above the header, which are not used.
+    /// Rows above the header, which are not used.
     pub above_header: usize,
+    /// Line number of the header.
+    #[serde(skip)]
+    pub header_row: u64,
     /// Whether the units are in a row below the header.
     pub units_below_header: bool,
     /// Rows in use.
@@ -108,10 +111,13 @@ impl fmt::Display for ReadSummary {
         if let Some(encoding) = self.encoding {
             write!(f, "; read as {encoding}")?;
         }
-        match self.above_header {
-            0 => {}
-            1 => write!(f, "; the line above the header left out")?,
-            lines => write!(f, "; the {lines} lines above the header left out")?,
+        if self.above_header > 0 {
+            let above = rows(self.above_header);
+            write!(
+                f,
+                "; the header is row {}, {above} above it left out",
+                self.header_row
+            )?;
         }
         if self.units_below_header {
             write!(f, "; units from the row below the header")?;

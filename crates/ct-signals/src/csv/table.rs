@@ -20,6 +20,8 @@ use crate::{
 /// The columns in use, with where each row ends in the file.
 pub(super) struct Table {
     pub(super) start: Start,
+    /// Line number of the header.
+    pub(super) header: u64,
     pub(super) ends: Vec<usize>,
     /// \[s\], from zero of the column, or from the first row where these are dates.
     pub(super) time: Vec<f64>,
@@ -54,6 +56,7 @@ pub(super) fn read_table(
     let mut numbers = Numbers::new(delimiter != b',', options.strict, &columns.missing);
     let mut table = Table {
         start,
+        header: header.row,
         ends: Vec::new(),
         time: Vec::new(),
         values: vec![Vec::new(); channels],
@@ -238,6 +241,7 @@ impl Table {
             file: file.into(),
             encoding: *encoding,
             above_header: self.start.above,
+            header_row: self.header,
             units_below_header: self.start.units,
             rows: record.len(),
             first_row: self.ends.first().map_or(0, |&end| line_number(text, end)),

@@ -32,19 +32,25 @@ pub(super) fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<Decoded<'a>, Err
     };
     let (text, encoding) = if let Some((wide, unit)) = wide {
         let (units, _) = wide.as_chunks();
-        let units: Vec<u16> = units.iter().map(|pair| unit(*pair)).collect();
-        let text = String::from_utf16(&units).map_err(|_| not_text("binary data"))?;
+        let characters = char::decode_utf16(units.iter().map(|pair| unit(*pair)));
+        let text: Result<String, _> = characters.collect();
+        let text = text.map_err(|_| not_text("binary data"))?;
         (Cow::Owned(text), Some("UTF-16"))
     } else if let Ok(text) = std::str::from_utf8(bytes) {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         (Cow::Borrowed(text), None)
     } else {
+        if bytes.utf8_chunks().any(|chunk| !chunk.valid().is_ascii()) {
+            return Err(not_text("a mix of UTF-8 and another encoding"));
+        }
+        if bytes.iter().any(|byte| is_control(*byte)) {
+            return Err(not_text("binary data"));
+        }
         // The characters of Latin-1 are the first 256 of Unicode.
         let text = bytes.iter().copied().map(char::from).collect();
         (Cow::Owned(text), Some("Latin-1"))
     };
-    let is_binary = |byte: u8| byte == 0 || encoding == Some("Latin-1") && is_control(byte);
-    if text.bytes().any(is_binary) {
+    if text.as_bytes().contains(&0) {
         return Err(not_text("binary data"));
     }
     let mut begin = 0;

@@ -117,13 +117,17 @@ impl Times {
     }
 }
 
-/// Whether numbers look like dates as spreadsheets count them, in days since 1900: they begin in the years 1954 to 2119, and the step is whole
-/// seconds but no decimal number of few digits.
+/// Whether numbers look like dates as spreadsheets count them, in days since 1900: they begin in the years 2000 to 2064, and the step is one
+/// that clocks of loggers have.
 pub(super) fn looks_like_days(first: f64, step: f64) -> bool {
-    const YEARS: std::ops::Range<f64> = 20_000.0..80_000.0;
-    let is_whole = |number: f64| number >= 0.5 && (number - number.round()).abs() < 0.02;
-    // The digits that a spreadsheet writes let a step of 1 s err by a percent or two.
-    YEARS.contains(&first) && is_whole(86_400.0 * step) && step < 1.0 && !is_whole(1e4 * step)
+    const YEARS: std::ops::Range<f64> = 36_526.0..60_000.0;
+    const SECONDS: [f64; 15] = [
+        1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 900.0, 1200.0, 1800.0,
+        3600.0,
+    ];
+    // Spreadsheets write five digits of a day, which is 0.86 s.
+    let is_near = |seconds: &f64| (86_400.0 * step - seconds).abs() < 0.45;
+    YEARS.contains(&first) && SECONDS.iter().any(is_near)
 }
 
 /// The offset from UTC at the end of a date: `+01:00`.
@@ -214,10 +218,22 @@ mod tests {
 
     #[test]
     fn days_of_a_spreadsheet_are_told_from_seconds() {
-        for step in [1.0, 10.0, 60.0, 300.0, 3600.0, 2400.0] {
-            assert!(looks_like_days(45_260.3, step / 86_400.0), "{step} s");
+        for seconds in [1.0, 10.0, 60.0, 300.0, 3600.0] {
+            let days: f64 = seconds / 86_400.0;
+            assert!(looks_like_days(45_260.3, days), "{seconds} s");
+            let five_digits = (days * 1e5).round() / 1e5;
+            assert!(looks_like_days(45_260.3, five_digits), "{seconds} s");
         }
-        for step in [0.001, 0.05, 0.1, 0.25, 0.5, 1.0, 60.0] {
+        for step in [
+            0.001,
+            0.005,
+            0.05,
+            0.1,
+            0.25,
+            1.0 / 60.0,
+            1.0 / 30.0,
+            1.0 / 64.0,
+        ] {
             assert!(!looks_like_days(45_260.3, step), "{step}");
         }
         assert!(!looks_like_days(0.0, 1.0 / 86_400.0));

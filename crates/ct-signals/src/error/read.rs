@@ -183,6 +183,20 @@ pub enum ReadError {
         /// The time's header with its unit.
         header: String,
     },
+    /// The header and the row of units below it give a column two units.
+    #[error(
+        "{file}, row {row}, column \"{column}\": this row of units says {below}; delete the unit that is wrong"
+    )]
+    TwoUnits {
+        /// The path as it was given.
+        file: String,
+        /// Line number of the row of units.
+        row: u64,
+        /// The column's header.
+        column: String,
+        /// The unit of the row below.
+        below: String,
+    },
     /// A cell holds NaN or an infinity.
     #[error(
         "{file}, row {row}, column \"{column}\": \"{text}\" is not a finite number; replace it, or leave out --strict: then its sample is missing"

@@ -92,8 +92,8 @@ pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
 pub(crate) fn days(summary: &ReadSummary) -> Option<String> {
     summary.looks_like_days.then(|| {
         format!(
-            "{}, column \"{time}\": the times look like dates that a spreadsheet wrote as days, and are taken as seconds; write the unit into \
-             the header, \"{time} [d]\"",
+            "{}, column \"{time}\": the times are taken as seconds, and look like dates that a spreadsheet wrote as days; if they are, write the \
+             unit into the header, \"{time} [d]\"",
             summary.file,
             time = summary.time_header
         )

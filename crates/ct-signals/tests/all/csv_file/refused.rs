@@ -37,6 +37,11 @@ fn not_text() {
         b"\xff\xfe\x00\xd8t\x00",
         b"t,u,y\n\x000,1,2\n",
         b"t,u [\xb0C],y\n\x01\x02",
+        "t,u,Kühlung\n0,1,2 \u{b0}"
+            .as_bytes()
+            .strip_suffix(b"\xb0")
+            .unwrap(),
+        b"t,K\xc3\xbchlung,y\n0,1,\xb0\n",
     ] {
         let error = read_bytes(bytes, &Columns::default()).unwrap_err();
         assert!(

@@ -278,15 +278,23 @@ fn too_few_rows_for_the_parameters() {
 }
 
 #[test]
-fn units_in_a_row_of_their_own() {
+fn a_row_of_units_that_are_not_understood_or_not_those_of_the_header() {
     let rows = Rows::new().text();
     let (header, numbers) = rows.split_once('\n').unwrap();
-    for units in ["s,V,cm", "s,-,°C", "s,,m3/h"] {
+    let with = |units: &str| format!("{header}\n{units}\n{numbers}");
+    record_refused(
+        with("s,counts,cm"),
+        &[
+            "bad.csv, row 2: no cell is a number",
+            "write them into the header, \"t [s]\", and delete this row",
+        ],
+    );
+    for units in ["s,-,°C", "s,,m3/h"] {
         record_refused(
-            format!("{header}\n{units}\n{numbers}"),
+            with(units),
             &[
-                "bad.csv, row 2: no cell is a number",
-                "write them into the header, \"t [s]\", and delete this row",
+                "bad.csv, row 2, column \"y [cm]\"",
+                "this row of units says",
             ],
         );
     }

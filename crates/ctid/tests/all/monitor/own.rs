@@ -99,7 +99,7 @@ fn a_time_unit_of_the_model_file_is_that_of_the_estimates() {
     let estimates = |model: &str| -> Value {
         let place = own_place();
         place.write("m.toml", model);
-        let outcome = fed(&place, "--estimates", block_rows(1500, 1500));
+        let outcome = fed(&place, "--estimates", block_rows(3400, 3400));
         assert_eq!(outcome.code, Some(0), "{}", outcome.err);
         let events = events(&outcome.out);
         let estimates = events.iter().find(|e| e["event"] == "estimates");

@@ -166,8 +166,8 @@ impl Tanks {
         })
     }
 
-    /// The error on the quarters of the estimation record that a fit to the others does not know \[V\]; the rows before and behind are two
-    /// records.
+    /// The error in the cross-validation \[V\]: each quarter of the estimation record is left out of a fit to the rows before and after it,
+    /// which are two records.
     fn left_out(&self, text: &str, effects: &[&str]) -> Option<f64> {
         let record = std::fs::read_to_string(&self.records[0]).ok()?;
         let (header, rows) = record.split_once('\n')?;
@@ -182,7 +182,7 @@ impl Tanks {
             let at = |fold: usize| rows.len() * fold / FOLDS;
             let (from, to) = (at(fold), at(fold + 1));
             let mut fitted = Vec::new();
-            for (name, part) in [("before.csv", &rows[..from]), ("behind.csv", &rows[to..])] {
+            for (name, part) in [("before.csv", &rows[..from]), ("after.csv", &rows[to..])] {
                 if !part.is_empty() {
                     fitted.push(written(name, part)?);
                 }

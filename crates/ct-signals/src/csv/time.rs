@@ -217,7 +217,7 @@ mod tests {
     use super::looks_like_days;
 
     #[test]
-    fn days_of_a_spreadsheet_are_told_from_seconds() {
+    fn days_of_a_spreadsheet_are_distinguished_from_seconds() {
         for seconds in [1.0, 10.0, 60.0, 300.0, 3600.0] {
             let days: f64 = seconds / 86_400.0;
             assert!(looks_like_days(45_260.3, days), "{seconds} s");

@@ -82,14 +82,19 @@ pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
     let noted = summaries.iter().filter(worth);
     let notes = noted.map(|summary| look.paragraph("", &format!("note: {summary}")));
     let warnings = summaries.iter().flat_map(|summary| {
-        let lines = days(summary).into_iter().chain(isolated(summary));
+        let lines = faults(summary);
         lines.map(|line| look.warning(format!("warning: {line}")) + "\n")
     });
     notes.chain(warnings).collect()
 }
 
+/// Sentences about what may be wrong in a record that was read, with the corrections.
+pub(crate) fn faults(summary: &ReadSummary) -> impl Iterator<Item = String> {
+    days(summary).into_iter().chain(isolated(summary))
+}
+
 /// A sentence about times that look like days, with the correction.
-pub(crate) fn days(summary: &ReadSummary) -> Option<String> {
+fn days(summary: &ReadSummary) -> Option<String> {
     summary.looks_like_days.then(|| {
         format!(
             "{}, column \"{time}\": the times are taken as seconds, and look like dates that a spreadsheet wrote as days; if they are, write the \
@@ -101,7 +106,7 @@ pub(crate) fn days(summary: &ReadSummary) -> Option<String> {
 }
 
 /// Sentences about readings that are far from the others, with the correction.
-pub(crate) fn isolated(summary: &ReadSummary) -> impl Iterator<Item = String> {
+fn isolated(summary: &ReadSummary) -> impl Iterator<Item = String> {
     let far = summary.isolated.iter();
     far.map(|far| of_isolated(summary, far))
 }

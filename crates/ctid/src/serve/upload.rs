@@ -74,10 +74,7 @@ impl Upload {
         let (_, _, read) = self.read.as_ref()?;
         let (_, summary) = read.as_ref().ok()?;
         let note = (!summary.is_plain()).then(|| summary.to_string());
-        let warnings = input::days(summary)
-            .into_iter()
-            .chain(input::isolated(summary));
-        let said: Vec<String> = note.into_iter().chain(warnings).collect();
+        let said: Vec<String> = note.into_iter().chain(input::faults(summary)).collect();
         (!said.is_empty()).then(|| said.join("; "))
     }
 

@@ -120,7 +120,7 @@ fn a_row_of_units_below_the_header_gives_the_units() {
         assert_eq!(found.record.outputs[0].unit, "cm");
         assert_eq!(found.record.len(), rows().len() + rows_before);
     }
-    // What stands in the header's brackets and is no unit is a part of the name; two units are one too many.
+    // What stands in the header's brackets and is no unit is a part of the name; two different units are refused.
     let header = |text: String, header: &str| text.replace("Time;Pump;Level", header);
     let inlet = named("Time", "Pump_A", "Level (inlet)");
     let text = header(with("s;V;cm"), "Time [s];Pump_A;Level (inlet)");

@@ -51,7 +51,7 @@ impl Context<'_> {
             let doubtful = lacking.into_iter().filter(|lacking| {
                 node.gain_over(lacking) <= self.thresholds.bic_margin
                     || !self.beyond_chance((&node, &node.fit), (lacking, &lacking.fit))
-                    || self.rests_on_one_reading(&node, lacking, noise)
+                    || self.rests_on_few_readings(&node, lacking, noise)
                     || is_chance(lacking)
             });
             let Some(least) = doubtful.min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())) else {
@@ -96,26 +96,36 @@ impl Context<'_> {
         }
     }
 
-    /// Whether a set is better than one that lacks some of its effects because of a single reading: without this reading both sets, fitted
-    /// again, are equally good.
-    fn rests_on_one_reading(&self, node: &Node, lacking: &Node, noise: &Noise) -> bool {
+    /// Whether a set is better than one that lacks some of its effects because of a single reading: without it both sets, fitted again, are
+    /// equally good. The same for functions of time and the beginnings of the records, where the unknown past of the inputs and states acts.
+    fn rests_on_few_readings(&self, node: &Node, lacking: &Node, noise: &Noise) -> bool {
         let without = |node: &Node, records: &[Record]| {
             let setup = self.setup(&node.model).ok()?;
             let start = vec![node.fit.x.clone().into()];
             estimation::fit_from(&setup.against(records), start, noise, FINE).ok()
         };
-        let Some((series, row)) = self.telling_reading(node, lacking, noise) else {
+        let Some(falls) = self.falls(node, lacking, noise) else {
             return false;
         };
-        let mut records = self.problem.records.clone();
-        let outputs = records[0].outputs.len();
-        records[series / outputs].outputs[series % outputs].values[row] = f64::NAN;
-        let (Some(with), Some(lacks)) = (without(node, &records), without(lacking, &records))
-        else {
-            return false;
-        };
-        lacks.bic() - with.bic() <= self.thresholds.bic_margin
-            || !self.beyond_chance((node, &with), (lacking, &lacks))
+        let outputs = self.problem.records[0].outputs.len();
+        let mut new = node.added.iter().filter(|i| !lacking.added.contains(i));
+        let in_time = new.all(|&i| self.candidates[i].follows_time());
+        let telling = [
+            self.telling_reading(&falls, noise).map(|one| vec![one]),
+            in_time.then(|| self.telling_beginning(&falls)).flatten(),
+        ];
+        telling.into_iter().flatten().any(|readings| {
+            let mut records = self.problem.records.clone();
+            for (series, row) in readings {
+                records[series / outputs].outputs[series % outputs].values[row] = f64::NAN;
+            }
+            let (Some(with), Some(lacks)) = (without(node, &records), without(lacking, &records))
+            else {
+                return false;
+            };
+            lacks.bic() - with.bic() <= self.thresholds.bic_margin
+                || !self.beyond_chance((node, &with), (lacking, &lacks))
+        })
     }
 
     /// A set without the effects that depend on a single reading, compared by its simulation error; `None` if no effect stays that the
@@ -126,7 +136,7 @@ impl Context<'_> {
             let lacking = self.each_lacking(&node, base, &white);
             let mut resting = lacking.into_iter().filter(|lacking| {
                 node.gain_over(lacking) <= self.thresholds.bic_margin
-                    || self.rests_on_one_reading(&node, lacking, &white)
+                    || self.rests_on_few_readings(&node, lacking, &white)
             });
             let Some(less) = resting.next() else {
                 return Some(node);
@@ -136,14 +146,8 @@ impl Context<'_> {
         None
     }
 
-    /// The reading (series and row) that causes half or more of the improvement of a set over one that lacks some of its effects. With
-    /// coloured noise, a reading affects as many rows after it as the noise model has coefficients.
-    fn telling_reading(
-        &self,
-        node: &Node,
-        lacking: &Node,
-        noise: &Noise,
-    ) -> Option<(usize, usize)> {
+    /// The fall of the deviance at each reading of each series, from a set that lacks some effects to the one with them.
+    fn falls(&self, node: &Node, lacking: &Node, noise: &Noise) -> Option<Vec<Vec<f64>>> {
         let whitened = |of: &Node| {
             let setup = self.setup(&of.model).ok()?;
             Some(noise.whiten(&estimation::residuals(&setup, &of.fit.x)?))
@@ -162,7 +166,12 @@ impl Context<'_> {
                     .map(|fall| if fall.is_nan() { 0.0 } else { fall })
                     .collect::<Vec<f64>>()
             });
-        let falls: Vec<Vec<f64>> = falls.collect();
+        Some(falls.collect())
+    }
+
+    /// The reading (series and row) that causes half or more of the fall of the deviance. With coloured noise, a reading affects as many rows
+    /// after it as the noise model has coefficients.
+    fn telling_reading(&self, falls: &[Vec<f64>], noise: &Noise) -> Option<(usize, usize)> {
         let all: f64 = falls.iter().flatten().sum();
         let rows = noise.order() + 1;
         let at_each = falls.iter().enumerate().flat_map(|(series, falls)| {
@@ -172,6 +181,20 @@ impl Context<'_> {
         let (most, series, window) = at_each.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let row = window.max_by(|&a, &b| falls[series][a].total_cmp(&falls[series][b]))?;
         (most >= self.thresholds.telling_reading * all).then_some((series, row))
+    }
+
+    /// The readings (series and row) at the beginnings of the records, if they cause half or more of the fall of the deviance.
+    fn telling_beginning(&self, falls: &[Vec<f64>]) -> Option<Vec<(usize, usize)>> {
+        let rows = |falls: &Vec<f64>| (self.thresholds.beginning * falls.len() as f64) as usize;
+        let all: f64 = falls.iter().flatten().sum();
+        let first = falls.iter().flat_map(|falls| &falls[..rows(falls)]);
+        if first.sum::<f64>() < self.thresholds.telling_reading * all {
+            return None;
+        }
+        let of_each = falls.iter().enumerate();
+        let readings =
+            of_each.flat_map(|(series, falls)| (0..rows(falls)).map(move |row| (series, row)));
+        Some(readings.collect())
     }
 
     /// The set without each of the effects that the search added.

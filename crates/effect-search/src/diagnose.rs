@@ -51,14 +51,13 @@ pub fn diagnose(
     context.limit.begin(Phase::White);
     let white = Noise::white(problem.spec.outputs.len());
     let all: Vec<usize> = (0..context.candidates.len()).collect();
-    let few = options
-        .max_effects
-        .min(options.thresholds.effects_before_noise);
+    let most = options.max_effects.min(options.thresholds.beam_effects);
+    let few = most.min(options.thresholds.effects_before_noise);
     let mut by_error = context.grow(base.clone(), (&all, &[]), &white, few)?;
     let (mut noise, slow) = context.noise_of(&by_error.best)?;
     let full = by_error.best.added.len() >= base.added.len() + few;
-    if noise.order() == 0 && full && few < options.max_effects {
-        by_error = context.grow_on(by_error, &white, options.max_effects)?;
+    if noise.order() == 0 && full && few < most {
+        by_error = context.grow_on(by_error, &white, most)?;
         (noise, _) = context.noise_of(&by_error.best)?;
     }
     let mut by_error_sets = by_error.fitted.clone();
@@ -97,6 +96,13 @@ pub fn diagnose(
     let mut not_noise = context.not_noise(&confirmed, &own)?;
     let mut slowness = 1.0;
     let many = |set: &Node| set.added.len() >= base.added.len() + options.thresholds.many_effects;
+    // Functions of time beside other effects compensate for any slow disturbance.
+    let in_time = |set: &Node| {
+        let new = set.added[base.added.len()..].iter();
+        new.filter(|i| context.candidates[**i].follows_time())
+            .count()
+    };
+    let flexible = many(&confirmed) && in_time(&confirmed) > 1;
     if not_noise.is_some() || many(&confirmed) {
         context.limit.begin(Phase::Floating);
         let mut sets = by_error_sets;
@@ -104,7 +110,7 @@ pub fn diagnose(
         sets.extend([grown.best.clone(), confirmed.clone()]);
         let timeless = context.floating(&base, &sets, options.max_effects);
         context.limit.begin(Phase::Part);
-        if not_noise.is_some() {
+        if not_noise.is_some() || flexible {
             // The noise model describes unmodelled physics as noise, and if that physics is slow, simulations of prewhitened fits drift.
             // The sets are therefore compared by their simulation error.
             sets.extend(timeless);
@@ -116,6 +122,10 @@ pub fn diagnose(
                 slowness = context.slowness(&own.noise);
                 (grown.singles, grown.base) = by_error_singles;
                 grown.of_singles = grown.base.clone();
+                not_noise = context.not_noise(&confirmed, &own)?;
+            } else if flexible {
+                confirmed = grown.base.clone();
+                own = context.in_own_noise(&confirmed)?;
                 not_noise = context.not_noise(&confirmed, &own)?;
             }
         } else if let Some(better) = context.better_in_own_noise(timeless, &own) {
@@ -264,12 +274,8 @@ fn with_noise_model(
         return Ok((grown, Noise::white(noise.outputs())));
     }
     let all: Vec<usize> = (0..context.candidates.len()).collect();
-    let grown = context.grow(
-        begin,
-        (&all, &by_error.singles),
-        &noise,
-        options.max_effects,
-    )?;
+    let most = options.max_effects.min(options.thresholds.beam_effects);
+    let grown = context.grow(begin, (&all, &by_error.singles), &noise, most)?;
     // The best set of the search with white noise may also be better with this noise model.
     let other = context.refitted(&by_error.best, &noise, FINE);
     let mut grown = grown;

@@ -22,12 +22,27 @@ impl Context<'_> {
         let most = base.added.len() + max_effects;
         let mut fitted: Vec<Node> = Vec::new();
         for seed in self.seeds(base, sets, &white) {
-            let mut set = self.exchanged(seed, base, &timeless, &white, &mut fitted);
+            let all = seed.added.len();
+            let mut set = self.exchanged(
+                seed,
+                (base.added.len(), all),
+                &timeless,
+                &white,
+                &mut fitted,
+            );
             while set.added.len() < most && !self.limit.passed() {
                 let Some(more) = self.one_more(&set, &timeless, &white, &mut fitted) else {
                     break;
                 };
-                set = self.exchanged(more, base, &timeless, &white, &mut fitted);
+                // The last effect is already the best one beside the others.
+                let others = more.added.len() - 1;
+                set = self.exchanged(
+                    more,
+                    (base.added.len(), others),
+                    &timeless,
+                    &white,
+                    &mut fitted,
+                );
             }
             fitted.push(set);
         }
@@ -95,7 +110,8 @@ impl Context<'_> {
         begin
     }
 
-    /// The set with the one additional effect that lowers the criterion most.
+    /// The set with the one additional effect that lowers the criterion most. Beside several effects, the score of another one is often far
+    /// too low.
     fn one_more(
         &self,
         set: &Node,
@@ -104,25 +120,25 @@ impl Context<'_> {
         fitted: &mut Vec<Node>,
     ) -> Option<Node> {
         let mut trials = self.trials_among(set, of, white);
-        trials.retain(|trial| self.may_lower_the_criterion(trial));
-        trials.truncate(self.thresholds.refits);
+        trials.truncate(self.thresholds.first_refits);
         let children = self.refits(set, &trials, white);
         fitted.extend(children.iter().cloned());
         let best = children.into_iter().next()?;
         (best.gain_over(set) > self.thresholds.growth_margin).then_some(best)
     }
 
-    /// The set improved by swaps or removals of effects, one by one, while the criterion falls.
+    /// The set improved by swaps or removals of effects, one by one, while the criterion falls. `first`, `end`: the positions of the effects
+    /// with which it begins; after a swap these are all.
     fn exchanged(
         &self,
         mut set: Node,
-        base: &Node,
+        (first, mut end): (usize, usize),
         of: &[usize],
         white: &Noise,
         fitted: &mut Vec<Node>,
     ) -> Node {
-        let mut position = base.added.len();
-        while position < set.added.len() && !self.limit.passed() {
+        let mut position = first;
+        while position < end && !self.limit.passed() {
             let taken_out = set.added[position];
             let others: Vec<usize> = of.iter().copied().filter(|i| *i != taken_out).collect();
             let better = self.without(&set, position, white, ROUGH).ok();
@@ -144,7 +160,7 @@ impl Context<'_> {
             match better {
                 Some(better) => {
                     set = better;
-                    position = base.added.len();
+                    (position, end) = (first, set.added.len());
                 }
                 None => position += 1,
             }

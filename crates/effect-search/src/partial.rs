@@ -14,8 +14,8 @@
 //! [`Thresholds::partial_share`]: crate::Thresholds::partial_share
 //! [`Thresholds::partial_share_of_time`]: crate::Thresholds::partial_share_of_time
 //!
-//! A larger set is taken where each further effect leaves at most a half of what a smaller set leaves, or two thirds of the squared error
-//! in the cross-validation.
+//! A larger set is taken where each further effect leaves at most a half of what a smaller set leaves, or three quarters of the squared
+//! error in the cross-validation, and is significant beside the smaller set's effects.
 
 use ct_model::effects::{EffectParameter, Role};
 use ct_signals::{ArModel, Record};
@@ -32,10 +32,10 @@ struct Part {
     set: Node,
     /// The share of the error above the noise that it explains.
     share: f64,
-    /// The squared error of each output in the cross-validation; `None` if another rule rejects the set, or a simulation is not finite.
-    left_out: Option<Vec<f64>>,
-    /// Whether it is a partial explanation.
-    accepted: bool,
+    /// The squared error of each output in the cross-validation.
+    left_out: Vec<f64>,
+    /// The criterion with a noise model of its own, of limited memory.
+    bic: f64,
 }
 
 impl Context<'_> {
@@ -44,7 +44,15 @@ impl Context<'_> {
     pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<(Node, f64)>, Error> {
         let white = Noise::white(self.problem.records[0].outputs.len());
         let own_base = self.in_limited_noise(base)?;
-        let base_left_out = self.left_out_squares(base).ok().flatten();
+        let Some(base_left_out) = self.left_out_squares(base).ok().flatten() else {
+            return Ok(None);
+        };
+        let in_time = |i: &usize| self.candidates[*i].follows_time();
+        let is_alone_or_timeless = |set: &&Node| {
+            let new = &set.added[base.added.len()..];
+            new.len() == 1 || !new.iter().any(in_time)
+        };
+        let sets: Vec<&Node> = sets.iter().filter(is_alone_or_timeless).collect();
         let most = sets.iter().map(|set| self.size(set)).max().unwrap_or(0);
         let mut best: Option<Part> = None;
         let mut smaller: Vec<Part> = Vec::new();
@@ -52,38 +60,43 @@ impl Context<'_> {
             if self.limit.passed() {
                 break;
             }
-            let mut of_size: Vec<Node> = Vec::new();
+            let mut of_size: Vec<&Node> = Vec::new();
             for set in sets.iter().filter(|set| self.size(set) == size) {
                 if !of_size.iter().any(|known| same_set(known, set)) {
-                    of_size.push(set.clone());
+                    of_size.push(set);
                 }
             }
-            let fits = of_size
-                .into_par_iter()
-                .filter_map(|set| self.refitted(&set, &white, ROUGH).ok());
+            let fits = of_size.into_par_iter().filter_map(|set| {
+                if set.fit.noise.order() == 0 {
+                    return Some(set.clone());
+                }
+                self.refitted(set, &white, ROUGH).ok()
+            });
             let mut fits = best_first(fits.collect());
             fits.truncate(self.thresholds.partial_tested);
-            let tested: Vec<Part> = fits
+            let parts: Vec<Part> = fits
                 .into_par_iter()
                 .filter_map(|set| self.refitted(&set, &white, FINE).ok())
                 .filter_map(|set| {
-                    self.part((base, &own_base), base_left_out.as_deref(), set)
-                        .ok()
+                    let part = self.part((base, &own_base), &base_left_out, set);
+                    part.ok().flatten()
                 })
                 .collect();
             let says_more = |part: &&Part| {
-                smaller.iter().all(|less| {
+                smaller.iter().chain(&best).all(|less| {
                     let within = less.set.added.iter().all(|i| part.set.added.contains(i));
-                    !within || self.pays(part, less)
+                    let is_best = best
+                        .as_ref()
+                        .is_some_and(|best| same_set(&best.set, &less.set));
+                    !(within || is_best) || self.pays(part, less)
                 })
             };
-            let accepted = tested.iter().filter(|part| part.accepted);
-            let more = accepted.filter(says_more);
-            let more = more.filter(|part| best.as_ref().is_none_or(|less| self.pays(part, less)));
-            if let Some(part) = more.max_by(|a, b| a.share.total_cmp(&b.share)) {
+            let carried = |part: &Part| fall(&base_left_out, &part.left_out);
+            let more = parts.iter().filter(says_more);
+            if let Some(part) = more.max_by(|a, b| carried(a).total_cmp(&carried(b))) {
                 best = Some(part.clone());
             }
-            smaller.extend(tested);
+            smaller.extend(parts);
         }
         Ok(best.map(|best| (best.set, best.share)))
     }
@@ -91,14 +104,13 @@ impl Context<'_> {
     /// Whether each effect of a part in addition to those of a smaller one is worth it.
     fn pays(&self, part: &Part, less: &Part) -> bool {
         let further = (self.size(&part.set) - self.size(&less.set)) as i32;
-        let left = |of: f64| of.powi(further);
-        if 1.0 - part.share <= left(self.thresholds.partial_left) * (1.0 - less.share) {
-            return true;
-        }
-        let (Some(after), Some(before)) = (&part.left_out, &less.left_out) else {
+        // Near the noise, the share that is left is a difference of two nearly equal numbers.
+        if less.bic - part.bic <= self.thresholds.bic_margin * f64::from(further) {
             return false;
-        };
-        1.0 - fall(before, after) <= left(self.thresholds.partial_left_out)
+        }
+        let left = |of: f64| of.powi(further);
+        1.0 - part.share <= left(self.thresholds.partial_left) * (1.0 - less.share)
+            || 1.0 - fall(&less.left_out, &part.left_out) <= left(self.thresholds.partial_left_out)
     }
 
     /// Number of effects of a set; functions of time count twice, because they are more flexible.
@@ -107,48 +119,41 @@ impl Context<'_> {
         set.added.len() + set.added.iter().filter(in_time).count()
     }
 
-    /// A set with the share of the error above the noise that it explains, and, if no other rule rejects it, with its squared error in
-    /// the cross-validation. `base_left_out`: that of the base; `None` if one of its simulations is not finite.
+    /// A set as a partial explanation; `None` if it is none. `base_left_out`: the squared error of the base in the cross-validation.
     fn part(
         &self,
         (base, own_base): (&Node, &Fit),
-        base_left_out: Option<&[f64]>,
+        base_left_out: &[f64],
         set: Node,
-    ) -> Result<Part, Error> {
+    ) -> Result<Option<Part>, Error> {
         let own = self.in_limited_noise(&set)?;
         let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
         let share = explained(&base.fit, &set.fit, &floors);
         let new = &set.added[base.added.len()..];
         let in_time = new.iter().any(|&i| self.candidates[i].follows_time());
-        let plausible = share
-            >= if in_time {
-                self.thresholds.partial_share_of_time
-            } else {
-                self.thresholds.partial_share
-            }
-            && !(in_time && new.len() > 1)
+        let least = if in_time {
+            self.thresholds.partial_share_of_time
+        } else {
+            self.thresholds.partial_share
+        };
+        let mut innovations = own.noise.iter().zip(own_base.noise.iter());
+        let plausible = share >= least
             && !self.at_a_bound(&set, new)
             && (new.len() == 1 || own_base.bic() - own.bic() > self.thresholds.bic_margin)
-            && own
-                .noise
-                .iter()
-                .zip(own_base.noise.iter())
+            && innovations
                 .all(|(own, base)| own.sigma() <= self.thresholds.innovation_ratio * base.sigma());
-        let left_out = if plausible {
-            self.left_out_squares(&set)?
-        } else {
-            None
-        };
-        let accepted = left_out
-            .as_deref()
-            .zip(base_left_out)
-            .is_some_and(|(after, before)| fall(before, after) >= self.thresholds.carried_over);
-        Ok(Part {
+        if !plausible {
+            return Ok(None);
+        }
+        let left_out = self.left_out_squares(&set)?;
+        let left_out = left_out
+            .filter(|left_out| fall(base_left_out, left_out) >= self.thresholds.carried_over);
+        Ok(left_out.map(|left_out| Part {
             set,
             share,
             left_out,
-            accepted,
-        })
+            bic: own.bic(),
+        }))
     }
 
     /// The fit of a set with a noise model of its own residual, with limited memory.
@@ -225,9 +230,18 @@ impl Context<'_> {
             }
         }
         let setup = self.setup(&node.model)?;
-        let others = setup.against(&fitted);
+        let mut others = setup.against(&fitted);
+        if fold == 0 {
+            // Without the beginning of a record nothing determines its initial states.
+            let parameters: Vec<usize> = (0..setup.parameter_count()).collect();
+            others = others.with_free(&parameters);
+        }
         let white = Noise::white(setup.outputs());
         let fit = fit_from(&others, vec![node.fit.x.clone().into()], &white, ROUGH)?;
+        if self.limit.passed() {
+            // A fit that was cut short is still near the estimates from all readings.
+            return Ok(None);
+        }
         let Some(residuals) = estimation::residuals(&setup, &fit.x) else {
             return Ok(None);
         };

@@ -79,7 +79,7 @@ pub struct Options<'a> {
 impl Default for Options<'_> {
     fn default() -> Self {
         Self {
-            max_effects: 4,
+            max_effects: 6,
             starts: 12,
             seed: 1,
             simulate_loop: true,

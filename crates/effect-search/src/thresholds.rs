@@ -82,6 +82,8 @@ pub struct Thresholds {
     pub beam: usize,
     /// Number of best sets that are fitted to convergence before they are compared (1 or more). Chosen, for time.
     pub converged: usize,
+    /// Largest number of effects that a beam adds; the floating search adds more. Chosen, for time.
+    pub beam_effects: usize,
     /// Of two sets with as many effects only the better one is extended if the norm of the difference of their whitened residuals is below
     /// this share of the norm of the better one's (0 to 1). Chosen.
     pub same_residual: f64,
@@ -117,6 +119,9 @@ pub struct Thresholds {
     /// If one reading causes at least this share of an effect's fall of the deviance, the effect is fitted again without this reading and
     /// has to pass the acceptance test without it (0 to 1). Chosen.
     pub telling_reading: f64,
+    /// The same holds for a function of time and this share of each record at its beginning (0 to 1), where the unknown past of the inputs and
+    /// states acts. Chosen.
+    pub beginning: f64,
 
     // Residual tests.
     /// A residual is not noise if the p-value of a test, corrected for the number of tests of its kind, is below this (probability).
@@ -222,6 +227,7 @@ impl Thresholds {
         pair_refits: 8,
         kept_candidates: 40,
         beam: 4,
+        beam_effects: 4,
         converged: 6,
         same_residual: 0.15,
         beam_share: 0.6,
@@ -236,6 +242,7 @@ impl Thresholds {
         bic_margin: 6.0,
         false_claim: 0.003,
         telling_reading: 0.5,
+        beginning: 0.05,
         not_noise: 1e-4,
         predictable_input: 0.01,
         function_chance: 1e-3,
@@ -247,7 +254,7 @@ impl Thresholds {
         partial_share_of_time: 0.9,
         partial_tested: 6,
         partial_left: 0.5,
-        partial_left_out: 2.0 / 3.0,
+        partial_left_out: 0.75,
         carried_over: 0.3,
         folds: 4,
         innovation_ratio: 1.05,

@@ -110,17 +110,77 @@ impl From<linear_identification::Error> for Error {
             E::StabilityBorder { record }
             | E::ControllerMismatch { record, .. }
             | E::MissingReadings { record, .. }
-            | E::InRecord { record, .. }
-            | E::FirstFit { record, .. } => {
+            | E::InRecord { record, .. } => {
                 let what = message.strip_prefix(&format!("{record}: "));
                 Self::File {
                     what: what.unwrap_or(&message).to_owned(),
                     file: record,
                 }
             }
+            E::FirstFit { record, .. } => {
+                let what = message.strip_prefix(&format!("{record}: "));
+                let what = what.unwrap_or(&message);
+                Self::File {
+                    what: format!("{what}: --from and --to, or --resample"),
+                    file: record,
+                }
+            }
+            // The message begins with the setting's name, which is the name of the option.
+            E::NotPositive { .. } | E::Bandwidth { .. } | E::LevelsEstimated { .. } => {
+                Self::Usage(format!("--{message}"))
+            }
             _ => Self::Usage(message),
         }
     }
+}
+
+/// Where more time may help.
+const MORE_TIME: &str = "--effort thorough searches longer";
+
+impl From<missing_effect::design::NoExperiment> for Error {
+    fn from(refused: missing_effect::design::NoExperiment) -> Self {
+        use missing_effect::design::NoExperiment as No;
+        Self::Usage(match &refused {
+            // The message begins with the argument's name, which is the name of the option.
+            No::SameEffect { .. }
+            | No::Range { .. }
+            | No::TooWide { .. }
+            | No::Beyond { .. }
+            | No::Duration { .. }
+            | No::TooLong { .. }
+            | No::Slew { .. } => format!("--{refused}"),
+            No::NoRange { .. } | No::Overfull { .. } => format!("{refused} with --range"),
+            No::NoFit { effect } => needs(&refused.to_string(), effect),
+            No::OutOfTime => format!("{refused}: {MORE_TIME}"),
+            _ => refused.to_string(),
+        })
+    }
+}
+
+impl From<effect_search::design::NoExperiment> for Error {
+    fn from(refused: effect_search::design::NoExperiment) -> Self {
+        use effect_search::design::NoExperiment as No;
+        Self::Usage(match &refused {
+            // The message begins with the argument's name, which is the name of the option.
+            No::SameEffect { .. }
+            | No::UnknownInput { .. }
+            | No::Range { .. }
+            | No::Duration { .. }
+            | No::Slew { .. } => format!("--{refused}"),
+            No::NoRange { input, .. } => format!("{refused} with --input {input}=LOW..HIGH"),
+            No::InModel { effect } => {
+                format!("{refused}: `ctid remove '{effect}' --model M.toml`")
+            }
+            No::NoFit { effect } => needs(&refused.to_string(), effect),
+            No::OutOfTime => format!("{refused}: {MORE_TIME}"),
+            _ => refused.to_string(),
+        })
+    }
+}
+
+/// A message about an effect, with the command that says more of it.
+fn needs(message: &str, effect: &str) -> String {
+    format!("{message}; `ctid effects '{effect}'` says what it needs")
 }
 
 impl Error {

@@ -58,15 +58,16 @@ pub(crate) fn assemble(
     } = finding;
     let problem = context.problem;
     let outputs = &problem.records[0].outputs;
-    let level = |noise: &ArModel| {
+    let level = |(noise, rmse): (&ArModel, &f64)| {
         // A short record does not determine the variance of slow disturbances.
         if context.is_slow(&own.noise) {
             noise.sigma()
         } else {
-            noise.stationary_std()
+            // With a root near the unit circle, the variance of a noise model is far from that of the residual.
+            noise.stationary_std().min(*rmse)
         }
     };
-    let floors: Vec<f64> = own.noise.iter().map(level).collect();
+    let floors: Vec<f64> = own.noise.iter().zip(&own.rmse).map(level).collect();
     // All models of the error ladder are fitted on the measured inputs with white noise, each output scaled by its noise, so that their
     // errors are comparable. The last model is fitted again in its loop, with its own noise model, if its residual is noise.
     let white = Noise::white(outputs.len());
@@ -125,10 +126,10 @@ pub(crate) fn assemble(
     let others: Vec<String> = others.filter(|id| !rounded.contains(id)).cloned().collect();
     ranked.extend(rounded);
     ranked.extend(others);
-    let noise = outputs.iter().zip(own.noise.iter());
-    let noise = noise.map(|(output, noise)| NoiseFloor {
+    let noise = outputs.iter().zip(own.noise.iter()).zip(&floors);
+    let noise = noise.map(|((output, noise), level)| NoiseFloor {
         output: output.name.clone(),
-        level: level(noise),
+        level: *level,
         innovation: noise.sigma(),
         coefficients: noise.coefficients().to_vec(),
     });
@@ -234,27 +235,12 @@ fn step(
         let names = outputs.iter().map(|y| y.name.clone());
         names.zip(values.iter().copied()).collect()
     };
-    let errors = if node.fit.noise.order() > 0 {
-        node.fit.std_errors()
-    } else {
-        let robust: Result<Robust, _> = estimation::robust_with_memory(
-            &setup,
-            &node.fit,
-            context.thresholds.noise_order,
-            context.longest_memory(),
-        );
-        robust.map_or_else(|_| node.fit.std_errors(), |robust| robust.std_errors)
-    };
-    let scatter = context.scatter(node).sqrt();
-    let wider = |error: f64| error * scatter;
-    let errors: Vec<Option<f64>> = errors.into_iter().map(|e| e.map(wider)).collect();
-    let errors = if ControlLoop::widens(context.control_loop.as_ref()) {
-        let order = context.thresholds.noise_order;
-        let moved = moved_by_weighting(&setup, &node.fit, order, FINE)?;
-        widened(errors, &moved)
-    } else {
-        errors
-    };
+    let without_steps = context.without_hard_steps(node)?;
+    let judged = without_steps.as_ref().unwrap_or(node);
+    let errors = std_errors(context, judged)?;
+    let errors: Vec<Option<f64>> = (0..setup.names().len())
+        .map(|i| errors[position_in(judged, node, i)?])
+        .collect();
     let spec = node.spec();
     let units = spec.parameters.iter().map(|p| p.about.unit.clone());
     let states = problem
@@ -300,11 +286,49 @@ fn step(
         rmse_test_per_output: test.map(|test| named(&test.rmse)),
         weighted_rmse: weighted_rms(&node.fit.rmse, floors, &node.fit.samples_per_output),
         bic: node.fit.bic(),
-        not_determined: not_determined(&setup, &node.fit),
+        not_determined: not_determined(&context.setup(&judged.model)?, &judged.fit),
         starts: node.fit.starts,
         starts_agree: node.fit.agree,
         outputs: at_outputs,
         simulated,
         parameters: parameters.collect(),
     })
+}
+
+/// Standard errors of a set's estimates, for noise that is as long as a search accepts.
+fn std_errors(context: &Context, node: &Node) -> Result<Vec<Option<f64>>, Error> {
+    let setup = context.setup(&node.model)?;
+    let errors = if node.fit.noise.order() > 0 {
+        node.fit.std_errors()
+    } else {
+        let robust: Result<Robust, _> = estimation::robust_with_memory(
+            &setup,
+            &node.fit,
+            context.thresholds.noise_order,
+            context.longest_memory(),
+        );
+        robust.map_or_else(|_| node.fit.std_errors(), |robust| robust.std_errors)
+    };
+    let scatter = context.scatter(node).sqrt();
+    let wider = |error: f64| error * scatter;
+    let errors: Vec<Option<f64>> = errors.into_iter().map(|e| e.map(wider)).collect();
+    Ok(if ControlLoop::widens(context.control_loop.as_ref()) {
+        let order = context.thresholds.noise_order;
+        let moved = moved_by_weighting(&setup, &node.fit, order, FINE)?;
+        widened(errors, &moved)
+    } else {
+        errors
+    })
+}
+
+/// The position in the vector of one set of an entry of another one with the same states.
+fn position_in(set: &Node, of: &Node, entry: usize) -> Option<usize> {
+    let (parameters, others) = (&set.spec().parameters, &of.spec().parameters);
+    match entry.checked_sub(others.len()) {
+        Some(state) => Some(parameters.len() + state),
+        None => {
+            let name = &others[entry].about.name;
+            parameters.iter().position(|p| p.about.name == *name)
+        }
+    }
 }

@@ -32,14 +32,14 @@ pub enum Error {
         seconds: f64,
     },
     /// An effect of the model file that cannot act in the model.
-    #[error("effect {id} cannot act in this model: `ctid effects --model` lists what can")]
+    #[error("effect {id} cannot act in this model")]
     UnknownEffect {
         /// Identifier of the effect.
         id: String,
     },
     /// With an effect of the model file, the model cannot be simulated.
     #[error(
-        "with {id} the simulation fails from every start of its parameters: give better start values under [effect.\"{id}\"], or remove it"
+        "with {id} the simulation fails from every start of its parameters: give its parameters better start values, or remove it"
     )]
     NoStart {
         /// Identifier of the effect.

@@ -147,6 +147,21 @@ impl Context<'_> {
         all.min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost))
     }
 
+    /// A set that rounds without noise before the rounding, without its roundings; `None` for other sets. The residual of hard steps may vanish,
+    /// and says nothing of the estimates' errors; without the steps the rounding error is noise.
+    pub fn without_hard_steps(&self, node: &Node) -> Result<Option<Node>, Error> {
+        let is_hard = |rounding: &Rounding| node.fit.x[rounding.dither] == 0.0;
+        if !self.roundings(node).iter().any(is_hard) {
+            return Ok(None);
+        }
+        let rest = node.added.iter().copied();
+        let rest = rest
+            .filter(|&i| !is_rounding(&self.candidates[i]))
+            .collect();
+        let white = Noise::white(node.spec().outputs.len());
+        self.subset(node, rest, &white, FINE).map(Some)
+    }
+
     /// The rounding of each output in a set.
     fn roundings(&self, node: &Node) -> Vec<Rounding> {
         let at = |candidate: &Candidate, short: &str| {

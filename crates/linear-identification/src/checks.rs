@@ -39,13 +39,13 @@ pub(crate) fn moves(record: &Record, signal: &Channel) -> Result<(), Error> {
 }
 
 pub(crate) fn positive(
-    option: &'static str,
+    setting: &'static str,
     unit: &'static str,
     value: Option<f64>,
 ) -> Result<(), Error> {
     match value {
         Some(value) if !(value > 0.0 && value.is_finite()) => Err(Error::NotPositive {
-            option,
+            setting,
             unit,
             value,
         }),

@@ -1,4 +1,4 @@
-//! Errors of identification: every message names the record and the correction.
+//! Errors of identification: every message names the record or, first of all, the argument, and the correction.
 
 use ct_signals::quoted;
 use missing_effect::numbers::significant;
@@ -41,10 +41,10 @@ pub enum Error {
         value: f64,
     },
     /// A setting that has to be above 0.
-    #[error("{option} is {value}, but must be a number of {unit} above 0")]
+    #[error("{setting} is {value}, but must be a number of {unit} above 0")]
     NotPositive {
-        /// Option as typed.
-        option: &'static str,
+        /// The setting.
+        setting: &'static str,
         /// Its unit.
         unit: &'static str,
         /// What was given.
@@ -52,7 +52,7 @@ pub enum Error {
     },
     /// A bandwidth for which the filters pass nothing, or only rounding errors.
     #[error(
-        "--bandwidth is {found:e} 1/s, but must be from {low:.1e} to {high:.1e} 1/s for this record; leave out the option, and the program chooses it"
+        "bandwidth is {found:e} 1/s, but must be from {low:.1e} to {high:.1e} 1/s for this record; without it, it is chosen"
     )]
     Bandwidth {
         /// Given value, 1/s.
@@ -86,7 +86,7 @@ pub enum Error {
     NoSample,
     /// Too few rows are left for the filters of `ct-rls`.
     #[error(
-        "{:.0} % of the readings are missing, and only {left} of {rows} rows are far enough behind long gaps for the filters of --method ct-rls; --method srivc and fcloe leave single readings out",
+        "{:.0} % of the readings are missing, and only {left} of {rows} rows are far enough behind long gaps for the filters of ct-rls; srivc and fcloe leave single readings out",
         100.0 * .missing
     )]
     RowsLeft {
@@ -99,7 +99,7 @@ pub enum Error {
     },
     /// The recursion ended at a model that is unstable.
     #[error(
-        "the estimates at the end are those of an unstable model; try {}--method stabilized-oe, whose model is kept stable",
+        "the estimates at the end are those of an unstable model; try {}stabilized-oe, whose model is kept stable",
         or_lower(*.order)
     )]
     Unstable {
@@ -108,7 +108,7 @@ pub enum Error {
     },
     /// Only `fcloe` estimates levels.
     #[error(
-        "--levels estimated is of --method fcloe; {} takes them from the record: rest, mean or zero",
+        "levels estimated is of fcloe; {} takes them from the record: rest, mean or zero",
         .method.id()
     )]
     LevelsEstimated {
@@ -148,7 +148,7 @@ pub enum Error {
     },
     /// Too few rows are left for the filters of a regression.
     #[error(
-        "{record}: {:.0} % of the readings of \"{}\" are missing, and only {left} of {rows} rows are far enough behind long gaps for the filters of --method {}; --method srivc and fcloe leave single readings out",
+        "{record}: {:.0} % of the readings of \"{}\" are missing, and only {left} of {rows} rows are far enough behind long gaps for the filters of {}; srivc and fcloe leave single readings out",
         100.0 * .missing,
         quoted(.output),
         .method.id()
@@ -177,7 +177,7 @@ pub enum Error {
     },
     /// Rows are missing, and the first fit for the longest hold failed.
     #[error(
-        "{record}: rows or samples of the input are missing, and a first fit that says for how long the input may be held failed: {why}; choose a part with --from and --to, or put the record on a coarser grid with --resample"
+        "{record}: rows or samples of the input are missing, and a first fit that says for how long the input may be held failed: {why}; choose a part of the record, or put it on a coarser grid"
     )]
     FirstFit {
         /// Name of the record.
@@ -208,11 +208,11 @@ impl From<ct_rls::Error> for Error {
     }
 }
 
-/// First suggestion: `--order 2,0, or `; empty without a lower order.
+/// First suggestion: `order 2,0, or `; empty without a lower order.
 fn or_lower(order: Order) -> String {
     order
         .lower()
-        .map_or_else(String::new, |lower| format!("--order {lower}, or "))
+        .map_or_else(String::new, |lower| format!("order {lower}, or "))
 }
 
 #[cfg(test)]
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn a_lower_order_is_advised_where_there_is_one() {
-        assert_eq!(or_lower(Order { n: 3, m: 3 }), "--order 2,2, or ");
+        assert_eq!(or_lower(Order { n: 3, m: 3 }), "order 2,2, or ");
         assert_eq!(or_lower(Order { n: 1, m: 0 }), "");
     }
 }

@@ -25,7 +25,7 @@ pub enum Error {
     },
     /// A measured disturbance in the model.
     #[error(
-        "the model has a measured disturbance, and a row of the monitor has one input: delete disturbance under [known] and its column"
+        "the model has a measured disturbance, and a row of the monitor has one input: delete the disturbance and its column"
     )]
     Disturbance,
     /// A user's own model that depends on time explicitly.

@@ -229,10 +229,10 @@ impl Files {
         ) {
             return Error::file(&self.model, error.to_string());
         }
-        // The message of this error names the option.
-        if matches!(error, Design(_)) {
-            return error.into();
-        }
+        let error = match error {
+            Design(refused) => return refused.into(),
+            error => error,
+        };
         let what = error.to_string();
         let named = |path: &PathBuf| what.contains(&self.name_of(path));
         if self.data.iter().chain(&self.test).any(named) {

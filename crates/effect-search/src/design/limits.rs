@@ -28,13 +28,13 @@ pub struct Limits {
     pub seed: u64,
 }
 
-/// An experiment that cannot be proposed. The messages name the options of `ctid design`.
+/// An experiment that cannot be proposed. A message about an argument begins with its name: `duration`, `slew`, `input`, `between`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoExperiment {
     /// The two effects are the same.
     #[error(
-        "--between {effect} {effect}: an effect cannot be distinguished from itself; give two different effects"
+        "between {effect} {effect}: an effect cannot be distinguished from itself; give two different effects"
     )]
     SameEffect {
         /// The effect.
@@ -42,16 +42,14 @@ pub enum NoExperiment {
     },
     /// An effect that the model has.
     #[error(
-        "{effect} is in the model already, so that there is nothing to decide; `ctid remove '{effect}' --model M.toml` takes it out"
+        "{effect} is in the model already, so that there is nothing to decide; remove it from the model first"
     )]
     InModel {
         /// The effect.
         effect: String,
     },
     /// An effect could not be fitted.
-    #[error(
-        "{effect} cannot be fitted to these records; `ctid effects '{effect}'` says what it needs"
-    )]
+    #[error("{effect} cannot be fitted to these records")]
     NoFit {
         /// The effect.
         effect: String,
@@ -60,7 +58,7 @@ pub enum NoExperiment {
     #[error("the model has no input that an experiment could move")]
     NoInput,
     /// The model has no input of this name.
-    #[error("--input {name}: the model has no such input; it has {known}")]
+    #[error("input {name}: the model has no such input; it has {known}")]
     UnknownInput {
         /// Name as given.
         name: String,
@@ -68,7 +66,7 @@ pub enum NoExperiment {
         known: String,
     },
     /// The range's ends are in the wrong order, equal or not finite.
-    #[error("--input {input}={}..{}: the smaller value comes first, and they have to differ", shown(*low), shown(*high))]
+    #[error("input {input}={}..{}: the smaller value comes first, and they have to differ", shown(*low), shown(*high))]
     Range {
         /// The input.
         input: String,
@@ -78,7 +76,7 @@ pub enum NoExperiment {
         high: f64,
     },
     /// The input is constant in the records, and no range is given.
-    #[error("the records hold one value of {input}, {}, so its permitted range is not known; give --input {input}=LOW..HIGH", shown(*value))]
+    #[error("the records hold one value of {input}, {}, so its permitted range is not known; give a range", shown(*value))]
     NoRange {
         /// The input.
         input: String,
@@ -86,7 +84,7 @@ pub enum NoExperiment {
         value: f64,
     },
     /// Too few samples, or too many.
-    #[error("--duration {} s holds {samples} samples at one every {} s; give between {} and {} s", shown(*duration), shown(*interval), shown(*least as f64 * interval), shown(MOST_SAMPLES as f64 * interval))]
+    #[error("duration {} s holds {samples} samples at one every {} s; give between {} and {} s", shown(*duration), shown(*interval), shown(*least as f64 * interval), shown(MOST_SAMPLES as f64 * interval))]
     Duration {
         /// The length \[s\].
         duration: f64,
@@ -98,7 +96,7 @@ pub enum NoExperiment {
         interval: f64,
     },
     /// A slew limit that is too small.
-    #[error("--slew {} a second moves {input} by less than its range within {} s", shown(*slew), shown(*duration))]
+    #[error("slew {} a second moves {input} by less than its range within {} s", shown(*slew), shown(*duration))]
     Slew {
         /// The input.
         input: String,
@@ -109,7 +107,7 @@ pub enum NoExperiment {
     },
     /// The time limit has passed before there was a result.
     #[error(
-        "the time did not suffice to fit both effects and to try experiments; allow more (--effort thorough), or give fewer rows or a shorter --duration"
+        "the time did not suffice to fit both effects and to try experiments; allow more time, or give fewer rows or a shorter duration"
     )]
     OutOfTime,
 }

@@ -127,8 +127,8 @@ struct Run {
 
 /// Identifies. Errors: those of [`crate::identify()`] and of `fcloe`.
 pub(super) fn identify(record: &Record, request: &Request) -> Result<Identification, Error> {
-    positive("--memory", "s", request.memory)?;
-    positive("--bandwidth", "1/s", request.bandwidth)?;
+    positive("memory", "s", request.memory)?;
+    positive("bandwidth", "1/s", request.bandwidth)?;
     let Order { n, m } = request.order;
     let task = Task {
         record,

@@ -30,8 +30,8 @@ pub(crate) fn identify(record: &Record, request: &Request) -> Result<Identificat
     ct_signals::require_samples(std::slice::from_ref(record), order.parameters() + order.n)?;
     moves(record, &record.inputs[0])?;
     moves(record, &record.outputs[0])?;
-    positive("--memory", "s", request.memory)?;
-    positive("--bandwidth", "1/s", request.bandwidth)?;
+    positive("memory", "s", request.memory)?;
+    positive("bandwidth", "1/s", request.bandwidth)?;
 
     let (scaled, mut warnings) = Scaled::new(record, request);
     scaled.check_bandwidth()?;

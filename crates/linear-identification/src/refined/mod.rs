@@ -83,7 +83,7 @@ fn asked(records: &[Mended], request: &Request) -> (Structure, rivc::Settings) {
 
 /// Identifies from all records together.
 pub(super) fn identify(all: &[Mended], request: &Request) -> Result<Identification, Error> {
-    positive("--bandwidth", "1/s", request.bandwidth)?;
+    positive("bandwidth", "1/s", request.bandwidth)?;
     let first = all
         .first()
         .map(|mended| &mended.whole)

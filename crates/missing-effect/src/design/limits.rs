@@ -29,22 +29,20 @@ pub struct Limits {
     pub seed: u64,
 }
 
-/// An experiment that cannot be proposed. The messages name the options of `ctid design`.
+/// An experiment that cannot be proposed. A message about an argument begins with its name: `range`, `duration`, `slew`, `between`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoExperiment {
     /// The two effects are the same.
     #[error(
-        "--between {effect} {effect}: an effect cannot be distinguished from itself; give two different effects"
+        "between {effect} {effect}: an effect cannot be distinguished from itself; give two different effects"
     )]
     SameEffect {
         /// The effect.
         effect: String,
     },
     /// An effect could not be fitted.
-    #[error(
-        "{effect} cannot be fitted to these records; `ctid effects {effect}` says what it needs"
-    )]
+    #[error("{effect} cannot be fitted to these records")]
     NoFit {
         /// The effect.
         effect: String,
@@ -63,7 +61,7 @@ pub enum NoExperiment {
     },
     /// The range's ends are exchanged, equal or no numbers.
     #[error(
-        "--range {} {}: the smaller value comes first, and they have to differ",
+        "range {} {}: the smaller value comes first, and they have to differ",
         shown(*low),
         shown(*high)
     )]
@@ -75,7 +73,7 @@ pub enum NoExperiment {
     },
     /// The range is too large for the computation.
     #[error(
-        "--range {low:e} {high:e} goes beyond {most:.2e}, a million times what the records visited; stay within it"
+        "range {low:e} {high:e} goes beyond {most:.2e}, a million times what the records visited; stay within it"
     )]
     TooWide {
         /// Lower end as given.
@@ -87,7 +85,7 @@ pub enum NoExperiment {
     },
     /// The range exceeds the plant's limits.
     #[error(
-        "--range {} {} leaves {} .. {}, {what}; stay within it",
+        "range {} {} leaves {} .. {}, {what}; stay within it",
         shown(*low),
         shown(*high),
         shown(*from),
@@ -107,7 +105,7 @@ pub enum NoExperiment {
     },
     /// The applied signal is constant in the records, and no range is given.
     #[error(
-        "the records hold one {what} of {} alone, so its permitted range is not known; give --range",
+        "the records hold one {what} of {} alone, so its permitted range is not known; give a range",
         shown(*value)
     )]
     NoRange {
@@ -118,7 +116,7 @@ pub enum NoExperiment {
     },
     /// Too few samples.
     #[error(
-        "--duration {} s holds {samples} samples at one every {} s, and {needed} are needed to fit the parameters; give at least {} s",
+        "duration {} s holds {samples} samples at one every {} s, and {needed} are needed to fit the parameters; give at least {} s",
         shown(*duration),
         shown(*interval),
         at_least(*needed as f64 * interval)
@@ -135,7 +133,7 @@ pub enum NoExperiment {
     },
     /// More samples than any reasonable experiment has.
     #[error(
-        "--duration {} s holds {samples} samples at one every {} s, and {most} are the most that are searched; give a shorter one",
+        "duration {} s holds {samples} samples at one every {} s, and {most} are the most that are searched; give a shorter one",
         shown(*duration),
         shown(*interval)
     )]
@@ -150,7 +148,7 @@ pub enum NoExperiment {
         interval: f64,
     },
     /// Too slow to get anywhere.
-    #[error("--slew {} a second moves by {} in {} s, less than the {} of the range; give at least {}", shown(*slew), significant(*moves, 3), shown(*duration), significant(*span, 3), at_least(span / duration))]
+    #[error("slew {} a second moves by {} in {} s, less than the {} of the range; give at least {}", shown(*slew), significant(*moves, 3), shown(*duration), significant(*span, 3), at_least(span / duration))]
     Slew {
         /// Largest change in a second.
         slew: f64,
@@ -163,12 +161,12 @@ pub enum NoExperiment {
     },
     /// The time limit was reached before there was a result.
     #[error(
-        "the time did not suffice to fit both effects and to try experiments; allow more (--effort thorough), or give fewer rows or a shorter --duration"
+        "the time did not suffice to fit both effects and to try experiments; allow more time, or give fewer rows or a shorter duration"
     )]
     OutOfTime,
     /// Every tried sequence would overfill a tank.
     #[error(
-        "every experiment between {} and {} would lead above the tank_height of {}; give a --range that stays lower",
+        "every experiment between {} and {} would lead above the tank_height of {}; give a range that stays lower",
         shown(*low),
         shown(*high),
         shown(*height)

@@ -75,10 +75,10 @@ pub(super) fn learn(
         let silent = (0..free.len()).filter(|&i| fit.triangle.column_norm(i) <= f64::MIN_POSITIVE);
         let silent: Vec<&str> = silent.map(|i| setup.names()[free[i]].as_str()).collect();
         return Err(if silent.is_empty() {
-            "the rows determine the parameters only in combination: give one of them under [known], give a [prior], or move the inputs more".into()
+            "the rows determine the parameters only in combination: fix one of them, give a prior, or move the inputs more".into()
         } else {
             format!(
-                "{} has no effect on the readings: give it under [known], or move the inputs more",
+                "{} has no effect on the readings: fix it, or move the inputs more",
                 silent.join(", ")
             )
         });

@@ -24,7 +24,9 @@ fn a_rate_that_torques_change_is_a_speed() {
     }
     assert!(!has(&motor, "coulomb(i)") && !motor.iter().any(|id| id.starts_with("end_stop")));
     let spring = ids("mass-spring.mo");
-    assert!(has(&spring, "coulomb(v)") && has(&spring, "end_stop(v,x)"));
+    for id in ["coulomb(v)", "end_stop(v,x)", "cubic_stiffness(v,x)"] {
+        assert!(has(&spring, id), "{id} of {spring:?}");
+    }
     let fermenter = ids("bioreactor.mo");
     assert!(!fermenter.iter().any(|id| id.starts_with("coulomb")));
 }
@@ -75,4 +77,30 @@ fn a_stop_ends_the_motion_and_takes_energy() {
     };
     assert!(rebound(&elastic) < 0.17, "{}", rebound(&elastic));
     assert!(rebound(&damped) > 0.29, "{}", rebound(&damped));
+}
+
+/// A mass on a linear spring of 2 N/m, held by 3 N: with a cubic part it comes to rest where `2 x + f (x/w)^3 = 3`, on either side.
+#[test]
+fn a_spring_that_hardens_is_deflected_less() {
+    let driven = Driven::all().swap_remove(1);
+    let all = driven.candidates();
+    let cubic = all.iter().find(|c| c.id == "cubic_stiffness(v,s)").unwrap();
+    let model = Model::new(apply(&driven.spec, &[cubic]).unwrap());
+    let width = cubic.record_numbers["width"];
+    let rest = |load: f64, cubed: f64| {
+        let mut parameters = model.parameters();
+        let mut own = model.spec().parameters.iter();
+        let at = own.position(|p| p.about.name == cubic.parameters[0].name);
+        parameters[at.unwrap()] = cubed * width.powi(3);
+        let load = vec![load; 20_000];
+        let positions = model
+            .simulate(&parameters, 0.005, &[&load])
+            .unwrap()
+            .swap_remove(0);
+        positions[positions.len() - 1]
+    };
+    assert!((rest(3.0, 0.0) - 1.5).abs() < 1e-6);
+    // 2 x + x^3 = 3 at x = 1.
+    assert!((rest(3.0, 1.0) - 1.0).abs() < 1e-6, "{}", rest(3.0, 1.0));
+    assert!((rest(-3.0, 1.0) + 1.0).abs() < 1e-6, "{}", rest(-3.0, 1.0));
 }

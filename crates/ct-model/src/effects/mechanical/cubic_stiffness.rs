@@ -1,0 +1,27 @@
+//! `cubic_stiffness(v,x)`: a spring that hardens or softens.
+
+use crate::effects::{Effect, Place, Role, Starts};
+
+pub(super) const EFFECT: Effect = Effect {
+    id: "cubic_stiffness",
+    place: Place::MotionAndPosition,
+    text: r#"
+model cubic_stiffness
+  input Real x;
+  constant Real balance(unit="balance") = 1;
+  constant Real width(unit="signal") = 1;
+  parameter Real force(unit="balance", min=-100*balance, max=100*balance) = 0 "back to zero, at a position as large as the visited range";
+  output Real v(unit="balance") = -force*(x/width)^3;
+end cubic_stiffness;
+"#,
+    parameters: &[("force", Role::Size, Starts::Balances(&[0.3, -0.3]))],
+    physics: "A spring that hardens or softens: a force back to zero, or away from it, in proportion to the cube of the position.",
+    confused_with: &["end_stop(v,x)", "nonlinearity(y)", "varies_with(p,x)"],
+    confirm: "Load it with known weights on both sides of its position at rest, and plot the position against the weight.",
+    symptoms: &[
+        "hardening spring",
+        "softening spring",
+        "stiffer at large amplitude",
+        "resonance shifts with the amplitude",
+    ],
+};

@@ -131,10 +131,13 @@ impl Context<'_> {
         base_left_out: &[f64],
         set: Node,
     ) -> Result<Option<Part>, Error> {
+        let new = &set.added[base.added.len()..];
+        if self.at_a_bound(&set, new) {
+            return Ok(None);
+        }
         let own = self.in_limited_noise(&set)?;
         let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
         let share = explained(&base.fit, &set.fit, &floors);
-        let new = &set.added[base.added.len()..];
         let in_time = new.iter().any(|&i| self.candidates[i].follows_time());
         let least = if in_time {
             self.thresholds.partial_share_of_time
@@ -143,7 +146,6 @@ impl Context<'_> {
         };
         let mut innovations = own.noise.iter().zip(own_base.noise.iter());
         let plausible = share >= least
-            && !self.at_a_bound(&set, new)
             && (new.len() == 1 || own_base.bic() - own.bic() > self.thresholds.bic_margin)
             && innovations
                 .all(|(own, base)| own.sigma() <= self.thresholds.innovation_ratio * base.sigma());

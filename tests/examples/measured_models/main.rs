@@ -1,5 +1,5 @@
-//! Models that a user would write of the measured records in `../shared/real` beside the checkout: what `ctid diagnose` says is missing in
-//! them, against what is known of each record.
+//! Models that a user would write of the measured records in `../shared/real` and `../shared/data` beside the checkout: what `ctid diagnose`
+//! says is missing in them, against what is known of each record.
 //!
 //! ```sh
 //! cargo build --release && cargo run --release -p ctid-tests --example measured_models [-- --effort thorough] [PART-OF-A-NAME...]
@@ -122,6 +122,14 @@ fn errors(step: &Value, key: &str) -> Vec<f64> {
     })
 }
 
+/// The held-out errors of a model at its outputs, if its initial states are fitted to the first 50 rows, which are not scored.
+fn errors_50(step: &Value) -> Vec<f64> {
+    let outputs = step["outputs"].as_array();
+    let all = outputs.into_iter().flatten();
+    all.filter_map(|output| output["rmse_test_50"].as_f64())
+        .collect()
+}
+
 /// Right: all that is known to be missing is named, nothing else, and the error is as low as it was reached by hand. Partly: some of it.
 fn mark(case: &Case, found: &Value) -> Mark {
     let claims = ["effect", "undecided", "partial"].contains(&found["verdict"].as_str().unwrap());
@@ -166,21 +174,25 @@ fn shown(case: &Case, answer: &Answer, mark: Mark) -> String {
     let found = &answer.found;
     let groups = groups(found);
     let named: Vec<String> = groups.iter().map(|group| group.join("/")).collect();
-    let course = |key: &str| -> String {
+    let joined = |errors: &dyn Fn(&Value) -> Vec<f64>| -> String {
         let of_step = |step: &Value| {
-            let all = errors(step, key);
-            let all: Vec<String> = all.iter().map(|error| number(*error)).collect();
+            let all: Vec<String> = errors(step).iter().map(|error| number(*error)).collect();
             all.join(" ")
         };
         let all: Vec<String> = steps(found).iter().map(of_step).collect();
         all.join(" -> ")
     };
+    let course = |key: &str| joined(&|step| errors(step, key));
     let limit = case.error.map_or(String::new(), |limit| {
         format!(" (by hand {})", number(limit))
     });
     let held_out = match case.held_out.is_empty() {
         true => String::new(),
-        false => format!("\n    held out  {}", course("rmse_test_per_output")),
+        false => format!(
+            "\n    held out  {}\n    held out, 50 rows  {}",
+            course("rmse_test_per_output"),
+            joined(&|step| errors_50(step))
+        ),
     };
     format!(
         "{}: {mark:?}: {} {} ({:.1} s)\n    expected  {}\n    fitted    {}{limit}{held_out}",

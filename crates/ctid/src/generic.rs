@@ -113,6 +113,9 @@ pub(crate) fn place(place: Place) -> &'static str {
             "in the equation of a state x: v is added to its right-hand side; if v contains rate, this right-hand side, it takes its place"
         }
         Place::Motion => "in the equation of a speed x: v is added to its right-hand side",
+        Place::Spring => {
+            "in the equation of a speed that depends on its position x: v is added to its right-hand side"
+        }
         Place::MotionAndPosition => {
             "in the equation of a speed a, whose position is x: v is added to its right-hand side"
         }

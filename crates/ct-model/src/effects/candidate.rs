@@ -312,6 +312,7 @@ fn ports_of(
         Place::BalanceAndSurrounding
         | Place::Motion
         | Place::MotionAndPosition
+        | Place::Spring
         | Place::Level
         | Place::LevelReading
         | Place::TankAndTankBelow

@@ -87,7 +87,7 @@ impl Effect {
             Place::BalanceAndSurrounding => "T,Ta",
             Place::BalanceAndSignal => "x,u",
             Place::Motion => "v",
-            Place::MotionAndPosition => "v,x",
+            Place::MotionAndPosition | Place::Spring => "v,x",
             Place::Level => "h",
             Place::TankAndTankBelow => "h1,h2",
             Place::Terminal => "y,i",

@@ -12,7 +12,8 @@ pub(super) fn ports(spec: &ModelSpec, effect: &Effect) -> Vec<Port> {
     match effect.place {
         Place::BalanceAndSurrounding => thermal(spec),
         Place::Motion => speeds(spec).into_iter().map(Port::Balance).collect(),
-        Place::MotionAndPosition => positions(spec),
+        Place::MotionAndPosition => positions(spec).collect(),
+        Place::Spring => springs(spec),
         Place::Level => levels(spec).map(Port::Balance).collect(),
         Place::LevelReading => level_readings(spec),
         Place::TankAndTankBelow => tanks(spec),
@@ -87,14 +88,19 @@ fn speeds(spec: &ModelSpec) -> Vec<usize> {
 }
 
 /// Speeds, each with its position.
-fn positions(spec: &ModelSpec) -> Vec<Port> {
+fn positions(spec: &ModelSpec) -> impl Iterator<Item = Port> {
     let speeds = speeds(spec);
     let states = 0..spec.states.len();
     let pairs = states.filter_map(|x| Some((spec.speed_of(x)?, x)));
     pairs
-        .filter(|(v, _)| speeds.contains(v))
+        .filter(move |(v, _)| speeds.contains(v))
         .map(|(v, x)| Port::BalanceAnd(v, Variable::State(x)))
-        .collect()
+}
+
+/// Speeds in whose equation a force depends on the position.
+fn springs(spec: &ModelSpec) -> Vec<Port> {
+    let is_spring = |port: &Port| matches!(*port, Port::BalanceAnd(v, x) if spec.depends_on(v, x));
+    positions(spec).filter(is_spring).collect()
 }
 
 /// States of this quantity are levels of tanks, whatever the unit of their sensor.

@@ -30,6 +30,8 @@ pub enum Place {
     Motion,
     /// The equation of a speed `a`, and its position `x`.
     MotionAndPosition,
+    /// The equation of a speed `a` that depends on its position `x`.
+    Spring,
     /// The equation of a level `x`.
     Level,
     /// Between a level and its reading: the effect of `y` supplies the reading.

@@ -46,7 +46,9 @@ pub(super) fn candidate(
         Port::BalanceAnd(x, a) if effect.place == Place::BalanceAndSignal => {
             (vec![("x", a)], vec![(x, false)])
         }
-        Port::BalanceAnd(v, x) if effect.place == Place::MotionAndPosition => {
+        Port::BalanceAnd(v, x)
+            if matches!(effect.place, Place::MotionAndPosition | Place::Spring) =>
+        {
             (vec![("x", x), ("a", state(v))], vec![(v, false)])
         }
         Port::BalanceAnd(x, a) => (vec![("x", state(x)), ("a", a)], vec![(x, false)]),

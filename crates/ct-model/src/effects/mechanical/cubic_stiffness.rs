@@ -4,7 +4,7 @@ use crate::effects::{Effect, Place, Role, Starts};
 
 pub(super) const EFFECT: Effect = Effect {
     id: "cubic_stiffness",
-    place: Place::MotionAndPosition,
+    place: Place::Spring,
     text: r#"
 model cubic_stiffness
   input Real x;

@@ -27,6 +27,15 @@ fn a_rate_that_torques_change_is_a_speed() {
     for id in ["coulomb(v)", "end_stop(v,x)", "cubic_stiffness(v,x)"] {
         assert!(has(&spring, id), "{id} of {spring:?}");
     }
+    // A weight that falls has no spring.
+    let weight = ModelSpec::parse(
+        "model Ball output Real h(unit=\"m\", start=9); Real v(unit=\"m/s\"); parameter Real g(unit=\"m/s2\") = 9.81;
+         equation der(h) = v; der(v) = -g; end Ball;",
+    )
+    .unwrap();
+    let all = candidates(&weight, &Visited::nominal(&weight));
+    assert!(all.iter().any(|c| c.id == "end_stop(v,h)"));
+    assert!(!all.iter().any(|c| c.id.starts_with("cubic_stiffness")));
     let fermenter = ids("bioreactor.mo");
     assert!(!fermenter.iter().any(|id| id.starts_with("coulomb")));
 }

@@ -66,8 +66,8 @@ fn the_cascaded_tanks_give_up_their_effects() {
     assert!(*held_out.last().unwrap() <= 0.23, "{held_out:?}");
 }
 
-/// From the same model as a text, without a time limit: the error on the test record is below that of the best published model of the physics
-/// (0.191 V), whether the initial states are fitted to its first 5 or 50 rows.
+/// From the same model as a text, without a time limit: the error on the test record is below 0.19 V, whether the initial states are fitted
+/// to its first 5 or 50 rows.
 #[test]
 #[cfg_attr(
     not(measured_records),

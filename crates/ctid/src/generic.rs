@@ -114,7 +114,7 @@ pub(crate) fn place(place: Place) -> &'static str {
         }
         Place::Motion => "in the equation of a speed x: v is added to its right-hand side",
         Place::Spring => {
-            "in the equation of a speed that depends on its position x: v is added to its right-hand side"
+            "in the equation of a speed that contains its position x: v is added to its right-hand side"
         }
         Place::MotionAndPosition => {
             "in the equation of a speed a, whose position is x: v is added to its right-hand side"

@@ -108,8 +108,9 @@ impl Context<'_> {
             return false;
         };
         let outputs = self.problem.records[0].outputs.len();
-        let mut new = node.added.iter().filter(|i| !lacking.added.contains(i));
-        let in_time = new.all(|&i| self.candidates[i].follows_time());
+        let new = node.added.iter().copied();
+        let new: Vec<usize> = new.filter(|i| !lacking.added.contains(i)).collect();
+        let in_time = self.in_time(&new) == new.len();
         let telling = [
             self.telling_reading(&falls, noise).map(|one| vec![one]),
             in_time.then(|| self.telling_beginning(&falls)).flatten(),
@@ -214,6 +215,21 @@ impl Context<'_> {
             self.thresholds.noise_order,
             FINE,
         )?)
+    }
+
+    /// Standard deviation of the noise at each output, of a fit with a noise model of its own.
+    pub fn noise_levels(&self, own: &Fit) -> Vec<f64> {
+        let is_slow = self.is_slow(&own.noise);
+        let level = |(noise, rmse): (&ArModel, &f64)| {
+            // A short record does not determine the variance of slow disturbances; with a root near the unit circle, the variance of a noise
+            // model is far from that of the residual.
+            if is_slow {
+                noise.sigma()
+            } else {
+                noise.stationary_std().min(*rmse).max(noise.sigma())
+            }
+        };
+        own.noise.iter().zip(&own.rmse).map(level).collect()
     }
 
     /// The noise model of a set's residual, with a memory limited to a share of the longest record, because a root near one would absorb

@@ -58,16 +58,7 @@ pub(crate) fn assemble(
     } = finding;
     let problem = context.problem;
     let outputs = &problem.records[0].outputs;
-    let level = |(noise, rmse): (&ArModel, &f64)| {
-        // A short record does not determine the variance of slow disturbances.
-        if context.is_slow(&own.noise) {
-            noise.sigma()
-        } else {
-            // With a root near the unit circle, the variance of a noise model is far from that of the residual.
-            noise.stationary_std().min(*rmse)
-        }
-    };
-    let floors: Vec<f64> = own.noise.iter().zip(&own.rmse).map(level).collect();
+    let floors = context.noise_levels(own);
     // All models of the error ladder are fitted on the measured inputs with white noise, each output scaled by its noise, so that their
     // errors are comparable. The last model is fitted again in its loop, with its own noise model, if its residual is noise.
     let white = Noise::white(outputs.len());
@@ -235,7 +226,7 @@ fn step(
         let names = outputs.iter().map(|y| y.name.clone());
         names.zip(values.iter().copied()).collect()
     };
-    let without_steps = context.without_hard_steps(node)?;
+    let without_steps = context.without_hard_steps(node).ok().flatten();
     let judged = without_steps.as_ref().unwrap_or(node);
     let errors = std_errors(context, judged)?;
     let errors: Vec<Option<f64>> = (0..setup.names().len())

@@ -6,8 +6,8 @@
 //! 3. The effects of the best set that pass the acceptance test are kept: with one common noise model first, then with a noise model from
 //!    each model's own residual.
 //! 4. Residual tests check whether the residual is noise. If it is not, or if many effects were needed, sets of effects that do not depend
-//!    on time are searched once more; if the residual is still not noise, the set that explains the largest part of the error is selected
-//!    from all sets.
+//!    on time are searched once more; if the residual is still not noise, or several of the effects depend on time only, a set that explains
+//!    a large part of the error is selected from all sets.
 //! 5. The result of the residual tests determines the verdict; effects that the data cannot distinguish form groups. Rounding that the
 //!    readings show is added without a test: the criterion hardly falls.
 
@@ -96,13 +96,9 @@ pub fn diagnose(
     let mut not_noise = context.not_noise(&confirmed, &own)?;
     let mut slowness = 1.0;
     let many = |set: &Node| set.added.len() >= base.added.len() + options.thresholds.many_effects;
-    // Functions of time beside other effects compensate for any slow disturbance.
-    let in_time = |set: &Node| {
-        let new = set.added[base.added.len()..].iter();
-        new.filter(|i| context.candidates[**i].follows_time())
-            .count()
-    };
-    let flexible = many(&confirmed) && in_time(&confirmed) > 1;
+    // Several functions of time compensate for any slow disturbance.
+    let flexible = many(&confirmed) && context.in_time(&confirmed.added[base.added.len()..]) > 1;
+    let mut reduced = false;
     if not_noise.is_some() || many(&confirmed) {
         context.limit.begin(Phase::Floating);
         let mut sets = by_error_sets;
@@ -110,7 +106,29 @@ pub fn diagnose(
         sets.extend([grown.best.clone(), confirmed.clone()]);
         let timeless = context.floating(&base, &sets, options.max_effects);
         context.limit.begin(Phase::Part);
-        if not_noise.is_some() || flexible {
+        let better = if not_noise.is_none() {
+            context.better_in_own_noise(timeless.clone(), &own)
+        } else {
+            None
+        };
+        if let Some(better) = better {
+            // So many effects may imitate other effects, and the noise model may describe the rest of the error.
+            noise = better.fit.noise.clone();
+            if let Ok(bare) = context.refitted(&grown.base, &noise, FINE) {
+                grown.base = bare;
+            }
+            let refitted = context.refitted(&better, &noise, FINE);
+            confirmed = refitted.unwrap_or_else(|_| better.clone());
+            let size = confirmed.added.len();
+            confirmed = context.confirm(confirmed, &grown.base, &noise)?;
+            // The deviance of a fit with its own noise model is lower than that of a fit with the same model given.
+            own = if confirmed.added.len() == size {
+                better.fit
+            } else {
+                context.in_own_noise(&confirmed)?
+            };
+            not_noise = context.not_noise(&confirmed, &own)?;
+        } else if not_noise.is_some() || flexible {
             // The noise model describes unmodelled physics as noise, and if that physics is slow, simulations of prewhitened fits drift.
             // The sets are therefore compared by their simulation error.
             sets.extend(timeless);
@@ -122,22 +140,15 @@ pub fn diagnose(
                 slowness = context.slowness(&own.noise);
                 (grown.singles, grown.base) = by_error_singles;
                 grown.of_singles = grown.base.clone();
+                reduced = not_noise.is_none();
                 not_noise = context.not_noise(&confirmed, &own)?;
-            } else if flexible {
-                confirmed = grown.base.clone();
-                own = context.in_own_noise(&confirmed)?;
-                not_noise = context.not_noise(&confirmed, &own)?;
+            } else if flexible && !context.limit.passed() {
+                let bare = context.in_own_noise(&grown.base)?;
+                let reason = context.not_noise(&grown.base, &bare)?;
+                if reason.is_some() {
+                    (confirmed, own, not_noise) = (grown.base.clone(), bare, reason);
+                }
             }
-        } else if let Some(better) = context.better_in_own_noise(timeless, &own) {
-            // So many effects may imitate other effects, and the noise model may describe the rest of the error.
-            noise = better.fit.noise.clone();
-            if let Ok(bare) = context.refitted(&grown.base, &noise, FINE) {
-                grown.base = bare;
-            }
-            // The deviance of a fit with its own noise model is lower than that of a fit with the same model given.
-            own = better.fit.clone();
-            confirmed = context.refitted(&better, &noise, FINE).unwrap_or(better);
-            not_noise = context.not_noise(&confirmed, &own)?;
         }
     }
     let some = confirmed.added.len() > grown.base.added.len();
@@ -164,13 +175,13 @@ pub fn diagnose(
     let many = many(&confirmed);
     // The noise level: the standard deviation of the whole residual if it is noise, otherwise that of its innovations.
     let floors: Vec<f64> = if whole {
-        own.noise.iter().map(ArModel::stationary_std).collect()
+        context.noise_levels(&own)
     } else {
         own.noise.iter().map(ArModel::sigma).collect()
     };
     let share = found.then(|| explained(&base.fit, &confirmed.fit, &floors));
     let verdict_of = |groups: &[Vec<usize>]| match (found, &not_noise, share) {
-        (true, None, _) if open || many => Verdict::Partial,
+        (true, None, _) if open || many || reduced => Verdict::Partial,
         (false, None, _) => Verdict::Adequate,
         (false, Some(_), _) => Verdict::Unexplained,
         (true, Some(_), Some(share)) if share >= options.thresholds.partial_share => {

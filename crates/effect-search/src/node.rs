@@ -261,6 +261,12 @@ impl Context<'_> {
         added.iter().any(|&i| first(i) == first(candidate))
     }
 
+    /// How many of these effects depend on time only.
+    pub fn in_time(&self, effects: &[usize]) -> usize {
+        let follows = |i: &&usize| self.candidates[**i].follows_time();
+        effects.iter().filter(follows).count()
+    }
+
     /// Positions of the candidates that are no functions of time: functions of time compensate for any slow disturbance, and leave nothing
     /// for other effects.
     pub fn timeless(&self) -> Vec<usize> {

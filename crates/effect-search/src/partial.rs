@@ -1,11 +1,11 @@
-//! Partial explanation: the largest part of the error that effects explain, if the residual is slower than noise that a search can model.
+//! Partial explanation: effects that explain a large part of the error, if the residual is slower than noise that a search can model.
 //!
 //! Measured records hold several causes, and disturbances that are nearly integrated. A noise model with a long memory uses changes from
 //! sample to sample only: it treats every slow effect as noise, and a fit with this weighting lets the simulation drift. In this case sets
 //! are compared by their simulation error. A set is a partial explanation if
 //! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an
-//!   effect that follows time alone, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and
-//!   without others beside it, as such a set can then fit any disturbance;
+//!   effect that depends on time only, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and
+//!   alone, because several such effects fit any disturbance;
 //! - several effects are significant if each model has a noise model of its own, of limited memory;
 //! - it predicts the next sample as well as the model without it, each beside a noise model of its own;
 //! - what is fitted to three quarters of the records predicts the fourth (cross-validation);
@@ -19,12 +19,16 @@
 
 use ct_model::effects::{EffectParameter, Role};
 use ct_signals::{ArModel, Record};
-use estimation::{Fit, Noise, fit_from, prewhitened};
+use estimation::{Fit, Noise, fit_from, linearise, prewhitened};
+use greybox::ModelSetup;
 use rayon::prelude::*;
 
 use crate::Error;
 use crate::node::{Context, FINE, Node, ROUGH};
 use crate::search::{best_first, same_set};
+
+/// An initial state is determined by the readings after the beginning if its influence on them is at least this share of that on all.
+const REMEMBERED: f64 = 0.1;
 
 /// A set as a partial explanation.
 #[derive(Clone)]
@@ -39,18 +43,18 @@ struct Part {
 }
 
 impl Context<'_> {
-    /// The set that explains the largest part of the error, fitted with white noise, and that part; `None` if no set is a partial
-    /// explanation. `sets`: fitted with any noise model; `base`: fitted with white noise.
+    /// The set that explains a large part of the error, fitted with white noise, and that part: of those with as many effects the one with the
+    /// smallest error in the cross-validation. `None` if no set is a partial explanation. `sets`: fitted with any noise model; `base`: fitted
+    /// with white noise.
     pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<(Node, f64)>, Error> {
         let white = Noise::white(self.problem.records[0].outputs.len());
         let own_base = self.in_limited_noise(base)?;
         let Some(base_left_out) = self.left_out_squares(base).ok().flatten() else {
             return Ok(None);
         };
-        let in_time = |i: &usize| self.candidates[*i].follows_time();
         let is_alone_or_timeless = |set: &&Node| {
             let new = &set.added[base.added.len()..];
-            new.len() == 1 || !new.iter().any(in_time)
+            new.len() == 1 || self.in_time(new) == 0
         };
         let sets: Vec<&Node> = sets.iter().filter(is_alone_or_timeless).collect();
         let most = sets.iter().map(|set| self.size(set)).max().unwrap_or(0);
@@ -83,7 +87,7 @@ impl Context<'_> {
                 })
                 .collect();
             let says_more = |part: &&Part| {
-                smaller.iter().chain(&best).all(|less| {
+                smaller.iter().all(|less| {
                     let within = less.set.added.iter().all(|i| part.set.added.contains(i));
                     let is_best = best
                         .as_ref()
@@ -120,8 +124,7 @@ impl Context<'_> {
 
     /// Number of effects of a set; functions of time count twice, because they are more flexible.
     fn size(&self, set: &Node) -> usize {
-        let in_time = |&&i: &&usize| self.candidates[i].follows_time();
-        set.added.len() + set.added.iter().filter(in_time).count()
+        set.added.len() + self.in_time(&set.added)
     }
 
     /// A set as a partial explanation; `None` if it is none. `base_left_out`: the squared error of the base in the cross-validation.
@@ -138,8 +141,7 @@ impl Context<'_> {
         let own = self.in_limited_noise(&set)?;
         let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
         let share = explained(&base.fit, &set.fit, &floors);
-        let in_time = new.iter().any(|&i| self.candidates[i].follows_time());
-        let least = if in_time {
+        let least = if self.in_time(new) > 0 {
             self.thresholds.partial_share_of_time
         } else {
             self.thresholds.partial_share
@@ -237,16 +239,16 @@ impl Context<'_> {
             }
         }
         let setup = self.setup(&node.model)?;
-        let mut others = setup.against(&fitted);
-        if fold == 0 {
-            // Without the beginning of a record nothing determines its initial states.
-            let parameters: Vec<usize> = (0..setup.parameter_count()).collect();
-            others = others.with_free(&parameters);
-        }
         let white = Noise::white(setup.outputs());
+        let others = setup.against(&fitted);
+        let others = if fold == 0 {
+            without_forgotten_states((&setup, others), &node.fit.x, &white)
+        } else {
+            others
+        };
         let fit = fit_from(&others, vec![node.fit.x.clone().into()], &white, ROUGH)?;
-        if self.limit.passed() {
-            // A fit that was cut short is still near the estimates from all readings.
+        // A fit that was cut short is still near the estimates from all readings.
+        if self.limit.leaves_out("parts of the cross-validation") {
             return Ok(None);
         }
         let Some(residuals) = estimation::residuals(&setup, &fit.x) else {
@@ -260,6 +262,26 @@ impl Context<'_> {
         }
         Ok(Some(squares))
     }
+}
+
+/// A setup without the beginnings of the records, in which initial states that the other readings hardly depend on keep their values: a fit
+/// may end at any value of them. `whole`: with all readings.
+fn without_forgotten_states<'a>(
+    (whole, others): (&ModelSetup<'a>, ModelSetup<'a>),
+    x: &[f64],
+    white: &Noise,
+) -> ModelSetup<'a> {
+    let norms = |setup: &ModelSetup| linearise(setup, x, white);
+    let (Some(all), Some(left)) = (norms(whole), norms(&others)) else {
+        return others;
+    };
+    let is_determined = |column: &usize| {
+        whole.free()[*column] < whole.parameter_count()
+            || left.column_norm(*column) > REMEMBERED * all.column_norm(*column)
+    };
+    let columns = (0..whole.free().len()).filter(is_determined);
+    let kept: Vec<usize> = columns.map(|column| whole.free()[column]).collect();
+    others.with_free(&kept)
 }
 
 /// The relative fall of squared errors: of several outputs, that of their geometric mean, as in a likelihood with a variance of each

@@ -111,7 +111,7 @@ pub(crate) enum Phase {
     Confirm,
     /// Sets of effects that do not follow time, grown once more.
     Floating,
-    /// The largest part of the error that effects explain.
+    /// Partial explanations.
     Part,
     /// The alternatives to each effect.
     Groups,

@@ -27,6 +27,8 @@ const ROUNDING: &str = "the rounding of readings";
 /// Least noise before the rounding, as a share of the step: with less, the effect does not depend on it.
 const LEAST_DITHER: f64 = 0.1;
 
+/// Noise before the rounding, as a share of the step, up to which the effect has hard steps.
+const HARD: f64 = 0.08;
 /// Noise before the rounding of smooth staircases, as shares of the step.
 const DITHERS: [f64; 3] = [0.1, 0.2, 0.3];
 /// See [`Context::scatter`].
@@ -147,10 +149,10 @@ impl Context<'_> {
         all.min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost))
     }
 
-    /// A set that rounds without noise before the rounding, without its roundings; `None` for other sets. The residual of hard steps may vanish,
+    /// A set that rounds with almost no noise before the rounding, without its roundings; `None` for other sets. The residual of hard steps may vanish,
     /// and says nothing of the estimates' errors; without the steps the rounding error is noise.
     pub fn without_hard_steps(&self, node: &Node) -> Result<Option<Node>, Error> {
-        let is_hard = |rounding: &Rounding| node.fit.x[rounding.dither] == 0.0;
+        let is_hard = |rounding: &Rounding| node.fit.x[rounding.dither] <= HARD;
         if !self.roundings(node).iter().any(is_hard) {
             return Ok(None);
         }

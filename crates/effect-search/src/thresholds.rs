@@ -155,11 +155,12 @@ pub struct Thresholds {
     /// A larger set is preferred if each further effect reduces the error above the noise level to at most this share of the smaller set's
     /// (0 to 1). Chosen.
     pub partial_left: f64,
-    /// Largest squared error that each further effect leaves of the smaller set's (0 to 1): less than this is not worth a name. Chosen.
-    pub partial_error: f64,
-    /// Or if each further effect reduces the squared error in the cross-validation to at most this share of the smaller set's: either
-    /// criterion is sufficient (0 to 1). Chosen.
+    /// Or if each further effect reduces the squared error in the cross-validation to at most this share of the smaller set's: one of the
+    /// two criteria is sufficient (0 to 1). Chosen.
     pub partial_left_out: f64,
+    /// In both cases each further effect must reduce the squared error of the fit to at most this share of the smaller set's (0 to 1).
+    /// Chosen.
+    pub partial_error: f64,
     /// Smallest share of the squared error, of several outputs of their geometric mean, that a set has to explain on parts of the records
     /// to which it was not fitted (0 to 1). Chosen.
     pub carried_over: f64,
@@ -256,8 +257,8 @@ impl Thresholds {
         partial_share_of_time: 0.9,
         partial_tested: 6,
         partial_left: 0.5,
-        partial_error: 0.9,
         partial_left_out: 0.75,
+        partial_error: 0.9,
         carried_over: 0.3,
         folds: 4,
         innovation_ratio: 1.05,

@@ -124,8 +124,9 @@ impl Context<'_> {
         });
         let carries = all.first().and_then(|(_, share)| *share);
         let carries = carries.is_some_and(|share| share >= self.thresholds.shape_least_share);
+        let untested = all.iter().all(|(_, share)| share.is_none());
         all.extend(courses.into_iter().map(|set| (set, None)));
-        if !carries {
+        if !carries && !untested {
             all.sort_by(|a, b| b.0.gain_over(&base).total_cmp(&a.0.gain_over(&base)));
         }
         let Some((best, share_left_out)) = all.first().cloned() else {

@@ -9,7 +9,7 @@ pub enum Error {
     Series(#[from] ct_signals::Error),
     /// No start gave a finite simulation.
     #[error(
-        "none of {starts} starts gave a finite simulation: check the units of the data and the fixed parameters"
+        "none of {starts} starts gave a finite simulation: check the units of the data and the constants under [known]"
     )]
     NoFiniteStart {
         /// Number of starts.

@@ -23,7 +23,7 @@ pub enum Error {
     },
     /// A prior is not a finite number with a positive standard error within the bounds.
     #[error(
-        "the prior of {name} is {value:?} with a standard error of {std_error:?}: the parameter lies between {lower:?} and {upper:?}; give a value there and a standard error above zero, in its unit"
+        "[prior] {name} = [{value:?}, {std_error:?}]: the parameter lies between {lower:?} and {upper:?}; give a value there and a standard error above zero, in its unit"
     )]
     Prior {
         /// The parameter.
@@ -88,7 +88,9 @@ pub enum Error {
     #[error("stopped before it was done")]
     Stopped,
     /// The loop cannot be simulated without its reference.
-    #[error("{record}: the record holds no reference, which a controller follows: name its column")]
+    #[error(
+        "{record}: the record holds no reference, which a controller follows: name its column as reference in the model file, under [columns] or, for a model of your own, under its [controller.INPUT]"
+    )]
     NoReference {
         /// The record.
         record: String,
@@ -105,7 +107,7 @@ pub enum Error {
     },
     /// A controller's command is held from sample to sample.
     #[error(
-        "{record}: the command runs in straight lines (first-order hold), but a controller holds it: set its hold to zero, or delete the controller"
+        "{record}: hold = \"first\" says that the command runs in straight lines, but a controller holds it: write hold = \"zero\", or delete [controller]"
     )]
     CommandNotHeld {
         /// The record.

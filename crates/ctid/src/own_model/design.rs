@@ -48,9 +48,7 @@ pub fn design(
     let found = search(&problem, [ids[0], ids[1]], limits, options, progress);
     found.map_err(|error| match error {
         // An error in the options, not in a file.
-        effect_search::Error::Design(refused) if refused != NoExperiment::OutOfTime => {
-            refused.into()
-        }
+        effect_search::Error::Design(refused) => refused.into(),
         error => blame(&problem.records, &error),
     })
 }

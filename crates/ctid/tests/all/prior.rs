@@ -52,7 +52,7 @@ fn a_prior_counts_as_a_reading() {
     place.write("outside.toml", model + "\n[prior]\nalpha = [1e12, 1.0]\n");
     place.refuses(
         "compare a.csv --model outside.toml",
-        &["prior of alpha", "lies between"],
+        &["[prior] alpha", "lies between"],
     );
     assert!(
         place

@@ -11,6 +11,7 @@ mod gaps;
 mod heat;
 mod hidden;
 mod level_shift;
+mod partial;
 mod quantisation;
 mod records;
 mod results;

@@ -38,6 +38,30 @@ fn rounding_of_reading_and_noise_is_named() {
     assert!((value("quantisation_y_dither") - 0.2).abs() < 0.06);
 }
 
+/// Readings without noise that the rounded model reproduces: the residual is zero, and says nothing of the estimates.
+#[test]
+fn estimates_from_rounded_readings_without_noise_have_errors() {
+    let mut record = record(BLOCK, 0.0, 0.0, 7);
+    rounded(&mut record, 0.5);
+    let believed = BLOCK
+        .replace("= 0.8;", "= 0.7;")
+        .replace("= 1.6;", "= 1.8;");
+    let diagnosis = found(&problem(&believed, record));
+    assert_eq!(diagnosis.groups, [["quantisation(y)"]]);
+    let last = diagnosis.steps.last().unwrap();
+    assert!(last.rmse.unwrap() < 1e-9, "{:?}", last.rmse);
+    for (name, value) in [("k", 0.8), ("g", 1.6)] {
+        let own = last.parameters.iter().find(|p| p.name == name).unwrap();
+        let error = own.std_error.unwrap();
+        assert!(
+            (1e-5 * value..0.01 * value).contains(&error),
+            "{name}: {error}"
+        );
+        assert!((own.value - value).abs() < 4.0 * error, "{}", own.value);
+    }
+    assert!(last.not_determined.is_empty(), "{:?}", last.not_determined);
+}
+
 #[test]
 fn rounding_that_is_not_to_be_named_is_reported() {
     let mut problem = noise_and_rounding();

@@ -88,7 +88,7 @@ fn a_stop_ends_the_motion_and_takes_energy() {
     assert!(rebound(&damped) > 0.29, "{}", rebound(&damped));
 }
 
-/// A mass on a linear spring of 2 N/m, held by 3 N: with a cubic part it comes to rest where `2 x + f (x/w)^3 = 3`, on either side.
+/// A mass on a linear spring of 2 N/m: with a cubic part around `r` it comes to rest where `2 x + c (x - r)^3` is the load.
 #[test]
 fn a_spring_that_hardens_is_deflected_less() {
     let driven = Driven::all().swap_remove(1);
@@ -96,11 +96,13 @@ fn a_spring_that_hardens_is_deflected_less() {
     let cubic = all.iter().find(|c| c.id == "cubic_stiffness(v,s)").unwrap();
     let model = Model::new(apply(&driven.spec, &[cubic]).unwrap());
     let width = cubic.record_numbers["width"];
-    let rest = |load: f64, cubed: f64| {
+    let rest = |load: f64, cubed: f64, around: f64| {
         let mut parameters = model.parameters();
-        let mut own = model.spec().parameters.iter();
-        let at = own.position(|p| p.about.name == cubic.parameters[0].name);
-        parameters[at.unwrap()] = cubed * width.powi(3);
+        for (own, value) in cubic.parameters.iter().zip([cubed * width.powi(3), around]) {
+            let mut all = model.spec().parameters.iter();
+            let at = all.position(|p| p.about.name == own.name);
+            parameters[at.unwrap()] = value;
+        }
         let load = vec![load; 20_000];
         let positions = model
             .simulate(&parameters, 0.005, &[&load])
@@ -108,8 +110,13 @@ fn a_spring_that_hardens_is_deflected_less() {
             .swap_remove(0);
         positions[positions.len() - 1]
     };
-    assert!((rest(3.0, 0.0) - 1.5).abs() < 1e-6);
-    // 2 x + x^3 = 3 at x = 1.
-    assert!((rest(3.0, 1.0) - 1.0).abs() < 1e-6, "{}", rest(3.0, 1.0));
-    assert!((rest(-3.0, 1.0) + 1.0).abs() < 1e-6, "{}", rest(-3.0, 1.0));
+    for (load, cubed, around, position) in [
+        (3.0, 0.0, 0.0, 1.5),
+        (3.0, 1.0, 0.0, 1.0),
+        (-3.0, 1.0, 0.0, -1.0),
+        (5.0, 1.0, 1.0, 2.0),
+    ] {
+        let found = rest(load, cubed, around);
+        assert!((found - position).abs() < 1e-6, "{found} {position}");
+    }
 }

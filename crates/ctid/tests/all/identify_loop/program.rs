@@ -136,7 +136,7 @@ fn what_cannot_be_is_refused() {
     );
     bad(
         &format!("{loops} iv --levels estimated"),
-        &["--levels estimated is of --method fcloe"],
+        &["--levels estimated is of fcloe"],
     );
     bad(
         &format!("{loops} ct-rls --levels mean"),

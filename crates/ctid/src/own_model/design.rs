@@ -2,8 +2,8 @@
 
 use ct_signals::{Heading, duration};
 use effect_search::design::{
-    Alternative, Design, Experiment, InputRange, InputSequenceKind, Kind, Limits, NoExperiment,
-    Prospect, design as search,
+    Alternative, Design, Experiment, InputRange, InputSequenceKind, Kind, Limits, Prospect,
+    design as search,
 };
 use effect_search::{Options, Progress};
 use serde::Serialize;

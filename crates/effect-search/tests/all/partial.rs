@@ -33,7 +33,8 @@ fn an_initial_state_that_is_soon_forgotten_does_not_decide_the_cross_validation(
         diagnosis.verdict, diagnosis.groups, unknown.effect, unknown.share_left_out
     );
     assert_eq!(unknown.variable, "u");
-    assert!(unknown.share_left_out.unwrap() > 0.8);
+    // Of what the effects leave; with initial states far from any temperature the share is zero or less.
+    assert!(unknown.share_left_out.unwrap() > 0.4);
 }
 
 /// The room's temperature, which is believed constant, wanders: functions of time fit that, whatever it does.

@@ -38,7 +38,7 @@ fn rounding_of_reading_and_noise_is_named() {
     assert!((value("quantisation_y_dither") - 0.2).abs() < 0.06);
 }
 
-/// Readings without noise that the rounded model reproduces: the residual is zero, and says nothing of the estimates.
+/// Readings without noise that the rounded model reproduces, but for a few: the residual says nothing of the estimates.
 #[test]
 fn estimates_from_rounded_readings_without_noise_have_errors() {
     let mut record = record(BLOCK, 0.0, 0.0, 7);
@@ -49,7 +49,8 @@ fn estimates_from_rounded_readings_without_noise_have_errors() {
     let diagnosis = found(&problem(&believed, record));
     assert_eq!(diagnosis.groups, [["quantisation(y)"]]);
     let last = diagnosis.steps.last().unwrap();
-    assert!(last.rmse.unwrap() < 1e-9, "{:?}", last.rmse);
+    // At most five of 500 are a step off.
+    assert!(last.rmse.unwrap() < 0.05, "{:?}", last.rmse);
     for (name, value) in [("k", 0.8), ("g", 1.6)] {
         let own = last.parameters.iter().find(|p| p.name == name).unwrap();
         let error = own.std_error.unwrap();

@@ -98,7 +98,7 @@ fn the_cascaded_tanks_as_a_text_give_up_more() {
     assert_eq!(found.verdict, effect_search::Verdict::Partial);
     assert_eq!(found.effects[0], "overflow(h1,h2)");
     let last = found.steps.last().unwrap();
-    let held_out = last.rmse_test_per_output.as_ref().unwrap()["y"];
+    let held_out = last.rmse_test_per_output.as_ref().unwrap()["y_level2"];
     assert!(held_out < 0.19, "{held_out}");
     assert!(last.outputs[0].rmse_test_50.unwrap() < 0.19);
 

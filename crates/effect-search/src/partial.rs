@@ -6,7 +6,7 @@
 //! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an
 //!   effect that depends on time only, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and
 //!   alone, because several such effects fit any disturbance;
-//! - several effects are significant if each model has a noise model of its own, of limited memory;
+//! - several effects are each worth it, as in a larger set (below);
 //! - it predicts the next sample as well as the model without it, each beside a noise model of its own;
 //! - what is fitted to three quarters of the records predicts the fourth (cross-validation);
 //! - no size of its effects is at a bound.
@@ -52,11 +52,21 @@ impl Context<'_> {
         let Some(base_left_out) = self.left_out_squares(base).ok().flatten() else {
             return Ok(None);
         };
+        let of_base = Part {
+            set: base.clone(),
+            share: 0.0,
+            left_out: base_left_out,
+            bic: own_base.bic(),
+        };
         let is_alone_or_timeless = |set: &&Node| {
             let new = &set.added[base.added.len()..];
             new.len() == 1 || self.in_time(new) == 0
         };
         let sets: Vec<&Node> = sets.iter().filter(is_alone_or_timeless).collect();
+        let is_white = |set: &Node| set.fit.noise.order() == 0;
+        let is_better = |set: &Node, known: &Node| {
+            is_white(set) && (!is_white(known) || set.fit.cost < known.fit.cost)
+        };
         let most = sets.iter().map(|set| self.size(set)).max().unwrap_or(0);
         let mut best: Option<Part> = None;
         let mut smaller: Vec<Part> = Vec::new();
@@ -66,12 +76,15 @@ impl Context<'_> {
             }
             let mut of_size: Vec<&Node> = Vec::new();
             for set in sets.iter().filter(|set| self.size(set) == size) {
-                if !of_size.iter().any(|known| same_set(known, set)) {
-                    of_size.push(set);
+                match of_size.iter_mut().find(|known| same_set(known, set)) {
+                    // Fits of one set may end in different minima.
+                    Some(known) if is_better(set, known) => *known = set,
+                    Some(_) => {}
+                    None => of_size.push(set),
                 }
             }
             let fits = of_size.into_par_iter().filter_map(|set| {
-                if set.fit.noise.order() == 0 {
+                if is_white(set) {
                     return Some(set.clone());
                 }
                 self.refitted(set, &white, ROUGH).ok()
@@ -82,7 +95,7 @@ impl Context<'_> {
                 .into_par_iter()
                 .filter_map(|set| self.refitted(&set, &white, FINE).ok())
                 .filter_map(|set| {
-                    let part = self.part((base, &own_base), &base_left_out, set);
+                    let part = self.part((&of_base, &own_base), set);
                     part.ok().flatten()
                 })
                 .collect();
@@ -95,7 +108,7 @@ impl Context<'_> {
                     !(within || is_best) || self.pays(part, less)
                 })
             };
-            let carried = |part: &Part| fall(&base_left_out, &part.left_out);
+            let carried = |part: &Part| fall(&of_base.left_out, &part.left_out);
             let more = parts.iter().filter(says_more);
             if let Some(part) = more.max_by(|a, b| carried(a).total_cmp(&carried(b))) {
                 best = Some(part.clone());
@@ -127,20 +140,15 @@ impl Context<'_> {
         set.added.len() + self.in_time(&set.added)
     }
 
-    /// A set as a partial explanation; `None` if it is none. `base_left_out`: the squared error of the base in the cross-validation.
-    fn part(
-        &self,
-        (base, own_base): (&Node, &Fit),
-        base_left_out: &[f64],
-        set: Node,
-    ) -> Result<Option<Part>, Error> {
-        let new = &set.added[base.added.len()..];
+    /// A set as a partial explanation; `None` if it is none.
+    fn part(&self, (base, own_base): (&Part, &Fit), set: Node) -> Result<Option<Part>, Error> {
+        let new = &set.added[base.set.added.len()..];
         if self.at_a_bound(&set, new) {
             return Ok(None);
         }
         let own = self.in_limited_noise(&set)?;
         let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
-        let share = explained(&base.fit, &set.fit, &floors);
+        let share = explained(&base.set.fit, &set.fit, &floors);
         let least = if self.in_time(new) > 0 {
             self.thresholds.partial_share_of_time
         } else {
@@ -148,21 +156,23 @@ impl Context<'_> {
         };
         let mut innovations = own.noise.iter().zip(own_base.noise.iter());
         let plausible = share >= least
-            && (new.len() == 1 || own_base.bic() - own.bic() > self.thresholds.bic_margin)
             && innovations
                 .all(|(own, base)| own.sigma() <= self.thresholds.innovation_ratio * base.sigma());
         if !plausible {
             return Ok(None);
         }
+        let several = new.len() > 1;
         let left_out = self.left_out_squares(&set)?;
         let left_out = left_out
-            .filter(|left_out| fall(base_left_out, left_out) >= self.thresholds.carried_over);
-        Ok(left_out.map(|left_out| Part {
+            .filter(|left_out| fall(&base.left_out, left_out) >= self.thresholds.carried_over);
+        let part = left_out.map(|left_out| Part {
             set,
             share,
             left_out,
             bic: own.bic(),
-        }))
+        });
+        // Several effects have to explain more than one.
+        Ok(part.filter(|part| !several || self.pays(part, base)))
     }
 
     /// The fit of a set with a noise model of its own residual, with limited memory.

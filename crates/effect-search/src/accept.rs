@@ -8,6 +8,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::Error;
 use crate::node::{Context, FINE, Node};
+use crate::partial::error_left;
 
 impl Context<'_> {
     /// Whether a set lowers the deviance significantly compared with one that lacks some of its effects: chi-square, corrected (Bonferroni)
@@ -129,14 +130,15 @@ impl Context<'_> {
         })
     }
 
-    /// A set without the effects that depend on a single reading, compared by its simulation error; `None` if no effect stays that the
-    /// criterion needs.
-    pub fn of_many_readings(&self, mut node: Node, base: &Node) -> Option<Node> {
+    /// A partial explanation without the effects that depend on a single reading or hardly lower the simulation error; `None` if no effect stays
+    /// that the criterion needs.
+    pub fn without_small_effects(&self, mut node: Node, base: &Node) -> Option<Node> {
         let white = Noise::white(node.spec().outputs.len());
         while node.added.len() > base.added.len() {
             let lacking = self.each_lacking(&node, base, &white);
             let mut resting = lacking.into_iter().filter(|lacking| {
                 node.gain_over(lacking) <= self.thresholds.bic_margin
+                    || error_left(&lacking.fit, &node.fit) > self.thresholds.partial_error
                     || self.rests_on_few_readings(&node, lacking, &white)
             });
             let Some(less) = resting.next() else {

@@ -133,7 +133,9 @@ pub fn diagnose(
             // The sets are therefore compared by their simulation error.
             sets.extend(timeless);
             let part = context.largest_part(&base, &sets)?;
-            if let Some(part) = part.and_then(|(part, _)| context.of_many_readings(part, &base)) {
+            if let Some(part) =
+                part.and_then(|(part, _)| context.without_small_effects(part, &base))
+            {
                 confirmed = part;
                 own = context.in_own_noise(&confirmed)?;
                 noise = white.clone();

@@ -122,9 +122,7 @@ impl Context<'_> {
     fn pays(&self, part: &Part, less: &Part) -> bool {
         let further = (self.size(&part.set) - self.size(&less.set)) as i32;
         let left = |of: f64| of.powi(further);
-        let squares =
-            |part: &Part| -> Vec<f64> { part.set.fit.rmse.iter().map(|e| e * e).collect() };
-        let error = 1.0 - fall(&squares(less), &squares(part));
+        let error = error_left(&less.set.fit, &part.set.fit);
         // Near the noise, the share that is left is a difference of two nearly equal numbers.
         if error > left(self.thresholds.partial_error)
             || less.bic - part.bic <= self.thresholds.bic_margin * f64::from(further)
@@ -292,6 +290,12 @@ fn without_forgotten_states<'a>(
     let columns = (0..whole.free().len()).filter(is_determined);
     let kept: Vec<usize> = columns.map(|column| whole.free()[column]).collect();
     others.with_free(&kept)
+}
+
+/// The squared error of a larger set's fit as a share of that of a smaller one; of several outputs by the geometric mean.
+pub(crate) fn error_left(less: &Fit, more: &Fit) -> f64 {
+    let squares = |fit: &Fit| -> Vec<f64> { fit.rmse.iter().map(|e| e * e).collect() };
+    1.0 - fall(&squares(less), &squares(more))
 }
 
 /// The relative fall of squared errors: of several outputs, that of their geometric mean, as in a likelihood with a variance of each

@@ -26,15 +26,21 @@ fn in_time(diagnosis: &Diagnosis) -> Vec<&String> {
 fn an_initial_state_that_is_soon_forgotten_does_not_decide_the_cross_validation() {
     let fast = BLOCK.replace("C(unit=\"J/K\") = 50", "C(unit=\"J/K\") = 6");
     let hidden = fast.replace("g*u -", "g*u*(1 + 0.5*sin(u/3)) -");
-    let diagnosis = found(&problem(&fast, record(&hidden, 0.0, 0.1, 11)));
+    let options = Options {
+        max_effects: 1,
+        time_limit: None,
+        ..Options::default()
+    };
+    let problem = problem(&fast, record(&hidden, 0.0, 0.1, 11));
+    let diagnosis = diagnose(&problem, &options, &|_| {}).unwrap();
     let unknown = diagnosis.unknown.as_ref().unwrap();
     println!(
         "{:?} {:?} {} {:?}",
         diagnosis.verdict, diagnosis.groups, unknown.effect, unknown.share_left_out
     );
     assert_eq!(unknown.variable, "u");
-    // Of what the effects leave; with initial states far from any temperature the share is zero or less.
-    assert!(unknown.share_left_out.unwrap() > 0.4);
+    // With initial states far from any temperature it is zero or less.
+    assert!(unknown.share_left_out.unwrap() > 0.9);
 }
 
 /// The room's temperature, which is believed constant, wanders: functions of time fit that, whatever it does.

@@ -110,20 +110,9 @@ impl From<linear_identification::Error> for Error {
             E::StabilityBorder { record }
             | E::ControllerMismatch { record, .. }
             | E::MissingReadings { record, .. }
-            | E::InRecord { record, .. } => {
-                let what = message.strip_prefix(&format!("{record}: "));
-                Self::File {
-                    what: what.unwrap_or(&message).to_owned(),
-                    file: record,
-                }
-            }
+            | E::InRecord { record, .. } => Self::of_record(record, &message, ""),
             E::FirstFit { record, .. } => {
-                let what = message.strip_prefix(&format!("{record}: "));
-                let what = what.unwrap_or(&message);
-                Self::File {
-                    what: format!("{what}: --from and --to, or --resample"),
-                    file: record,
-                }
+                Self::of_record(record, &message, ": --from and --to, or --resample")
             }
             // The message begins with the setting's name, which is the name of the option.
             E::NotPositive { .. } | E::Bandwidth { .. } | E::LevelsEstimated { .. } => {
@@ -184,6 +173,15 @@ fn needs(message: &str, effect: &str) -> String {
 }
 
 impl Error {
+    /// A message that begins with the name of a record, and what the program adds to it.
+    fn of_record(record: String, message: &str, options: &str) -> Self {
+        let what = message.strip_prefix(&format!("{record}: "));
+        Self::File {
+            what: format!("{}{options}", what.unwrap_or(message)),
+            file: record,
+        }
+    }
+
     /// An error about a file as a whole.
     pub(crate) fn file(path: &Path, what: impl Into<String>) -> Self {
         Self::File {

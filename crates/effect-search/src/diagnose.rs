@@ -16,14 +16,14 @@ use estimation::Noise;
 use greybox::weighted_rms;
 
 use crate::Error;
-use crate::assemble::{Finding, assemble};
-use crate::believed::begin;
-use crate::node::{Context, FINE, Node};
-use crate::partial::explained;
-use crate::problem::{Limit, Options, Phase, Problem};
+use crate::accept::partial::explained;
+use crate::base::problem::{Limit, Options, Phase, Problem};
+use crate::fit::believed::begin;
+use crate::fit::node::{Context, FINE, Node};
 use crate::residual_tests::NotNoise;
-use crate::result::{Diagnosis, Verdict};
-use crate::search::Grown;
+use crate::result::assemble::{Finding, assemble};
+use crate::result::diagnosis::{Diagnosis, Verdict};
+use crate::search::grow::Grown;
 
 /// The progress of a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

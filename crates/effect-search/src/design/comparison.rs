@@ -10,7 +10,7 @@ use super::limits::Bounds;
 use super::separation::{information, least};
 use super::{Experiment, InputSequenceKind, Kind, NoExperiment, Power, Reach, power};
 use crate::Error;
-use crate::node::{Context, FINE, Node};
+use crate::fit::node::{Context, FINE, Node};
 
 /// Both effects, and their results on the records.
 pub(super) struct Comparison<'s, 'a> {

@@ -27,10 +27,10 @@ pub use separation::{information, least};
 pub use sequences::{Kind, Room, Sequence, sequences};
 
 use crate::Error;
-use crate::believed::begin;
+use crate::base::problem::{Limit, Options, Phase, Problem};
 use crate::diagnose::Progress;
-use crate::node::{Context, FINE, Node};
-use crate::problem::{Limit, Options, Phase, Problem};
+use crate::fit::believed::begin;
+use crate::fit::node::{Context, FINE, Node};
 use limits::Bounds;
 
 /// The slowest time constant for which the sequences are designed, as a share of the experiment's length, since the process may not be known.

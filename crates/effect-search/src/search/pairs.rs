@@ -7,8 +7,8 @@ use estimation::{Noise, Rows, rows};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::node::{Context, Node};
-use crate::score::Trial;
+use crate::fit::node::{Context, Node};
+use crate::search::score::Trial;
 
 /// Number of values in all columns above which rows are thinned out.
 const MOST_VALUES: usize = 20_000_000;

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::Error;
-use crate::node::{Context, FINE, Node};
-use crate::partial::error_left;
+use crate::accept::partial::error_left;
+use crate::fit::node::{Context, FINE, Node};
 
 impl Context<'_> {
     /// Whether a set lowers the deviance significantly compared with one that lacks some of its effects: chi-square, corrected (Bonferroni)

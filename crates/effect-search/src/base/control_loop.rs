@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 use crate::Error;
-use crate::output_step::ResidualTests;
+use crate::residual_tests::ResidualTests;
 use crate::residual_tests::feedback::{LAGS, feedback_p};
 use crate::thresholds::Thresholds;
 

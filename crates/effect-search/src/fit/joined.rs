@@ -6,7 +6,7 @@
 use estimation::{Prior, Residuals, Rows, Sample, rows};
 use greybox::ModelSetup;
 
-use crate::node::{Context, Node};
+use crate::fit::node::{Context, Node};
 
 /// Source of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,9 +5,9 @@ use estimation::{Fit, Noise};
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::node::{Context, FINE, Node};
-use crate::partial::explained;
-use crate::search::best_first;
+use crate::accept::partial::explained;
+use crate::fit::node::{Context, FINE, Node};
+use crate::search::grow::best_first;
 
 /// Step that is left out if the time is over.
 const OTHERS: &str = "other effects that may explain the same";

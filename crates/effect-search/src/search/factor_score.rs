@@ -11,9 +11,9 @@ use ct_model::effects::{Candidate, apply};
 use estimation::{Noise, Residuals, Rows, linearise, within};
 
 use crate::Error;
-use crate::joined::Joined;
-use crate::node::{Context, Node};
-use crate::score::{Trial, step_within, thinned};
+use crate::fit::joined::Joined;
+use crate::fit::node::{Context, Node};
+use crate::search::score::{Trial, step_within, thinned};
 
 /// A start of the candidate's own parameters.
 struct Place {

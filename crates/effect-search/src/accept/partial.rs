@@ -24,8 +24,8 @@ use greybox::ModelSetup;
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::node::{Context, FINE, Node, ROUGH};
-use crate::search::{best_first, same_set};
+use crate::fit::node::{Context, FINE, Node, ROUGH};
+use crate::search::grow::{best_first, same_set};
 
 /// An initial state is determined by the readings after the beginning if its influence on them is at least this share of that on all.
 const REMEMBERED: f64 = 0.1;

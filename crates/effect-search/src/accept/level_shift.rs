@@ -10,7 +10,7 @@ use estimation::{Noise, fit_from};
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::node::{Context, FINE, Node};
+use crate::fit::node::{Context, FINE, Node};
 use crate::residual_tests::NotNoise;
 
 /// Number of instants that are tried, those with the largest whitened residual.

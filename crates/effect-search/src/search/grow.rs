@@ -8,9 +8,9 @@ use estimation::Noise;
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::node::{Context, FINE, Node, ROUGH};
-use crate::pairs::joint_scores;
-use crate::score::Trial;
+use crate::fit::node::{Context, FINE, Node, ROUGH};
+use crate::search::pairs::joint_scores;
+use crate::search::score::Trial;
 
 /// Step that is left out if the time is over.
 const LARGER: &str = "larger sets of effects";

@@ -9,11 +9,11 @@ use estimation::{Fit, Noise, Start, Stopping, fit_from};
 use greybox::{FitOptions, ModelSetup, SimulatedLoop};
 
 use crate::Error;
-use crate::control_loop::ControlLoop;
-use crate::problem::{Limit, Problem};
-use crate::result::Absorbed;
+use crate::base::control_loop::ControlLoop;
+use crate::base::problem::{Limit, Problem};
+use crate::fit::relations::Absorbed;
+use crate::fit::relations::Tie;
 use crate::thresholds::Thresholds;
-use crate::ties::Tie;
 
 /// Stopping criteria of a first fit, which only has to give a rank.
 pub(crate) const ROUGH: Stopping = Stopping {

@@ -16,8 +16,8 @@ use greybox::ModelSetup;
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::joined::Joined;
-use crate::node::{Context, Node};
+use crate::fit::joined::Joined;
+use crate::fit::node::{Context, Node};
 use crate::residual_tests::strongest_line;
 
 /// Damping of the predicted step, for directions that the data do not determine.

@@ -2,19 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use ct_model::Given;
-use ct_model::effects::Candidate;
 use ct_signals::ArModel;
 use estimation::{Fit, Noise, moved_by_weighting};
 use greybox::{Robust, not_determined, weighted_rms};
 
-use crate::control_loop::{ControlLoop, NotSimulated, widened};
-use crate::detectable::leading;
-use crate::node::{Context, FINE, Node};
-use crate::output_step::output_steps;
-use crate::quantisation::quantisation;
-use crate::result::{Diagnosis, Estimate, NoiseFloor, Single, Step, Verdict};
-use crate::search::Grown;
+use crate::accept::quantisation::quantisation;
+use crate::base::control_loop::{ControlLoop, NotSimulated, widened};
+use crate::diagnostics::detectable::leading;
+use crate::fit::estimate::{Estimate, sizes};
+use crate::fit::node::{Context, FINE, Node};
+use crate::result::diagnosis::{Diagnosis, NoiseFloor, Single, Step, Verdict};
+use crate::result::output_step::output_steps;
+use crate::search::grow::Grown;
 use crate::{Error, held_out};
 
 /// A result.
@@ -193,23 +192,6 @@ fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<
         nodes.push(next);
     }
     Ok(nodes)
-}
-
-/// Estimates of an effect's parameters in a set.
-pub(crate) fn sizes(node: &Node, candidate: &Candidate) -> Vec<Estimate> {
-    let errors = node.fit.std_errors();
-    let parameters = node.spec().parameters.iter().enumerate();
-    let own =
-        parameters.filter(|(_, p)| candidate.parameters.iter().any(|o| o.name == p.about.name));
-    own.map(|(i, parameter)| Estimate {
-        effect: Some(candidate.id.clone()),
-        name: parameter.about.name.clone(),
-        value: node.fit.x[i],
-        std_error: errors[i],
-        unit: parameter.about.unit.clone(),
-        known: parameter.given != Given::Fitted,
-    })
-    .collect()
 }
 
 /// `noise`: of the last model, with the level of each output.

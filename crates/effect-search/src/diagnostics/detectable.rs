@@ -12,9 +12,9 @@ use estimation::{Noise, Rows, Signature, linearise};
 use rayon::prelude::*;
 
 use crate::Error;
-use crate::joined::Joined;
-use crate::node::{Context, Node};
-use crate::ties::DEPENDENT;
+use crate::fit::joined::Joined;
+use crate::fit::node::{Context, Node};
+use crate::search::ties::DEPENDENT;
 
 /// The leading size of a candidate with a derivative at its absent value.
 pub(crate) fn leading(candidate: &Candidate) -> Option<&EffectParameter> {

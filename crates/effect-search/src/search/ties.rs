@@ -15,18 +15,9 @@ use estimation::{Noise, Residuals, rows, within};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::node::{Context, Node};
-use crate::pairs::{basis_of, every_nth, project, whitened};
-use crate::result::Absorbed;
-
-/// The first candidate with a sensitivity that is collinear with that of a candidate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Tie {
-    /// Its position; that of the candidate itself if there is none.
-    pub first: usize,
-    /// Change of the candidate's size that has the influence of a unit change of the first one's.
-    pub scale: f64,
-}
+use crate::fit::node::{Context, Node};
+use crate::fit::relations::{Absorbed, Tie};
+use crate::search::pairs::{basis_of, every_nth, project, whitened};
 
 /// Direction of a candidate's sensitivity.
 enum Direction {

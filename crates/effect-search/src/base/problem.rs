@@ -11,7 +11,7 @@ use ct_signals::Record;
 use greybox::{LoopController, ModelSetup, PriorValue, TimeLimit};
 use serde::{Deserialize, Serialize};
 
-use crate::gaps::MendedGaps;
+use crate::base::gaps::MendedGaps;
 use crate::thresholds::Thresholds;
 
 /// A model and the records that it is compared with.

@@ -14,11 +14,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::assemble::sizes;
-use crate::node::{Context, FINE, Node, ROUGH};
-use crate::partial::{explained, fall};
-use crate::result::Estimate;
-use crate::search::best_first;
+use crate::accept::partial::{explained, fall};
+use crate::fit::estimate::Estimate;
+use crate::fit::estimate::sizes;
+use crate::fit::node::{Context, FINE, Node, ROUGH};
+use crate::search::grow::best_first;
 
 /// A smooth function at a port.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

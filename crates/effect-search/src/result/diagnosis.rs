@@ -5,12 +5,14 @@ use std::collections::BTreeMap;
 use ct_signals::ArModel;
 use serde::{Deserialize, Serialize};
 
-use crate::control_loop::ControlLoop;
-use crate::gaps::MendedGaps;
-use crate::output_step::OutputStep;
-use crate::quantisation::Quantisation;
+use crate::accept::quantisation::Quantisation;
+use crate::base::control_loop::ControlLoop;
+use crate::base::gaps::MendedGaps;
+use crate::diagnostics::unknown::Unknown;
+use crate::fit::estimate::Estimate;
+use crate::fit::relations::Absorbed;
 use crate::residual_tests::NotNoise;
-use crate::unknown::Unknown;
+use crate::result::output_step::OutputStep;
 
 /// The finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,24 +28,6 @@ pub enum Verdict {
     Unexplained,
     /// No missing effect is detectable in these data.
     Adequate,
-}
-
-/// A fitted parameter or initial state.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
-    /// Its name.
-    pub name: String,
-    /// Value \[unit\].
-    pub value: f64,
-    /// Standard error; `None` if the value is known, at a bound or not determined.
-    pub std_error: Option<f64>,
-    /// Unit as in the text.
-    pub unit: String,
-    /// The value is not fitted.
-    pub known: bool,
-    /// The effect of the parameter; `None` for the believed model's own parameters.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub effect: Option<String>,
 }
 
 /// One of the reported models: the believed one, or a model with one more effect.
@@ -104,16 +88,6 @@ pub struct Single {
     /// `None` also if the believed parameters compensate for all of the signature.
     #[serde(default)]
     pub smallest_visible: Option<f64>,
-}
-
-/// A candidate of the model file that changes the outputs only as the model's own parameters do: its term is in the model already.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Absorbed {
-    /// The candidate.
-    pub effect: String,
-    /// The parameter that alone has the same influence; `None` if only several together have it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub parameter: Option<String>,
 }
 
 /// The noise of an output.

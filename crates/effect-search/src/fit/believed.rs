@@ -15,9 +15,9 @@ use estimation::{Fit, Noise, Residuals, within};
 use greybox::{FitOptions, ModelSetup, possible_reading_steps};
 
 use crate::Error;
-use crate::control_loop::enclose;
-use crate::node::{Context, FINE, Node};
-use crate::problem::{Kept, Limit, Options, Problem};
+use crate::base::control_loop::enclose;
+use crate::base::problem::{Kept, Limit, Options, Problem};
+use crate::fit::node::{Context, FINE, Node};
 
 /// The believed model, including the effects of the model file.
 #[derive(Debug, Clone)]

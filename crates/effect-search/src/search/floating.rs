@@ -10,8 +10,8 @@
 use estimation::{Fit, Noise};
 use rayon::prelude::*;
 
-use crate::node::{Context, Node, ROUGH};
-use crate::search::{best_first, same_set};
+use crate::fit::node::{Context, Node, ROUGH};
+use crate::search::grow::{best_first, same_set};
 
 impl Context<'_> {
     /// Floating search: sets of up to the given number of effects that are no functions of time, fitted with white noise. `sets`: sets of

@@ -15,8 +15,8 @@ use greybox::exact_reading_step;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::node::{Context, FINE, Node};
-use crate::score::QUANTISATION;
+use crate::fit::node::{Context, FINE, Node};
+use crate::search::score::QUANTISATION;
 
 /// Rounding is reported if its variance is within this range, as a share of the mean squared residual. With a larger variance the measured
 /// quantity is constant, or the grid is not that of a converter.

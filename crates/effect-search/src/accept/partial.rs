@@ -43,10 +43,10 @@ struct Part {
 }
 
 impl Context<'_> {
-    /// The set that explains a large part of the error, fitted with white noise, and that part: of those with as many effects the one with the
+    /// The set that explains a large part of the error, fitted with white noise: of those with as many effects the one with the
     /// smallest error in the cross-validation. `None` if no set is a partial explanation. `sets`: fitted with any noise model; `base`: fitted
     /// with white noise.
-    pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<(Node, f64)>, Error> {
+    pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<Node>, Error> {
         let white = Noise::white(self.problem.records[0].outputs.len());
         let own_base = self.in_limited_noise(base)?;
         let Some(base_left_out) = self.left_out_squares(base).ok().flatten() else {
@@ -115,7 +115,7 @@ impl Context<'_> {
             }
             smaller.extend(parts);
         }
-        Ok(best.map(|best| (best.set, best.share)))
+        Ok(best.map(|best| best.set))
     }
 
     /// Whether each effect of a part in addition to those of a smaller one is worth it.

@@ -1,0 +1,180 @@
+//! The answer: the effects of the best set that pass the acceptance test, or a set that explains a large part of the error.
+
+use ct_signals::ArModel;
+use estimation::{Fit, Noise};
+use greybox::weighted_rms;
+
+use super::searched::Searched;
+use crate::Error;
+use crate::base::problem::Phase;
+use crate::fit::node::{Context, FINE, Node};
+use crate::residual_tests::NotNoise;
+
+/// A set of effects as the answer.
+pub(super) struct Answer {
+    pub set: Node,
+    /// The set's fit with the noise model of its own residual, ...
+    pub own: Fit,
+    /// ... and what shows that this residual is not noise.
+    pub not_noise: Option<NotNoise>,
+    /// The noise model with which effects are compared.
+    pub noise: Noise,
+    /// Samples per independent sample, if that is not the noise model of the set's residual.
+    pub slowness: f64,
+    /// The set is a part of one that leaves noise.
+    pub reduced: bool,
+}
+
+impl Answer {
+    /// Whether the set has so many effects that together they may imitate another one.
+    pub fn has_many(&self, context: &Context, base: &Node) -> bool {
+        self.set.added.len() >= base.added.len() + context.thresholds.many_effects
+    }
+}
+
+impl Context<'_> {
+    fn answer(&self, set: Node, noise: Noise) -> Result<Answer, Error> {
+        let own = self.in_own_noise(&set)?;
+        Ok(Answer {
+            not_noise: self.not_noise(&set, &own)?,
+            set,
+            own,
+            noise,
+            slowness: 1.0,
+            reduced: false,
+        })
+    }
+
+    /// The effects of the best set that pass the acceptance test.
+    pub(super) fn accepted(&self, searched: &Searched) -> Result<Answer, Error> {
+        self.limit.begin(Phase::Confirm);
+        let (grown, noise) = (&searched.grown, &searched.noise);
+        let effects = grown.base.added.len();
+        let mut set = self.confirm(grown.best.clone(), &grown.base, noise)?;
+        if grown.cut_short && set.added.len() == effects {
+            // After a search that was cut short, the noise model also describes effects that were not tried; the test below decides without
+            // it.
+            set = grown.best.clone();
+        }
+        if set.added.len() > effects {
+            set = self.in_lowest_minimum(set, effects, noise);
+            if !self.stands_in_own_noise(&set, &grown.base)? {
+                set = grown.base.clone();
+            }
+        }
+        self.answer(set, noise.clone())
+    }
+
+    /// Whether a set is better than the model without it when each has the noise model of its own residual: what autocorrelated noise
+    /// explains needs no effect.
+    fn stands_in_own_noise(&self, set: &Node, base: &Node) -> Result<bool, Error> {
+        let own = self.in_own_noise(set)?;
+        let bare = self.in_own_noise(base)?;
+        let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
+        let error =
+            |node: &Node| weighted_rms(&node.fit.rmse, &floors, &node.fit.samples_per_output);
+        // The simulation error must decrease too: in a prewhitened fit, a single reading can be a reason to add an effect.
+        Ok(bare.bic() - own.bic() > self.thresholds.bic_margin
+            && self.beyond_chance((set, &own), (base, &bare))
+            && error(set) < error(base))
+    }
+
+    /// The answer after a floating search without functions of time: a better set, a set that explains a large part of the error, or the same.
+    pub(super) fn reconsidered(
+        &self,
+        answer: Answer,
+        searched: &mut Searched,
+        max_effects: usize,
+    ) -> Result<Answer, Error> {
+        let base = searched.singles_by_error.1.clone();
+        // Several functions of time compensate for any slow disturbance.
+        let flexible =
+            answer.has_many(self, &base) && self.in_time(&answer.set.added[base.added.len()..]) > 1;
+        self.limit.begin(Phase::Floating);
+        let mut sets = searched.by_error.clone();
+        sets.extend(searched.grown.fitted.iter().cloned());
+        sets.extend([searched.grown.best.clone(), answer.set.clone()]);
+        let timeless = self.floating(&base, &sets, max_effects);
+        self.limit.begin(Phase::Part);
+        if answer.not_noise.is_none()
+            && let Some(better) = self.better_in_own_noise(timeless.clone(), &answer.own)
+        {
+            return self.taken(better, searched);
+        }
+        if answer.not_noise.is_none() && !flexible {
+            return Ok(answer);
+        }
+        // The noise model describes unmodelled physics as noise, and if that physics is slow, simulations of prewhitened fits drift.
+        // The sets are therefore compared by their simulation error.
+        sets.extend(timeless);
+        let part = self.largest_part(&base, &sets)?;
+        if let Some(part) = part.and_then(|part| self.without_small_effects(part, &base)) {
+            let (singles, base) = searched.singles_by_error.clone();
+            let grown = &mut searched.grown;
+            (grown.singles, grown.base, grown.of_singles) = (singles, base.clone(), base);
+            let noise = Noise::white(part.spec().outputs.len());
+            let part = self.answer(part, noise)?;
+            return Ok(Answer {
+                slowness: self.slowness(&part.own.noise),
+                reduced: answer.not_noise.is_none(),
+                ..part
+            });
+        }
+        if flexible && !self.limit.passed() {
+            let bare = self.answer(searched.grown.base.clone(), answer.noise.clone())?;
+            if bare.not_noise.is_some() {
+                return Ok(bare);
+            }
+        }
+        Ok(answer)
+    }
+
+    /// A set of the floating search as the answer, after the acceptance test. `better`: with the noise model of its own residual.
+    fn taken(&self, better: Node, searched: &mut Searched) -> Result<Answer, Error> {
+        let grown = &mut searched.grown;
+        // So many effects may imitate other effects, and the noise model may describe the rest of the error.
+        let noise = better.fit.noise.clone();
+        if let Ok(bare) = self.refitted(&grown.base, &noise, FINE) {
+            grown.base = bare;
+        }
+        let refitted = self.refitted(&better, &noise, FINE);
+        let set = refitted.unwrap_or_else(|_| better.clone());
+        let size = set.added.len();
+        let set = self.confirm(set, &grown.base, &noise)?;
+        let mut answer = self.answer(set, noise)?;
+        if answer.set.added.len() == size {
+            // The deviance of a fit with its own noise model is lower than that of a fit with the same model given.
+            answer.not_noise = self.not_noise(&answer.set, &better.fit)?;
+            answer.own = better.fit;
+        }
+        Ok(answer)
+    }
+
+    /// The model without effects, if a level shift of a reading explains more than those of the answer, or an abrupt change that they leave.
+    pub(super) fn or_level_shift(
+        &self,
+        answer: Answer,
+        searched: &Searched,
+    ) -> Result<Answer, Error> {
+        let base = &searched.grown.base;
+        let some = answer.set.added.len() > base.added.len();
+        if !some && !matches!(answer.not_noise, Some(NotNoise::Instant { .. })) {
+            return Ok(answer);
+        }
+        let margin = if some {
+            0.0
+        } else {
+            self.thresholds.bic_margin
+        };
+        let shift = self.level_shift(base, &answer.noise)?;
+        let Some(shift) = shift.filter(|shift| shift.bic < answer.set.fit.bic() - margin) else {
+            return Ok(answer);
+        };
+        Ok(Answer {
+            not_noise: Some(shift.found),
+            own: self.in_own_noise(base)?,
+            set: base.clone(),
+            ..answer
+        })
+    }
+}

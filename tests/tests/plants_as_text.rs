@@ -135,8 +135,7 @@ fn a_saturation_between_two_levels_of_the_command_is_found() {
 #[cfg_attr(not(blind_records), ignore = "no blind records beside the checkout")]
 fn stiction_is_a_backlash_that_jumps() {
     let found = diagnosed("case-0016", Plant::CascadedTanksLinear.text(), &[]).unwrap();
-    // The fit may end at another position of the pump at the beginning: its first move then comes at another time, and the effect is a part.
-    assert!(matches!(found.verdict, Verdict::Effect | Verdict::Partial));
+    assert_eq!(found.verdict, Verdict::Effect);
     assert_eq!(found.effects, ["backlash(u)"]);
     let last = found.steps.last().unwrap();
     let of = |name: &str| {

@@ -111,8 +111,9 @@ impl Context<'_> {
         if let Some(part) = part.and_then(|part| self.without_small_effects(part, &base)) {
             let (singles, base) = searched.singles_by_error.clone();
             let grown = &mut searched.grown;
-            (grown.singles, grown.base, grown.of_singles) = (singles, base.clone(), base);
+            (grown.singles, grown.base, grown.of_singles) = (singles, base.clone(), base.clone());
             let noise = Noise::white(part.spec().outputs.len());
+            let part = self.in_lowest_minimum(part, base.added.len(), &noise);
             let part = self.answer(part, noise)?;
             return Ok(Answer {
                 slowness: self.slowness(&part.own.noise),

@@ -18,7 +18,7 @@ use crate::findings::Reader;
 use crate::look::{Look, Side};
 use crate::output::Found;
 use crate::sentences::{interval, with_unit};
-use crate::simulate::{cell, csv_text, header};
+use crate::csv_text::{cell, csv_text, header};
 use crate::{Error, numbers};
 
 /// A significant effect lowers the criterion by this much.

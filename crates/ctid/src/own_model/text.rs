@@ -11,7 +11,7 @@ use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot::{self, Axis, Curve, plot};
 use crate::sentences::{FailureWords, of_gaps};
-use crate::simulate::header;
+use crate::csv_text::header;
 use crate::terminal::{FAILURES, residual_tests, without_50};
 
 /// The complete comparison, with a plot of the first record.

@@ -90,7 +90,7 @@ use self::own::Own;
 use self::sessions::Sessions;
 use self::upload::Upload;
 use crate::Error;
-use crate::commands::say;
+use crate::finish::say;
 use ct_signals::ReadOptions;
 
 use crate::input::Files;

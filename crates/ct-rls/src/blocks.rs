@@ -24,8 +24,9 @@
 
 use nalgebra::SVector;
 
-use crate::estimator::{Innovation, Outcome};
+use crate::estimator::Innovation;
 use crate::integrator::sealed::{Block, BlockRule, Refusal, Rule};
+use crate::outcome::Outcome;
 use crate::settings::{MAX_EPSILON, StepFactors, Weights};
 use crate::{ContinuousRls, Euler, ExactHold, Integrator, UdFactor, factor};
 

@@ -165,7 +165,8 @@ class Model:
         records = as_list(data)
         frames = to_frames(records, "data", wanted)
         with phases(progress) as on_phase:
-            fitted = native.fit(
+            fitted = _ctid.Fit.of_model(
+                native,
                 frames,
                 starts=whole("starts", starts, 1, MOST_STARTS),
                 seed=whole("seed", seed, 0, LARGEST_SEED),

@@ -24,8 +24,9 @@
 
 use nalgebra::SVector;
 
-use crate::estimator::{Innovation, Outcome};
-use crate::integrator::sealed::{BlockRule, Refusal, Rule};
+use crate::estimator::Innovation;
+use crate::integrator::sealed::{Block, BlockRule, Refusal, Rule};
+use crate::outcome::Outcome;
 use crate::settings::{MAX_EPSILON, StepFactors, Weights};
 use crate::{ContinuousRls, Euler, ExactHold, Integrator, UdFactor, factor};
 
@@ -91,15 +92,6 @@ pub fn update_blocks<const A: usize, const B: usize, I: BlockIntegrator>(
         outcome,
     }
 }
-
-/// One block: estimates, `P`, regressor, weights, step.
-pub type Block<'a, const P: usize, S> = (
-    &'a mut [f64; P],
-    &'a mut S,
-    &'a [f64; P],
-    &'a Weights,
-    &'a StepFactors,
-);
 
 impl BlockRule for Euler {
     #[inline(always)]

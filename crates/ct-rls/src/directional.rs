@@ -47,6 +47,7 @@
 //! 1987, for the idea.
 
 use crate::integrator::sealed::{FactorRule, Memory, Refusal, Rule, step_on_factors};
+use crate::integrator::{FactoredIntegrator, Integrator};
 use crate::settings::{MAX_EPSILON, StepFactors, Weights, in_range};
 use crate::{UdFactor, factor};
 
@@ -67,6 +68,9 @@ use crate::{UdFactor, factor};
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Directional;
+
+impl Integrator for Directional {}
+impl FactoredIntegrator for Directional {}
 
 impl Memory for Directional {
     #[cfg(feature = "serde")]

@@ -9,9 +9,10 @@ use core::marker::PhantomData;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimator::{Health, Innovation, Outcome, RecursiveEstimator};
+use crate::estimator::{Health, Innovation, RecursiveEstimator};
 use crate::guard::Guard;
 use crate::integrator::sealed::{Capped, Refusal};
+use crate::outcome::Outcome;
 use crate::random_walk::check_intensity;
 use crate::rls::check_theta;
 use crate::{Error, ExactHold, FactoredIntegrator, Guards, RandomWalk, Weights, factor};

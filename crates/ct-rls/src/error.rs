@@ -1,6 +1,6 @@
 //! Errors of settings and runs: each message contains the numbers that disagree and the correction.
 
-use crate::Outcome;
+use crate::outcome::Outcome;
 
 /// All errors of this crate, and the reasons why a run has stopped.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

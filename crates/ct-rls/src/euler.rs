@@ -13,12 +13,14 @@
 use crate::Error;
 use crate::factor::dot;
 use crate::integrator::sealed::{Memory, Refusal, Rule};
-use crate::integrator::{Plain, take};
+use crate::integrator::{Integrator, Plain, take};
 use crate::settings::{MAX_EPSILON, StepFactors, Weights};
 
 /// Euler's rule for the full matrix `P`. Stops if its step is too long.
 #[derive(Clone, Copy, Debug)]
 pub struct Euler;
+
+impl Integrator for Euler {}
 
 impl Memory for Euler {}
 

@@ -34,12 +34,16 @@ use nalgebra::{SMatrix, SVector};
 use crate::integrator::sealed::{
     Capped, Covariance, FactorRule, Memory, Refusal, Rule, step_on_factors,
 };
+use crate::integrator::{FactoredIntegrator, Integrator};
 use crate::settings::{StepFactors, Weights};
 use crate::{Error, UdFactor, factor};
 
 /// The exact solution for held signals, on `P = U D U'`: the default. Positive definite whatever the step.
 #[derive(Clone, Copy, Debug)]
 pub struct ExactHold;
+
+impl Integrator for ExactHold {}
+impl FactoredIntegrator for ExactHold {}
 
 impl Memory for ExactHold {}
 

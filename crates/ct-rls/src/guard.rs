@@ -1,8 +1,9 @@
 //! Checks around every step for every representation of `P`: the guards, the counts, and the reason why a run has stopped.
 
 use crate::Error;
-use crate::estimator::{Health, Outcome};
+use crate::estimator::Health;
 use crate::integrator::sealed::{Capped, Memory, Refusal};
+use crate::outcome::Outcome;
 use crate::settings::{Guards, MAX_PHI_SQUARED, StepFactors, Weights};
 
 /// The start of the cap on the trace, times the trace of `P(0)`.

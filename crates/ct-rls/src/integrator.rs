@@ -2,30 +2,19 @@
 
 use core::fmt::Debug;
 
-use crate::{Directional, Euler, ExactHold, RandomWalk, Rk4};
-
-/// A rule that carries `theta` and `P` over a step: [`ExactHold`], [`Directional`] or [`RandomWalk`]; [`Euler`] and [`Rk4`] to compare.
+/// A rule that carries `theta` and `P` over a step: [`ExactHold`](crate::ExactHold), [`Directional`](crate::Directional) or
+/// [`RandomWalk`](crate::RandomWalk); [`Euler`](crate::Euler) and [`Rk4`](crate::Rk4) to compare.
 pub trait Integrator: sealed::Rule + Copy + Debug {}
 
-impl Integrator for ExactHold {}
-impl Integrator for Directional {}
-impl Integrator for RandomWalk {}
-impl Integrator for Euler {}
-impl Integrator for Rk4 {}
-
-/// An integrator for the factors of `P`, which keep `P` positive definite: [`ExactHold`], [`Directional`] or [`RandomWalk`].
+/// An integrator for the factors of `P`, which keep `P` positive definite: [`ExactHold`](crate::ExactHold),
+/// [`Directional`](crate::Directional) or [`RandomWalk`](crate::RandomWalk).
 pub trait FactoredIntegrator: Integrator + sealed::FactorRule {}
-
-impl FactoredIntegrator for ExactHold {}
-impl FactoredIntegrator for Directional {}
-impl FactoredIntegrator for RandomWalk {}
 
 pub(crate) mod sealed {
     use core::fmt::Debug;
 
     use nalgebra::{SMatrix, SVector};
 
-    use crate::blocks::Block;
     use crate::settings::{StepFactors, Weights};
     use crate::{Error, UdFactor};
 
@@ -152,6 +141,15 @@ pub(crate) mod sealed {
         let scratch = (product.as_mut_slice(), gain.as_mut_slice());
         R::advance(parts, scratch, phi, epsilon, weights, step, intensity).ok_or(Refusal::NotFinite)
     }
+
+    /// One block: estimates, `P`, regressor, weights, step.
+    pub type Block<'a, const P: usize, S> = (
+        &'a mut [f64; P],
+        &'a mut S,
+        &'a [f64; P],
+        &'a Weights,
+        &'a StepFactors,
+    );
 
     pub trait BlockRule: Rule {
         /// One step of two blocks, given `eps` at its start; returns the sum of `phi'P phi` at its start.

@@ -37,6 +37,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::integrator::sealed::{
     Capped, Covariance, FactorRule, Memory, Refusal, Rule, step_on_factors,
 };
+use crate::integrator::{FactoredIntegrator, Integrator};
 use crate::settings::{MAX_EPSILON, StepFactors, Weights, in_range};
 use crate::{ContinuousRls, Error, UdFactor, factor};
 
@@ -104,6 +105,9 @@ impl<const P: usize> ContinuousRls<P, RandomWalk> {
         self.state.q.into()
     }
 }
+
+impl Integrator for RandomWalk {}
+impl FactoredIntegrator for RandomWalk {}
 
 impl Memory for RandomWalk {
     #[cfg(feature = "serde")]

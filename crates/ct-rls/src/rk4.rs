@@ -9,12 +9,14 @@
 use crate::Error;
 use crate::factor::dot;
 use crate::integrator::sealed::{Covariance, Memory, Refusal, Rule};
-use crate::integrator::{Plain, take};
+use crate::integrator::{Integrator, Plain, take};
 use crate::settings::{MAX_EPSILON, StepFactors, Weights};
 
 /// Runge-Kutta method of fourth order for the full matrix `P`. Stops if `P` is no longer positive definite.
 #[derive(Clone, Copy, Debug)]
 pub struct Rk4;
+
+impl Integrator for Rk4 {}
 
 impl Memory for Rk4 {}
 

@@ -71,6 +71,7 @@ mod quote;
 mod record;
 mod resample;
 pub mod residual_tests;
+mod series;
 mod stationary_noise;
 mod stationary_whitener;
 mod stream;
@@ -93,9 +94,9 @@ pub use isolated::{IsolatedReadings, isolated_readings};
 pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
 pub use quote::{escaped, quoted, shown};
 pub use record::{
-    Channel, Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, interpolated, range_of, record_names,
-    require_samples,
+    Channel, Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, record_names, require_samples,
 };
+pub use series::{interpolated, range_of};
 pub use stationary_noise::{CovarianceSum, StationaryNoise};
 pub use stationary_whitener::StationaryWhitener;
 pub use stream::{BadLine, Line, RowTimes, Rows};

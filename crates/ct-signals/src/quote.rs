@@ -30,6 +30,11 @@ pub fn shown(value: f64) -> String {
     }
 }
 
+/// A number rounded to remove binary rounding errors.
+pub(crate) fn rounded(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
+}
+
 /// A text with control characters, invisible characters and characters that change the text direction escaped as `\u{202e}`.
 #[must_use]
 pub fn escaped(text: &str) -> Cow<'_, str> {

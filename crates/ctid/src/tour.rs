@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use ct_signals::ReadOptions;
 use missing_effect::{Diagnosis, Options, Problem, Verdict};
 
-use crate::commands::say;
+use crate::finish::say;
 use crate::input::Files;
 use crate::look::Look;
 use crate::progress::Bar;

@@ -11,7 +11,7 @@ use crate::{
     Scalar,
     inflow::Inflow,
     lag_response::{one_lag, two_lags},
-    structure::SERIES,
+    limits::SERIES,
 };
 
 /// Coefficients of one vessel's level after a step.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Known, Unit, scales::Scales};
+use crate::{Unit, scales::Scales};
 
 /// A plant of the model file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -158,15 +158,6 @@ impl Plant {
             Some(_) => "level_lower",
             None => "level",
         }
-    }
-
-    /// Two parameters whose values may be exchanged without any change of the readings, once the initial level of the vessel that is not
-    /// measured is fitted again. An effect in one of the vessels removes this symmetry. `None` if there is no such pair, and also if both
-    /// levels are measured or a measured disturbance flows into the lower vessel, which removes the symmetry too.
-    #[must_use]
-    pub fn interchangeable(self, known: &Known) -> Option<[&'static str; 2]> {
-        let told_apart = known.outputs(self).len() > 1 || known.disturbed_vessel(self) == Some(1);
-        (self == Self::CascadedTanksLinear && !told_apart).then_some(["tau1", "tau2"])
     }
 
     /// The plant's own fitted parameters, in the order in which the simulator takes them. For a record with a measured disturbance

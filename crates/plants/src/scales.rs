@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::structure::{MAX_VESSELS, SERIES};
+use crate::limits::{MAX_VESSELS, SERIES};
 
 /// A start value chosen from the data as the best of several alternatives; their number enters the multiple-testing correction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

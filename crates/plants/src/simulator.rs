@@ -6,8 +6,8 @@ mod numbers;
 pub use numbers::SimulatorNumber;
 
 use crate::{
-    Scalar, actuator::Actuator, actuator::Signal, inflow::Feed, inflow::Inflow, sensor::Sensor,
-    structure::MAX_VESSELS, structure::SERIES, vessels::Stretch, vessels::Vessels,
+    Scalar, actuator::Actuator, actuator::Signal, inflow::Feed, inflow::Inflow,
+    limits::MAX_VESSELS, limits::SERIES, sensor::Sensor, vessels::Stretch, vessels::Vessels,
 };
 
 /// The command over one sampling interval \[input unit\].

@@ -4,63 +4,12 @@ mod site;
 
 pub use self::site::{Placed, Site};
 use crate::{
-    Domain, Error, ParameterInfo, Plant, Term, effects, effects::EffectInfo, effects::Place,
-    plant::Outlet, scales::OutputScales, scales::Picked, scales::Scales,
+    Domain, Error, Known, MAX_VESSELS, ParameterInfo, Plant, Term, effects, effects::EffectInfo,
+    effects::Place, plant::Outlet, scales::OutputScales, scales::Picked, scales::Scales,
 };
-
-/// Largest number of vessels of a plant.
-pub const MAX_VESSELS: usize = 3;
-/// Largest number of vessels in series, each above the next one. A plant with three vessels has them connected by valves.
-pub(crate) const SERIES: usize = 2;
 
 /// Factor by which the range of an effect's size is widened if its estimate is at a bound.
 pub const WIDENED: f64 = 4.0;
-
-/// Constants that are known and not fitted.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Known {
-    /// Area of each vessel. `None`: the area is one, and the level is only known in units of the sensor.
-    pub area: [Option<f64>; MAX_VESSELS],
-    /// The vessels whose levels are measured, in the order of the outputs; empty: the last vessel only.
-    pub measured: Vec<usize>,
-    /// `S_n sqrt(2 g)` of the pipes between tanks, `S_n` their cross-section: flow coefficients are then dimensionless \[level^2.5/s\].
-    pub orifice: Option<f64>,
-    /// Height of the tanks \[level unit\].
-    pub tank_height: Option<f64>,
-    /// Largest command \[input unit\].
-    pub input_range: Option<f64>,
-    /// The vessel into which the record's second input flows as a measured disturbance, with the gain `disturbance_gain`; an index beyond
-    /// the last vessel means the last vessel. `None`: a second input is not used. For joined tanks, the second input is always the command
-    /// to the second pump.
-    pub disturbance: Option<usize>,
-}
-
-impl Known {
-    /// The vessels whose levels are measured, in the order of the outputs.
-    #[must_use]
-    pub fn outputs(&self, plant: Plant) -> Vec<usize> {
-        if self.measured.is_empty() {
-            vec![plant.vessels() - 1]
-        } else {
-            self.measured.clone()
-        }
-    }
-
-    /// The name of an output if there are several: the name of the vessel whose level it reads.
-    #[must_use]
-    pub fn output_name(&self, plant: Plant, output: usize) -> Option<&'static str> {
-        let outputs = self.outputs(plant);
-        let vessel = outputs.get(output).filter(|_| outputs.len() > 1)?;
-        plant.vessel_name(*vessel)
-    }
-
-    /// The vessel into which a measured disturbance flows, if there is one.
-    #[must_use]
-    pub fn disturbed_vessel(&self, plant: Plant) -> Option<usize> {
-        let vessel = self.disturbance.filter(|_| !plant.joined())?;
-        Some(vessel.min(plant.vessels() - 1))
-    }
-}
 
 /// A plant and its active effects.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use ct_signals::parts;
 use ctid::own_model::{Records, design, diagnosed_page};
-use effect_search::Failures;
 use effect_search::Options;
 use effect_search::design::Limits;
 use numpy::PyArray1;
@@ -14,7 +13,11 @@ use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::Content;
-use crate::model::{Inner, Kept, Model};
+use crate::json::json;
+use crate::model::Model;
+use crate::own::{Inner, Kept};
+use crate::series::{RecordSeries, simulated_series, units_of};
+use crate::time_limit::limit;
 use crate::{bytes, error, work};
 
 /// Diagnosis of a model; immutable.
@@ -35,70 +38,6 @@ struct KeptDiagnosis {
     fitted: usize,
     found: effect_search::Diagnosis,
     simulated: Vec<Vec<Vec<f64>>>,
-}
-
-/// Name, measured values and values of each step of an output.
-type OutputSeries<'py> = (
-    String,
-    Bound<'py, PyArray1<f64>>,
-    Vec<Bound<'py, PyArray1<f64>>>,
-);
-
-/// Name of a record, whether it is held out, its times \[s\], and its outputs.
-pub type RecordSeries<'py> = (
-    String,
-    bool,
-    Bound<'py, PyArray1<f64>>,
-    Vec<OutputSeries<'py>>,
-);
-
-/// The outputs of a record by its position: names and measured values, with the series that each step simulated.
-pub fn simulated_series<'py, 'a>(
-    py: Python<'py>,
-    record: usize,
-    outputs: impl ExactSizeIterator<Item = (String, &'a [f64])>,
-    steps: &[&[Vec<f64>]],
-) -> Vec<OutputSeries<'py>> {
-    let first = record * outputs.len();
-    let of_output = |(o, (name, measured)): (usize, (String, &[f64]))| {
-        let series = steps.iter().filter_map(|step| step.get(first + o));
-        let series = series.map(|values| PyArray1::from_slice(py, values));
-        (name, PyArray1::from_slice(py, measured), series.collect())
-    };
-    outputs.enumerate().map(of_output).collect()
-}
-
-/// A bin of the residual: index of the record (for a window), from, to, samples, mean, root mean square, whether the model fails clearly in
-/// the bin.
-pub type Bin = (Option<usize>, f64, f64, usize, f64, f64, bool);
-/// A kind of bin, the name of its input or state, and the bin.
-pub type NamedBin = (&'static str, Option<String>, Bin);
-
-/// Bins of the residual, by kind.
-pub fn bins(failures: &Failures) -> Vec<NamedBin> {
-    let unnamed = [
-        ("time", &failures.by_time),
-        ("output", &failures.by_output),
-        ("direction", &failures.by_direction),
-        ("frequency", &failures.by_frequency),
-    ];
-    let unnamed = unnamed.into_iter().map(|(by, bins)| (by, None, bins));
-    let inputs = failures.by_input.iter().map(|signal| ("input", signal));
-    let states = failures.by_state.iter().map(|signal| ("state", signal));
-    let named = inputs.chain(states);
-    let named = named.map(|(by, signal)| (by, Some(signal.name.clone()), &signal.bins));
-    let all = unnamed.chain(named).flat_map(|(by, name, bins)| {
-        bins.iter().map(move |b| {
-            let bin = (b.record, b.from, b.to, b.count, b.mean, b.rms, b.fails);
-            (by, name.clone(), bin)
-        })
-    });
-    all.collect()
-}
-
-/// A result as the program writes it.
-pub fn json(found: &impl Serialize) -> PyResult<String> {
-    serde_json::to_string(found).map_err(|error| error::Error::new_err(error.to_string()))
 }
 
 impl Diagnosis {
@@ -170,7 +109,7 @@ impl Diagnosis {
         time_limit: Option<f64>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(String, f64)> {
-        let limit = crate::fit::limit(effort, time_limit)?;
+        let limit = limit(effort, time_limit)?;
         let limits = Limits {
             inputs,
             ranges,
@@ -202,7 +141,7 @@ impl Diagnosis {
     /// The unit of each output; empty if no record has it.
     #[getter]
     fn output_units(&self) -> Vec<String> {
-        crate::fit::units_of(&self.records.records)
+        units_of(&self.records.records)
     }
 
     /// For each record, fitted ones first: its name, whether it is held out, its times \[s\], and for each output its name, the measured

@@ -1,7 +1,5 @@
 //! A fit.
 
-mod simulation;
-
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
@@ -14,10 +12,14 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
-pub use self::simulation::{check_simulation, limit, simulation, time_limit, units_of};
 use crate::diagnosis::Diagnosis;
-use crate::frame::{Content, Frame};
-use crate::model::{Inner, Kept, Model, contents, records};
+use crate::frame::{Content, Frame, contents};
+use crate::json::json;
+use crate::model::Model;
+use crate::own::{Inner, Kept, records};
+use crate::series::{Covariance, NamedBin, bins, units_of};
+use crate::simulation::{check_simulation, simulation};
+use crate::time_limit::limit;
 use crate::{bytes, error, work};
 
 /// A model that was fitted to frames; it never changes.
@@ -40,14 +42,11 @@ struct KeptFit {
     fit: greybox::Fit,
 }
 
-/// Names and matrix; none where the records do not determine all that was fitted.
-pub type Covariance<'py> = Option<(Vec<String>, Bound<'py, PyArray2<f64>>)>;
-
 /// Measured and simulated series of an output: name, measured, simulated.
 type Series<'py> = (String, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
 impl Fit {
-    pub fn of(
+    fn of(
         model: Arc<Inner>,
         frames: Vec<Content>,
         options: &FitOptions,
@@ -89,6 +88,35 @@ impl Fit {
 
 #[pymethods]
 impl Fit {
+    /// Fits a model to frames.
+    #[staticmethod]
+    #[pyo3(signature = (model, frames, *, starts, seed, noise_order, progress=None))]
+    fn of_model(
+        py: Python<'_>,
+        model: &Model,
+        frames: Vec<Bound<'_, Frame>>,
+        starts: usize,
+        seed: u64,
+        noise_order: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Self> {
+        let options = FitOptions {
+            starts,
+            seed,
+            noise_order,
+            ..FitOptions::default()
+        };
+        let frames = contents(&frames);
+        if frames.is_empty() {
+            return Err(error::of_data("no record: give a frame, or a list of them"));
+        }
+        let model = model.0.clone();
+        work::run(py, progress.as_ref(), move |stop, phases| {
+            phases.tell("fitting the model");
+            Self::of(model, frames, &options, stop)
+        })
+    }
+
     /// Name, value, standard error, unit and whether it is known, of each parameter and initial state.
     #[getter]
     fn estimates(&self) -> Vec<(String, f64, Option<f64>, String, bool)> {
@@ -203,17 +231,10 @@ impl Fit {
     }
 
     /// For each output: its name, the p-values of the tests of its residual (whiteness, dependence on the inputs), the bins where the model
-    /// fails, and these failures in sentences. A bin has a kind and a [`crate::diagnosis::Bin`].
+    /// fails, and these failures in sentences. A bin has a kind and a [`crate::series::Bin`].
     #[getter]
     #[allow(clippy::type_complexity)]
-    fn outputs(
-        &self,
-    ) -> Vec<(
-        String,
-        (f64, f64),
-        Vec<crate::diagnosis::NamedBin>,
-        Vec<String>,
-    )> {
+    fn outputs(&self) -> Vec<(String, (f64, f64), Vec<NamedBin>, Vec<String>)> {
         let diagnosis = &self.page().diagnosis;
         let outputs = diagnosis
             .steps
@@ -221,7 +242,7 @@ impl Fit {
             .map_or(&[][..], |step| &step.outputs);
         let all = outputs.iter().enumerate().map(|(at, output)| {
             let tests = (output.tests.whiteness_p, output.tests.input_p);
-            let bins = crate::diagnosis::bins(&output.failures);
+            let bins = bins(&output.failures);
             let sentences = ctid::sentences::of_failures(diagnosis, output, at);
             (output.name.clone(), tests, bins, sentences)
         });
@@ -253,7 +274,7 @@ impl Fit {
 
     /// The result as `ctid compare --json` writes it, without its mark.
     fn json(&self) -> PyResult<String> {
-        crate::diagnosis::json(&self.comparison)
+        json(&self.comparison)
     }
 
     /// The page of `ctid compare --report`.

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use ct_signals::{Columns, ReadOptions, Reading, parse_csv, parse_inputs_csv};
+use ct_signals::{Columns, Hold, ReadOptions, Reading, parse_csv, parse_inputs_csv};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -115,5 +115,21 @@ impl Content {
             time: Some(self.time.clone()),
             ..columns.clone()
         }
+    }
+}
+
+/// Frames that Python hands over.
+pub fn contents(frames: &[Bound<'_, Frame>]) -> Vec<Content> {
+    frames.iter().map(|frame| frame.get().0.clone()).collect()
+}
+
+/// What the inputs do between rows.
+pub fn hold_of(hold: &str) -> PyResult<Hold> {
+    match hold {
+        "zero" => Ok(Hold::Zero),
+        "first" => Ok(Hold::First),
+        other => Err(error::of_model(format!(
+            "hold is \"zero\" or \"first\", and not \"{other}\""
+        ))),
     }
 }

@@ -1,7 +1,7 @@
 //! Linear models in continuous time from records: `ctid identify`.
 
 use clap::ValueEnum;
-use ct_signals::{Columns, Hold, ReadOptions, Reading};
+use ct_signals::{Columns, ReadOptions, Reading};
 use ctid::output::Written;
 use fcloe::Controller;
 use linear_identification::{
@@ -11,8 +11,8 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 
 use crate::error;
-use crate::frame::Frame;
-use crate::model::contents;
+use crate::frame::{Frame, contents, hold_of};
+use crate::json::json;
 use crate::work;
 
 /// Time, measured output, simulated output.
@@ -30,17 +30,6 @@ pub fn controller(polynomials: Option<(Vec<f64>, Vec<f64>)>) -> PyResult<Option<
     let of = |coefficients| ct_lti::Polynomial::new(coefficients).map_err(error::of_model);
     let controller = Controller::new(of(r)?, of(s)?);
     controller.map(Some).map_err(error::of_model)
-}
-
-/// What the inputs do between rows.
-pub fn hold_of(hold: &str) -> PyResult<Hold> {
-    match hold {
-        "zero" => Ok(Hold::Zero),
-        "first" => Ok(Hold::First),
-        other => Err(error::of_model(format!(
-            "hold is \"zero\" or \"first\", and not \"{other}\""
-        ))),
-    }
 }
 
 /// Identifies a linear model; returns what `ctid identify --json` writes, without its mark, and the curves.
@@ -143,5 +132,5 @@ pub fn identify<'py>(
         PyArray1::from_slice(py, &shown.output.values),
         PyArray1::from_slice(py, &shown.simulated),
     );
-    Ok((crate::diagnosis::json(&Written::of(&found))?, curves))
+    Ok((json(&Written::of(&found))?, curves))
 }

@@ -4,105 +4,19 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use ct_model::ModelSpec;
-use ct_signals::{Columns, ReadOptions, Reading};
-use ctid::own_model::{AnyModelFile, OwnModelFile, OwnSettings, Records};
-use greybox::{FitOptions, PriorValue};
+use ctid::own_model::{AnyModelFile, OwnModelFile, OwnSettings};
+use greybox::PriorValue;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use serde::{Deserialize, Serialize};
 
-use crate::fit::Fit;
-use crate::frame::{Content, Frame};
+use crate::frame::hold_of;
 use crate::monitor::Monitor;
-use crate::{bytes, error, work};
+use crate::own::{Inner, parsed};
+use crate::{bytes, error};
 
 /// A model; it never changes.
 #[pyclass(frozen, module = "ctid._ctid")]
 pub struct Model(pub Arc<Inner>);
-
-/// A model and, after a fit, its values.
-pub struct Inner {
-    /// Text for the user.
-    pub text: String,
-    pub file: OwnModelFile,
-    /// Fitted values by name, of parameters and of `x(0)`; empty where nothing was fitted.
-    pub values: BTreeMap<String, f64>,
-}
-
-/// The model in its pickled form.
-#[derive(Serialize, Deserialize)]
-pub struct Kept {
-    name: String,
-    text: String,
-    settings: OwnSettings,
-    values: BTreeMap<String, f64>,
-}
-
-impl Inner {
-    pub fn kept(&self) -> Kept {
-        Kept {
-            name: self.file.name.clone(),
-            text: self.text.clone(),
-            settings: self.file.settings(),
-            values: self.values.clone(),
-        }
-    }
-
-    pub fn of_kept(kept: Kept) -> PyResult<Self> {
-        let Kept {
-            name,
-            text,
-            settings,
-            values,
-        } = kept;
-        let spec = parsed(&name, &text)?;
-        let file = OwnModelFile::new(&name, spec, settings).map_err(|e| error::of(&e))?;
-        Ok(Self { text, file, values })
-    }
-
-    /// Frames as records of the model; the fitted ones come first, and `fitted` is their number.
-    pub fn records(&self, frames: &[Content], fitted: usize) -> Result<Records, ctid::Error> {
-        records(&self.file, frames, fitted)
-    }
-}
-
-pub fn records(
-    file: &OwnModelFile,
-    frames: &[Content],
-    fitted: usize,
-) -> Result<Records, ctid::Error> {
-    let options = ReadOptions::from(file.hold);
-    let read = |frame: &Content| frame.record(&file.columns, &options);
-    let all = frames.iter().map(read);
-    let all = all.collect::<Result<Vec<Reading>, _>>()?;
-    let unit = file.time_unit.unwrap_or_else(|| time_unit(frames));
-    file.gathered(all, fitted, unit)
-}
-
-/// Seconds in one unit of the time of at least one frame.
-fn time_unit(frames: &[Content]) -> f64 {
-    let time = frames.first().map(|frame| frame.time.clone());
-    let columns = Columns {
-        time,
-        ..Columns::default()
-    };
-    columns.time_header().1
-}
-
-fn parsed(name: &str, text: &str) -> PyResult<ModelSpec> {
-    ModelSpec::parse_to_simulate(text).map_err(|source| {
-        error::of(&ctid::Error::Text {
-            file: name.to_string(),
-            source,
-        })
-    })
-}
-
-/// Frames that Python hands over.
-pub fn contents(frames: &[Bound<'_, Frame>]) -> Vec<Content> {
-    frames.iter().map(|frame| frame.get().0.clone()).collect()
-}
 
 #[pymethods]
 impl Model {
@@ -161,41 +75,11 @@ impl Model {
                 .insert(name, PriorValue { value, std_error });
         }
         if let Some(hold) = hold {
-            settings.hold = crate::identify::hold_of(hold)?;
+            settings.hold = hold_of(hold)?;
         }
-        let kept = Kept {
-            settings,
-            ..self.0.kept()
-        };
+        let mut kept = self.0.kept();
+        kept.settings = settings;
         Ok(Self(Arc::new(Inner::of_kept(kept)?)))
-    }
-
-    /// Fits the model to frames.
-    #[pyo3(signature = (frames, *, starts, seed, noise_order, progress=None))]
-    fn fit(
-        &self,
-        py: Python<'_>,
-        frames: Vec<Bound<'_, Frame>>,
-        starts: usize,
-        seed: u64,
-        noise_order: usize,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<Fit> {
-        let options = FitOptions {
-            starts,
-            seed,
-            noise_order,
-            ..FitOptions::default()
-        };
-        let frames = contents(&frames);
-        if frames.is_empty() {
-            return Err(error::of_data("no record: give a frame, or a list of them"));
-        }
-        let model = self.0.clone();
-        work::run(py, progress.as_ref(), move |stop, phases| {
-            phases.tell("fitting the model");
-            Fit::of(model, frames, &options, stop)
-        })
     }
 
     /// The model with its effects as text, with the fitted values after a fit.
@@ -283,18 +167,5 @@ impl Model {
     #[staticmethod]
     fn from_bytes(content: &[u8]) -> PyResult<Self> {
         Ok(Self(Arc::new(Inner::of_kept(bytes::read(content)?)?)))
-    }
-}
-
-impl Inner {
-    /// The model with its effects in it and all values that are known of it.
-    pub fn valued(&self) -> Result<ModelSpec, ctid::Error> {
-        let mut spec = self.file.mended(None)?.model.spec().clone();
-        for parameter in &mut spec.parameters {
-            let name = &parameter.about.name;
-            let value = self.file.known.get(name).or(self.values.get(name));
-            parameter.value = *value.unwrap_or(&parameter.value);
-        }
-        Ok(spec)
     }
 }

@@ -12,9 +12,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
-use crate::diagnosis::json;
-use crate::model::Inner;
-use crate::{bytes, error, tank};
+use crate::json::json;
+use crate::own::Inner;
+use crate::tank_file::{heading, parsed};
+use crate::{bytes, error};
 
 /// Watches a plant row by row.
 #[pyclass(frozen, module = "ctid._ctid")]
@@ -86,7 +87,7 @@ impl Watched {
                 (own.into(), Units::default())
             }
             Of::Tank { text, units } => {
-                let file = tank::parsed(text).map_err(|error| error::of(&error))?;
+                let file = parsed(text).map_err(|error| error::of(&error))?;
                 let (input, output) = units.clone();
                 let believed = ctid::monitor::believed(&file);
                 (believed.into(), Units { output, input })
@@ -114,7 +115,7 @@ impl Watched {
                 Ok((inputs.collect(), outputs.collect()))
             }
             Of::Tank { text, .. } => {
-                let file = tank::parsed(text).map_err(|error| error::of(&error))?;
+                let file = parsed(text).map_err(|error| error::of(&error))?;
                 Ok(signals_of_tank(&file))
             }
         }
@@ -124,7 +125,7 @@ impl Watched {
 /// The columns of a plant's command and readings; without them `u`, and `y` or the names of the levels that are read.
 fn signals_of_tank(file: &ModelFile) -> (Vec<String>, Vec<String>) {
     let read = file.known.outputs(file.plant);
-    let name = |column: &String| tank::heading(column).0;
+    let name = |column: &String| heading(column).0;
     let inputs = match &file.columns.inputs[..] {
         [] => vec!["u".to_string()],
         columns => columns.iter().map(name).collect(),

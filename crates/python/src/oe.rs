@@ -189,7 +189,7 @@ impl StabilizedOe {
                 filter.len()
             )));
         }
-        let hold = match crate::identify::hold_of(hold)? {
+        let hold = match crate::frame::hold_of(hold)? {
             ct_signals::Hold::Zero => Hold::Zero,
             ct_signals::Hold::First => Hold::First,
         };

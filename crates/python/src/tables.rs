@@ -3,6 +3,7 @@
 use paper_tables::{baysse, udink};
 use pyo3::prelude::*;
 
+use crate::json::json;
 use crate::work;
 
 /// Output of `ctid tables udink --json`, without the entry `written_by`.
@@ -12,12 +13,12 @@ pub fn udink_tables(py: Python<'_>, runs: usize, seed: u64) -> PyResult<String> 
     let found = work::run(py, None, |_, _| {
         Ok(udink::study(&settings, runs, seed, &|_| {})?)
     })?;
-    crate::diagnosis::json(&found)
+    json(&found)
 }
 
 /// Output of `ctid tables baysse --json`, without the entry `written_by`.
 #[pyfunction]
 pub fn baysse_tables(py: Python<'_>, runs: usize, seed: u64) -> PyResult<String> {
     let found = work::run(py, None, |_, _| Ok(baysse::study(runs, seed, &|_| {})?))?;
-    crate::diagnosis::json(&found)
+    json(&found)
 }

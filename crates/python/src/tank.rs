@@ -6,10 +6,10 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 use ct_model::ModelSpec;
-use ct_signals::{Heading, ReadOptions, Reading};
+use ct_signals::{ReadOptions, Reading};
 use ctid::effort::EffortLevel;
 use ctid::input;
-use ctid::model_file::{self, ModelFile};
+use ctid::model_file::ModelFile;
 use ctid::output::Written;
 use ctid::simulate::{TimeColumn, of_plant, text_of_plant};
 use missing_effect::{Diagnosis as Found, Options, Problem, compare, diagnose};
@@ -18,15 +18,14 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 
-use crate::diagnosis::{NamedBin, RecordSeries, bins, json, simulated_series};
-use crate::fit::{Covariance, check_simulation, simulation, units_of};
-use crate::frame::{Content, Frame};
-use crate::model::contents;
+use crate::frame::{Content, Frame, contents};
+use crate::json::json;
+use crate::series::{Covariance, NamedBin, RecordSeries, bins, simulated_series, units_of};
+use crate::simulation::{check_simulation, simulation};
+use crate::tank_file::{NAME, parsed};
 use crate::tank_text::WITHOUT_TEXT;
+use crate::time_limit::limit;
 use crate::{bytes, error, work};
-
-/// What stands for the model file in messages.
-pub const NAME: &str = "the model";
 
 /// A plant that was fitted to frames, or diagnosed; it never changes.
 #[pyclass(frozen, module = "ctid._ctid")]
@@ -45,10 +44,6 @@ pub struct TankFit {
 /// How well the parameters are known: names, covariance, degrees of freedom.
 type Known = Option<(Vec<String>, Vec<Vec<f64>>, f64)>;
 
-pub fn parsed(text: &str) -> Result<ModelFile, ctid::Error> {
-    model_file::parse(NAME, text)
-}
-
 /// The records of a plant as the program checks them.
 pub fn problem(file: ModelFile, frames: &[Content], fitted: usize) -> Result<Problem, ctid::Error> {
     let options = ReadOptions::from(file.hold);
@@ -61,12 +56,6 @@ pub fn problem(file: ModelFile, frames: &[Content], fitted: usize) -> Result<Pro
     input::on_one_clock(&mut records);
     let test = records.split_off(fitted);
     input::problem(NAME, file, records, test)
-}
-
-/// Name and unit of a column.
-pub fn heading(column: &str) -> (String, String) {
-    let Heading { name, unit, .. } = Heading::of(column);
-    (name, unit)
 }
 
 /// Ctrl-C ends a search; of a fit the result is dropped.
@@ -303,7 +292,7 @@ impl TankFit {
         seed: u64,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
-        let limit = crate::fit::limit(effort, time_limit)?;
+        let limit = limit(effort, time_limit)?;
         let mut frames = self.frames[..self.fitted].to_vec();
         frames.extend(contents(&test));
         work::run(py, progress.as_ref(), |stop, phases| {

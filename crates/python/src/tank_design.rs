@@ -6,7 +6,10 @@ use ctid::output::Written;
 use missing_effect::design::{Limits, design};
 use pyo3::prelude::*;
 
-use crate::tank::{KeptTank, NAME, options, parsed, problem};
+use crate::json::json;
+use crate::tank::{KeptTank, options, problem};
+use crate::tank_file::{NAME, parsed};
+use crate::time_limit::limit;
 use crate::{bytes, error, work};
 
 /// The experiment that distinguishes two effects best, from a plant and its records, in the form in which [`crate::tank::TankFit`] is pickled: what
@@ -26,7 +29,7 @@ pub fn tank_design(
     time_limit: Option<f64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
-    let limit = crate::fit::limit(effort, time_limit)?;
+    let limit = limit(effort, time_limit)?;
     let limits = Limits {
         range,
         slew,
@@ -61,5 +64,5 @@ pub fn tank_design(
             error => error.into(),
         })
     })?;
-    crate::diagnosis::json(&Written::of(&found))
+    json(&Written::of(&found))
 }

@@ -6,10 +6,10 @@ use ctid::model_file::ModelFile;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::frame::Frame;
-use crate::model::contents;
+use crate::frame::{Frame, contents};
 use crate::monitor::Monitor;
-use crate::tank::{TankFit, heading, parsed};
+use crate::tank::TankFit;
+use crate::tank_file::{heading, parsed};
 use crate::{error, tank_text};
 
 /// A plant, from the text of a model file; it never changes.

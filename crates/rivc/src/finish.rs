@@ -4,13 +4,14 @@ use ct_signals::{ArModel, StationaryNoise};
 use nalgebra::DMatrix;
 
 use crate::equations::Equations;
-use crate::estimate::{Estimate, Kind, Noise, Parameter, Settings};
 use crate::iterate::Refined;
 use crate::model::Model;
 use crate::pass::Instruments;
 use crate::plant::Plant;
 use crate::prepared::Prepared;
 use crate::problem::{Delayed, Problem};
+use crate::result::{Estimate, Kind, Parameter};
+use crate::settings::{Noise, Settings};
 use crate::{Data, Error};
 
 pub(crate) fn finish(

@@ -78,13 +78,17 @@ mod pass;
 mod plant;
 mod prepared;
 mod problem;
+mod result;
+mod settings;
 mod start;
 mod structure;
 
 pub use data::{Data, Input};
 pub use error::Error;
-pub use estimate::{Estimate, Kind, Noise, Parameter, Settings, estimate};
+pub use estimate::estimate;
 pub use plant::Plant;
+pub use result::{Estimate, Kind, Parameter};
+pub use settings::{Noise, Settings};
 pub use structure::{Delay, Structure};
 
 #[cfg(doctest)]

@@ -11,8 +11,6 @@
 
 use ct_rls::{BlockIntegrator, Euler, ExactHold};
 
-use crate::model::slopes;
-
 /// An integrator for estimates and model: [`ExactHold`] or [`Euler`].
 pub trait Integrator: BlockIntegrator + sealed::ModelRule {}
 
@@ -27,6 +25,19 @@ pub(crate) mod sealed {
         /// One step of `dt` seconds of the model with the coefficients `a = (a_1, .., a_n)` and an input that changes from `w0` to `w1`.
         fn advance<const N: usize>(state: &mut [f64; N], a: &[f64; N], w: (f64, f64), dt: f64);
     }
+}
+
+/// `y_m'` to `y_m^(n)`, given `drive = B^ u`.
+#[inline]
+pub(crate) fn slopes<const N: usize>(state: &[f64; N], a: &[f64], drive: f64) -> [f64; N] {
+    let mut slopes = [0.0; N];
+    let mut rest = drive - state[0];
+    for i in 1..N {
+        slopes[i - 1] = state[i];
+        rest -= a[i - 1] * state[i];
+    }
+    slopes[N - 1] = rest / a[N - 1];
+    slopes
 }
 
 impl sealed::ModelRule for Euler {

@@ -7,7 +7,7 @@
 //! with `theta^` as it is, so that `phi_m' theta^ = y_m` holds exactly: a derivative from elsewhere would break (4.7).
 
 use crate::Integrator;
-use crate::integrator::sealed::ModelRule;
+use crate::integrator::{sealed::ModelRule, slopes};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Model<const N: usize, const P: usize> {
@@ -77,17 +77,4 @@ fn drive<const N: usize, const P: usize>(theta: &[f64; P], inputs: &[f64; P]) ->
         .zip(&inputs[N..])
         .map(|(b, u)| b * u)
         .sum()
-}
-
-/// `y_m'` to `y_m^(n)`, given `drive = B^ u`.
-#[inline]
-pub(crate) fn slopes<const N: usize>(state: &[f64; N], a: &[f64], drive: f64) -> [f64; N] {
-    let mut slopes = [0.0; N];
-    let mut rest = drive - state[0];
-    for i in 1..N {
-        slopes[i - 1] = state[i];
-        rest -= a[i - 1] * state[i];
-    }
-    slopes[N - 1] = rest / a[N - 1];
-    slopes
 }

@@ -2,7 +2,8 @@
 
 use super::SimulationState;
 use super::delays::Delays;
-use super::step::{Drive, Interval, Step};
+use super::drive::{Drive, Interval};
+use super::step::Step;
 use crate::scalar::Scalar;
 use crate::tape::{Register, Registers, Tape};
 
@@ -46,7 +47,7 @@ impl<T: Scalar> SimulationState<T> {
     /// Whether the slopes at the end of the last step are finite.
     fn ends_with_values(&mut self, tape: &Tape, drive: &Drive<'_, T>, h: T) -> bool {
         let next = self.work.next.clone();
-        drive.load(tape, &mut self.work, self.time + h, &next);
+        self.work.load(tape, drive, self.time + h, &next);
         self.work.evaluate_slopes(tape, drive);
         let values = &self.work.registers.values;
         let mut slopes = tape.derivatives.iter().map(|&i| values[i].value());
@@ -89,7 +90,7 @@ impl<T: Scalar> SimulationState<T> {
 
     /// Projects the states onto the switching surfaces on which they slide.
     pub(super) fn put_back(&mut self, tape: &Tape, drive: &Drive<'_, T>) {
-        drive.load(tape, &mut self.work, self.time, &self.state);
+        self.work.load(tape, drive, self.time, &self.state);
         self.work.evaluate_slopes(tape, drive);
         let Step {
             sliding, registers, ..

@@ -3,11 +3,11 @@
 //! **Reference**: J. R. Dormand, P. J. Prince, J. Computational and Applied Mathematics 6 (1980) 19-26; E. Hairer, S. P. Nørsett,
 //! G. Wanner, Solving Ordinary Differential Equations I, 2nd edition, table II.5.2 and, for the interpolation, section II.6.
 
-use super::step::{Drive, Step, largest};
+use super::drive::Drive;
+use super::step::{STAGES, Step, largest};
 use crate::scalar::Scalar;
 use crate::tape::Tape;
 
-pub(super) const STAGES: usize = 7;
 const NODES: [f64; STAGES] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
 const A: [&[f64]; STAGES] = [
     &[],

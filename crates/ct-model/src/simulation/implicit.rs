@@ -7,7 +7,8 @@
 
 use nalgebra::DMatrix;
 
-use super::step::{Drive, Step, largest};
+use super::drive::Drive;
+use super::step::{Step, largest};
 use crate::scalar::{Dual, Scalar};
 use crate::tape::{Registers, Tape};
 
@@ -91,7 +92,7 @@ impl Jacobian {
         for (j, scale) in scale.iter().enumerate() {
             let by = DIFFERENCE * scale / tolerance;
             moved[j] = x[j] + by;
-            drive.load(tape, work, time, &moved);
+            work.load(tape, drive, time, &moved);
             work.evaluate_slopes(tape, drive);
             for (i, &register) in tape.derivatives.iter().enumerate() {
                 let rise = work.registers.values[register] - work.slopes[i];
@@ -120,7 +121,7 @@ pub(super) fn step<T: Scalar>(
     (scale, tolerance): (&[f64], f64),
 ) -> Option<f64> {
     let n = x.len();
-    drive.load(tape, work, time, x);
+    work.load(tape, drive, time, x);
     work.evaluate_slopes(tape, drive);
     work.keep_slope(tape, 0);
     work.begun = false;
@@ -146,7 +147,7 @@ pub(super) fn step<T: Scalar>(
                 work.next[i] = x[i] + h * sum;
             }
             let next = std::mem::take(&mut work.next);
-            drive.load(tape, work, time + h * NODES[stage], &next);
+            work.load(tape, drive, time + h * NODES[stage], &next);
             work.next = next;
             work.evaluate_slopes(tape, drive);
             for (i, &register) in tape.derivatives.iter().enumerate() {

@@ -1,9 +1,9 @@
 //! Simulation over one sampling interval, with step-size control; steps end at jumps and events.
 
 use super::delays::{Delays, POINTS};
+use super::drive::{Drive, Interval};
 use super::events::Event;
 use super::explicit::Interpolation;
-use super::step::{Drive, Interval};
 use super::{Method, NoSolution, SimulationState, explicit, implicit, order_four};
 use crate::scalar::Scalar;
 use crate::tape::Tape;
@@ -60,7 +60,7 @@ impl<T: Scalar> SimulationState<T> {
         if !delays.all.is_empty() {
             if first {
                 let drive = Drive::new(interval, delays);
-                drive.load(tape, &mut self.work, self.time, &self.state);
+                self.work.load(tape, &drive, self.time, &self.state);
                 self.before_the_record(tape);
                 for (delay, &(what, _)) in delays.all.iter_mut().zip(&tape.delays) {
                     delay.begin(self.time, self.work.registers.values[what]);
@@ -79,7 +79,7 @@ impl<T: Scalar> SimulationState<T> {
         self.begun = true;
         if !self.is_computed(from) {
             let drive = Drive::new(interval, delays);
-            drive.load(tape, &mut self.work, self.time, &self.state);
+            self.work.load(tape, &drive, self.time, &self.state);
             tape.evaluate_with_guards(&mut self.work.registers);
             self.remember(tape);
             self.slide_on(tape, &drive);
@@ -143,7 +143,8 @@ impl<T: Scalar> SimulationState<T> {
                 }
             }
             let drive = Drive::new(interval, delays);
-            drive.load(tape, &mut self.work, self.time + length * share, &state);
+            self.work
+                .load(tape, &drive, self.time + length * share, &state);
             if ahead {
                 tape.evaluate_with_guards(&mut self.work.registers);
             } else {
@@ -262,7 +263,7 @@ impl<T: Scalar> SimulationState<T> {
             }
             if let Some(Event { change, .. }) = event {
                 let drive = Drive::new(interval, delays);
-                drive.load(tape, &mut self.work, self.time, &self.state);
+                self.work.load(tape, &drive, self.time, &self.state);
                 self.change(tape, &drive, change);
                 for delay in delays.all.iter_mut().filter(|delay| !delay.known_ahead) {
                     delay.jump(self.time);
@@ -272,7 +273,7 @@ impl<T: Scalar> SimulationState<T> {
                 self.work.begun = false;
                 // A branch may depend on the signal that jumps.
                 let drive = Drive::new(interval, delays);
-                drive.load(tape, &mut self.work, self.time, &self.state);
+                self.work.load(tape, &drive, self.time, &self.state);
                 tape.evaluate_with_guards(&mut self.work.registers);
                 self.slide_on(tape, &drive);
                 for (i, delay) in delays.all.iter_mut().enumerate() {
@@ -290,7 +291,7 @@ impl<T: Scalar> SimulationState<T> {
     /// Adds the derivative of the remaining time if the last step ended at an event at the very end of the interval.
     fn finish(&mut self, tape: &Tape, interval: Interval<'_>, left: T, delays: &Delays<T>) {
         let drive = Drive::new(interval, delays);
-        drive.load(tape, &mut self.work, self.time, &self.state);
+        self.work.load(tape, &drive, self.time, &self.state);
         self.work.evaluate_slopes(tape, &drive);
         for (x, &register) in self.state.iter_mut().zip(&tape.derivatives) {
             *x = *x + left * self.work.registers.values[register];

@@ -8,9 +8,10 @@
 //! step, so that simulations with and without derivatives may differ by the tolerance.
 
 use super::delays::Delays;
+use super::drive::{Drive, Interval};
 use super::explicit::{self, Interpolation};
 use super::interval::{growth, reduction};
-use super::step::{Drive, Interval, largest};
+use super::step::largest;
 use super::{Method, SimulationState};
 use crate::scalar::Scalar;
 use crate::tape::Tape;
@@ -168,7 +169,7 @@ impl<T: Scalar> SimulationState<T> {
         long_step.inside.at(share, state);
         let drive = Drive::new(interval, delays);
         work.registers.held = true;
-        drive.load(tape, work, T::constant(until), state);
+        work.load(tape, &drive, T::constant(until), state);
         tape.evaluate_readings(&mut work.registers);
         if tape.is_any_changed(&work.registers) {
             state.copy_from_slice(&long_step.before);

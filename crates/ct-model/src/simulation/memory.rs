@@ -7,7 +7,7 @@
 
 use super::SimulationState;
 use super::delays::{Delay, Delays};
-use super::step::Drive;
+use super::drive::Drive;
 use crate::scalar::Scalar;
 use crate::tape::Tape;
 
@@ -46,7 +46,7 @@ impl<T: Scalar> SimulationState<T> {
             return;
         }
         let drive = Drive::held(inputs, &self.held, delays);
-        drive.load(tape, &mut self.work, self.time, &self.state);
+        self.work.load(tape, &drive, self.time, &self.state);
         self.before_the_record(tape);
     }
 

@@ -13,6 +13,7 @@
 //! **Reference** for the derivatives through events: S. Galan, W. F. Feehery, P. I. Barton, Applied Numerical Mathematics 31 (1999) 17-47.
 
 mod delays;
+mod drive;
 mod events;
 mod exact;
 mod explicit;
@@ -33,11 +34,12 @@ pub use self::numbers::SimulationNumber;
 pub use self::owners::{SharedSimulation, Simulation};
 
 use self::delays::{Delay, Delays};
+use self::drive::{Drive, Interval};
 use self::exact::Exact;
 use self::implicit::Jacobian;
 use self::interval::MOST_STEPS;
 use self::long_step::LongStep;
-use self::step::{Drive, Interval, Step};
+use self::step::Step;
 use crate::linearity::ExactSteps;
 use crate::scalar::Scalar;
 use crate::tape::Tape;
@@ -179,7 +181,7 @@ impl<T: Scalar> SimulationState<T> {
         } else {
             self.long_step.end();
             self.work.registers.held = false;
-            drive.load(tape, &mut self.work, self.time, &self.state);
+            self.work.load(tape, &drive, self.time, &self.state);
             if self.begun {
                 self.let_through(tape, &delays);
             } else {
@@ -332,7 +334,7 @@ impl<T: Scalar> SimulationState<T> {
         // Linear models do not depend on `time`. The slope for held inputs comes first, then the contribution of the inputs' slopes.
         if !self.is_computed(from) {
             let drive = Drive::held(from, &self.held, &delays);
-            drive.load(tape, &mut self.work, self.time, &self.state);
+            self.work.load(tape, &drive, self.time, &self.state);
             // A branch may depend on an input.
             tape.evaluate_with_guards(&mut self.work.registers);
         }
@@ -345,7 +347,7 @@ impl<T: Scalar> SimulationState<T> {
                 *end = from + rise * h;
             }
             let drive = Drive::held(&self.last, &self.held, &delays);
-            drive.load(tape, &mut self.work, self.time, &self.state);
+            self.work.load(tape, &drive, self.time, &self.state);
             tape.evaluate(&mut self.work.registers);
             self.work.keep_slope(tape, 1);
             for (i, added) in self.added.iter_mut().enumerate() {

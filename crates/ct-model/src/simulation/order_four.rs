@@ -8,8 +8,8 @@
 //! **Reference**: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition, tables II.1.1 and II.1.2, and
 //! section II.4 for embedded methods.
 
-use super::explicit::STAGES;
-use super::step::{Drive, Step, largest};
+use super::drive::Drive;
+use super::step::{STAGES, Step, largest};
 use crate::scalar::Scalar;
 use crate::tape::Tape;
 

@@ -10,7 +10,7 @@
 //!
 //! **Reference**: A. F. Filippov, Differential Equations with Discontinuous Righthand Sides, Kluwer 1988, section 4.
 
-use super::step::Drive;
+use super::drive::Drive;
 use crate::scalar::Scalar;
 use crate::tape::{Register, Registers, Tape};
 

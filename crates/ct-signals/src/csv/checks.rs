@@ -4,7 +4,9 @@ use std::collections::HashMap;
 
 use super::{ReadOptions, fewest_rows, table::Table, text::line_number};
 use crate::columns::{Found, Layout, Purpose};
+use crate::quote::rounded;
 use crate::record::median_step;
+use crate::series::constant;
 use crate::{Error, quoted};
 
 /// A record is rejected if more than this share of the output is exactly at its limits ...
@@ -208,18 +210,4 @@ fn check_saturation(file: &str, column: &Found, values: &[f64]) -> Result<(), Er
         rows,
         limits,
     })
-}
-
-/// A number rounded to remove binary rounding errors.
-pub(super) fn rounded(value: f64) -> f64 {
-    format!("{value:.9e}").parse().unwrap_or(value)
-}
-
-/// The value of a signal that is constant to a part in a billion, without missing samples.
-pub(crate) fn constant(values: &[f64]) -> Option<f64> {
-    let first = *values.iter().find(|value| !value.is_nan())?;
-    values
-        .iter()
-        .all(|v| v.is_nan() || (v - first).abs() <= 1e-9 * first.abs())
-        .then_some(first)
 }

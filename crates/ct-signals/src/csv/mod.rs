@@ -26,7 +26,6 @@ use self::table::read_table;
 use self::text::decode;
 pub(crate) use self::{
     cells::{Cell, CellFault, Numbers, THOUSANDS, TIME_AS_NUMBER, says_missing},
-    checks::constant,
     text::{check_width, delimiter, delimiter_name, is_number},
     time::Times,
 };

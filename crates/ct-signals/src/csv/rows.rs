@@ -1,10 +1,10 @@
 //! The rows of a CSV file, from its header on.
 
-use csv::{Reader, ReaderBuilder, StringRecord, Trim};
+use csv::{Reader, StringRecord};
 
 use super::empty;
 use super::start::{Start, unit_of};
-use super::text::{check_header, is_before_header, line_number};
+use super::text::{check_header, is_before_header, line_number, reader};
 use crate::{Error, ReadError, Unit, quoted, unit};
 
 /// Reads rows, and knows where each of them ends in the file.
@@ -91,14 +91,4 @@ impl<'a> Rows<'a> {
         let read = usize::try_from(self.reader.position().byte());
         read.map_or(usize::MAX, |read| read.saturating_add(self.start.begin))
     }
-}
-
-pub(super) fn reader(text: &str, delimiter: u8) -> Reader<&[u8]> {
-    ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .delimiter(delimiter)
-        .comment(Some(b'#'))
-        .trim(Trim::All)
-        .from_reader(text.as_bytes())
 }

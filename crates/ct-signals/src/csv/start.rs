@@ -3,8 +3,7 @@
 use csv::StringRecord;
 
 use super::cells::says_missing;
-use super::rows::reader;
-use super::text::{delimiter, is_before_header};
+use super::text::{delimiter, is_before_header, reader};
 use crate::{MOST_COLUMNS, TimestampReader, Unit};
 
 /// Rows in which the header is looked for, and bytes.

@@ -1,8 +1,8 @@
-//! The text of a CSV file: its encoding, its delimiter, and the line numbers of its rows.
+//! The text of a CSV file: its encoding, its delimiter, the reader of its rows, and their line numbers.
 
 use std::borrow::Cow;
 
-use csv::StringRecord;
+use csv::{Reader, ReaderBuilder, StringRecord, Trim};
 
 use crate::{Error, LONGEST_LINE, MOST_COLUMNS, ReadError, quoted};
 
@@ -155,4 +155,15 @@ pub(crate) fn delimiter_name(delimiter: u8) -> &'static str {
         b'|' => "bar",
         _ => "comma",
     }
+}
+
+/// Reads the rows of a text, which may differ in length, without comments and without blanks around the cells.
+pub(super) fn reader(text: &str, delimiter: u8) -> Reader<&[u8]> {
+    ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(delimiter)
+        .comment(Some(b'#'))
+        .trim(Trim::All)
+        .from_reader(text.as_bytes())
 }

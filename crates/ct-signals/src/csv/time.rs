@@ -5,11 +5,11 @@ use csv::StringRecord;
 use super::{
     ReadOptions,
     cells::{CellFault, Numbers},
-    checks::rounded,
     place::Place,
     rows::Rows,
 };
 use crate::columns::Columns;
+use crate::quote::rounded;
 use crate::{Calendar, Error, ReadError, Timestamp, TimestampError, TimestampReader, Zone, quoted};
 
 /// Format of a time column.

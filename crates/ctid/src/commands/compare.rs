@@ -7,8 +7,9 @@ use clap::{Args, ValueEnum};
 use greybox::FitOptions;
 use missing_effect::Options;
 
-use super::{Results, finish, plant_options};
+use super::{Results, plant_options};
 use crate::effort::EffortLevel;
+use crate::finish::finish;
 use crate::input::excitation;
 use crate::input::{self, Files, Input, ReadArguments};
 use crate::look::Look;

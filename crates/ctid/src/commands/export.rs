@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use clap::{ArgGroup, Args};
 use greybox::FitOptions;
 
-use super::{finish, plant_options};
+use super::plant_options;
 use crate::Error;
 use crate::effort::EffortLevel;
+use crate::finish::finish;
 use crate::input::{self, Files, ReadArguments};
 use crate::look::Look;
 use crate::output::{self, Kind};

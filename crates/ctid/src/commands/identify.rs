@@ -16,8 +16,9 @@ use linear_identification::{
 use missing_effect::Progress;
 
 use self::choice::Choice;
-use super::{Results, finish};
+use super::Results;
 use crate::Error;
+use crate::finish::finish;
 use crate::identify::{side_by_side_text, text};
 use crate::input::{self, ReadArguments};
 use crate::look::Look;

@@ -6,7 +6,7 @@ mod identify;
 mod simulate;
 mod tables;
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
@@ -18,8 +18,9 @@ use self::identify::Identify;
 use self::simulate::Simulate;
 use self::tables::Tables;
 use crate::effort::EffortLevel;
+use crate::finish::say;
 use crate::look::Look;
-use crate::output::{self, Found, Kind, Output};
+use crate::output::{self, Kind, Output};
 use crate::own_model::{self, AnyModelFile};
 use crate::progress::Bar;
 use crate::symptoms::Sought;
@@ -215,54 +216,6 @@ impl Results {
         let json = self.json.as_deref().map(|path| (Kind::Json, path));
         let report = self.report.as_deref().map(|path| (Kind::Report, path));
         json.into_iter().chain(report)
-    }
-}
-
-/// Writes the files, then prints the findings and the names of the files.
-pub(crate) fn finish(
-    found: &impl Found,
-    text: &str,
-    outputs: &[Output],
-    out: &mut dyn Write,
-    look: Look,
-) -> Result<(), Error> {
-    // The files are written first: they are complete even if the reader of the text closes the pipe. If a file cannot be written, the text
-    // is printed nevertheless.
-    let written: Vec<_> = outputs.iter().map(|output| output.write(found)).collect();
-    let mut text = text.to_string();
-    if !outputs.is_empty() {
-        text.push('\n');
-    }
-    let mut failed = Ok(());
-    for (output, written) in outputs.iter().zip(written) {
-        let path = output.path().display();
-        let written = match written {
-            Ok(written) => written,
-            Err(error) => {
-                failed = Err(error);
-                continue;
-            }
-        };
-        text += &look.faint(match (written, output.kind()) {
-            (true, _) => format!("wrote {path}"),
-            (false, Kind::Record) => {
-                format!("{path} is not written: no experiment is worth applying")
-            }
-            (false, _) => {
-                format!("{path} is not written: the residual shows no function of a variable")
-            }
-        });
-        text.push('\n');
-    }
-    say(out, &text)?;
-    failed
-}
-
-/// Writes text; a reader that has closed the pipe is no error.
-pub(crate) fn say(out: &mut dyn Write, text: &str) -> Result<(), Error> {
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(()),
     }
 }
 

@@ -7,9 +7,10 @@ use clap::Args;
 use ct_signals::ReadOptions;
 use greybox::FitOptions;
 
-use super::{finish, plant_options};
+use super::plant_options;
 use crate::Error;
 use crate::effort::EffortLevel;
+use crate::finish::finish;
 use crate::input::{self, Files, ReadArguments};
 use crate::look::Look;
 use crate::output::{self, Kind};

@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use paper_tables::{baysse, udink};
 
-use super::{Results, finish};
+use super::Results;
 use crate::Error;
 use crate::design::seed;
+use crate::finish::finish;
 use crate::look::Look;
 use crate::output::{self, Kind};
 use crate::progress::Bar;

@@ -13,15 +13,15 @@ use missing_effect::design::{Candidacy, Design, Limits};
 use plants::{EffectInfo, Known, Placed, Plant};
 use serde::Serialize;
 
-use crate::commands::finish;
+use crate::csv_text::header;
 use crate::effort::EffortLevel;
+use crate::finish::finish;
 use crate::input::{self, Files, Input, ReadArguments};
 use crate::look::Look;
 use crate::model_file::ModelFile;
 use crate::output::{self, Found, Kind, Output};
 use crate::own_model::{self, AnyModelFile, OwnModelFile, OwnProposal};
 use crate::progress::Bar;
-use crate::simulate::header;
 use crate::{Error, names, sentences};
 
 /// Command line options.

@@ -6,7 +6,8 @@ use effect_search::Kept;
 use super::own::Findings;
 use crate::Error;
 use crate::own_model::OwnModelFile;
-use crate::own_model::effects::{every_candidate, find, plain};
+use crate::own_model::effects::{every_candidate, find};
+use crate::own_model::raw_effects::plain;
 use crate::own_model::term::function;
 use crate::report::rounded;
 

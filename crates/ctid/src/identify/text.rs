@@ -5,11 +5,11 @@ mod facts;
 use linear_identification::{Identification, Order, deviation};
 
 pub(crate) use self::facts::{condition, facts, refined_facts};
+use crate::csv_text::header;
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot::{self, Axis};
 use crate::sentences;
-use crate::simulate::header;
 
 /// The whole of it.
 #[must_use]

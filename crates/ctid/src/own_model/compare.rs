@@ -12,9 +12,10 @@ use greybox::{FitOptions, TimeLimit, not_determined, weighted_rms};
 use missing_effect::Effort;
 use serde::Serialize;
 
+use super::blame::{blame, blame_search};
+use super::effects::RecordNumbers;
 use super::file::{OwnModelFile, Records};
-use super::fitted::{FitLimit, FittedModel, blame, blame_search};
-use super::problem::RecordNumbers;
+use super::fitted::{FitLimit, FittedModel};
 use crate::Error;
 
 /// The initial states of held-out records are fitted within this share of the time, whatever the fit took.

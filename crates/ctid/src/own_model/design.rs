@@ -8,17 +8,17 @@ use effect_search::design::{
 use effect_search::{Options, Progress};
 use serde::Serialize;
 
+use super::blame::blame;
 use super::effects::{every_candidate, find};
 use super::file::{OwnModelFile, Records};
-use super::fitted::blame;
 use super::problem::problem;
 use super::words::{EffectWords, shown_unit};
+use crate::csv_text::{cell, csv_text, header};
 use crate::design::text::{self, SHOWN, lines, power};
 use crate::findings::Reader;
 use crate::look::{Look, Side};
 use crate::output::Found;
 use crate::sentences::{interval, with_unit};
-use crate::simulate::{cell, csv_text, header};
 use crate::{Error, numbers};
 
 /// A significant effect lowers the criterion by this much.

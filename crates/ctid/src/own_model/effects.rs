@@ -6,32 +6,20 @@ use ct_model::ModelSpec;
 use ct_model::effects::{Candidate, OwnCandidate, Visited, all_effects, apply};
 use ct_signals::quoted;
 use effect_search::{Kept, all_candidates};
-use serde::Deserialize;
 use toml::Spanned;
 
+use super::raw_effects::{RawEffects, Setting, plain};
 use super::term::{self, FUNCTION};
 use crate::model_file::Source;
 use crate::{Error, names};
-
-/// The tables of effects, by identifier.
-pub(super) type RawEffects = BTreeMap<Spanned<String>, BTreeMap<Spanned<String>, Setting>>;
 
 /// Key of the numbers of the record, next to the names of parameters.
 pub(crate) const RECORD: &str = "record";
 /// The key of the parameters that are not fitted.
 const FIXED: &str = "fixed";
 
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    untagged,
-    expecting = "a number, `fixed = [\"a parameter\"]`, `record = { duration = 600.0 }`, or `function = \"shape(x,u)\"`"
-)]
-pub(super) enum Setting {
-    Start(f64),
-    Fixed(Vec<String>),
-    Record(BTreeMap<String, f64>),
-    Function(String),
-}
+/// Numbers of a record that the effects contain, by the effects' identifiers.
+pub type RecordNumbers = BTreeMap<String, BTreeMap<String, f64>>;
 
 /// The effects of a model file.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -48,11 +36,6 @@ pub struct OwnEffects {
     pub waiting: Vec<String>,
     /// Smooth functions that have names of the user's choice, in the model or not, by these names: `shape(T,u)`.
     pub functions: BTreeMap<String, String>,
-}
-
-/// An identifier without the blanks that the user typed.
-pub(crate) fn plain(id: &str) -> String {
-    id.chars().filter(|c| !c.is_whitespace()).collect()
 }
 
 /// Reads and checks the effects of a model file.

@@ -6,8 +6,8 @@ use ct_model::Expression;
 use effect_search::{ControlLoop, NotSimulated, Thresholds, enclose};
 use greybox::{Fit, FitOptions, ModelSetup, SimulatedLoop};
 
+use super::blame::blame_search;
 use super::file::{OwnModelFile, Records};
-use super::fitted::blame_search;
 use crate::Error;
 
 /// If the residual in the simulated loop is not independent of the signals from outside, the model lacks an effect. If then the error of an

@@ -5,8 +5,9 @@ use ct_signals::{Heading, ReadSummary, record_names};
 use greybox::FitOptions;
 use serde::Serialize;
 
+use super::blame::blame;
 use super::file::{OwnModelFile, Records};
-use super::fitted::{FitLimit, FittedModel, blame};
+use super::fitted::{FitLimit, FittedModel};
 use crate::Error;
 use crate::input::Files;
 use crate::numbers;

@@ -16,8 +16,7 @@ use greybox::PriorValue;
 use serde::{Deserialize, Serialize};
 
 use super::controller::OwnController;
-use super::effects::{self, OwnEffects};
-use super::problem::RecordNumbers;
+use super::effects::{self, OwnEffects, RecordNumbers};
 use crate::Error;
 use crate::edit::own::Findings;
 use crate::input::Files;

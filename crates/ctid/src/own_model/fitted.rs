@@ -1,11 +1,10 @@
 //! A user's own model fitted to records: the basis of comparisons, simulations and exports.
 
-use std::fmt::Display;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use ct_signals::{Columns, Reading, Record, record_names};
+use ct_signals::Record;
 use effect_search::{ControlLoop, Options, held_out, widened};
 use greybox::{
     Fit, FitOptions, FitUncertainty, ModelSetup, Robust, SimulatedLoop, TimeLimit,
@@ -13,12 +12,11 @@ use greybox::{
 };
 use missing_effect::Effort;
 
+use super::blame::{blame, blame_search};
 use super::enclosed::in_loop;
 use super::file::{OwnModelFile, Records};
-use super::simulate::simulated;
 use crate::Error;
 use crate::findings::{self, Reader};
-use crate::simulate::{ReadInputs, Simulated};
 
 /// Share of the time for adding the effects of the file one after the other.
 const OF_EFFECTS: f64 = 0.5;
@@ -181,6 +179,17 @@ impl FittedModel {
         &self.records
     }
 
+    /// The same fit with these records in place of its own.
+    pub(super) fn with_records(&self, records: Vec<Record>) -> Self {
+        Self {
+            records: Records {
+                records,
+                ..self.records.clone()
+            },
+            ..self.clone()
+        }
+    }
+
     /// The fit.
     #[must_use]
     pub fn estimate(&self) -> &Fit {
@@ -271,34 +280,6 @@ impl FittedModel {
         Ok(Some(moved))
     }
 
-    /// The model on the inputs of another record. Where that has readings its initial states are fitted to the `first` of each output, or
-    /// more where these do not tell. `level`: the probability with which the band holds, within 0 and 1.
-    ///
-    /// # Errors
-    /// Where an input is not whole, or the simulation does not go on, with the place and the correction.
-    pub fn simulate(&self, reading: Reading, first: usize, level: f64) -> Result<Simulated, Error> {
-        let name = std::path::PathBuf::from(&reading.record.name);
-        let columns = Columns {
-            time: Some(reading.summary.time_header.clone()),
-            ..Columns::default()
-        };
-        let mut read = ReadInputs::of(&name, reading, &columns)?;
-        self.model.convert(&mut read.record)?;
-        let mut all = self.records.records.clone();
-        all.push(read.record);
-        crate::input::on_one_clock(&mut all);
-        read.record = all.pop().unwrap_or_default();
-        let whole = Self {
-            records: Records {
-                records: all,
-                ..self.records.clone()
-            },
-            ..self.clone()
-        };
-        let of = (&self.model, Some(&whole), whole.records.time_unit);
-        simulated(of, (&read, &name, first), level, &self.options)
-    }
-
     /// Scores of simulations of other records, output by output. Initial states are fitted to the first rows of each record, which are not
     /// scored; all other parameters are fixed.
     ///
@@ -358,20 +339,4 @@ fn setup_of<'a>(model: &'a OwnModelFile, records: &'a Records) -> Result<ModelSe
     );
     let setup = setup.and_then(|setup| setup.with_priors(&model.priors));
     setup.map_err(|error| blame(&records.records, &error))
-}
-
-/// An error of a computation or of a search, with its records.
-pub(super) fn blame(records: &[Record], error: &impl Display) -> Error {
-    Error::File {
-        file: record_names(records).join(", "),
-        what: error.to_string(),
-    }
-}
-
-/// An error of the search, with its records.
-pub(super) fn blame_search(records: &[Record], error: effect_search::Error) -> Error {
-    match error {
-        effect_search::Error::Fit(error) => blame(records, &error),
-        other => Error::Columns(other.to_string()),
-    }
 }

@@ -12,13 +12,16 @@
 //!
 //! The commands of the program call these functions, so results agree to the last digit.
 
+mod blame;
 mod candidates;
 mod compare;
+mod control_loop;
 mod controller;
 mod design;
 mod diagnose;
 pub(crate) mod effects;
 mod enclosed;
+mod estimates;
 mod export;
 mod file;
 mod fitted;
@@ -26,6 +29,7 @@ mod held_out;
 mod identify;
 pub(crate) mod ports;
 mod problem;
+pub(crate) mod raw_effects;
 pub(crate) mod report;
 mod simulate;
 mod singles;
@@ -46,14 +50,13 @@ pub use self::diagnose::diagnose;
 pub(crate) use self::diagnose::{
     heading as diagnosis_heading, remaining as diagnosis_remaining, said as diagnosis_said, sizes,
 };
-pub use self::effects::OwnEffects;
+pub use self::effects::{OwnEffects, RecordNumbers};
 pub use self::export::text;
 pub(crate) use self::export::{Exported, commented, export};
 pub use self::file::{AnyModelFile, OwnModelFile, OwnSettings, Records};
 pub(crate) use self::file::{conversion, read_model};
 pub use self::fitted::{FitLimit, FittedModel, OutputScore};
 pub(crate) use self::identify::{Beside, OneByOne};
-pub use self::problem::RecordNumbers;
 pub(crate) use self::problem::options;
 pub use self::report::{Document, compared as compared_page, diagnosed as diagnosed_page};
 pub(crate) use self::simulate::simulate;

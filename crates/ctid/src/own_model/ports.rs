@@ -4,7 +4,8 @@ use ct_model::ModelSpec;
 use ct_model::effects::{Candidate, Effect, Place, Port, Role, Visited, candidates};
 
 use super::OwnModelFile;
-use super::effects::{every_candidate, find, plain};
+use super::effects::{every_candidate, find};
+use super::raw_effects::plain;
 use super::words::{EffectWords, shown_unit};
 use crate::Error;
 use crate::generic::{self, Sheet};

@@ -6,14 +6,12 @@ use ct_model::Model;
 use ct_model::effects::{Candidate, Role, Visited, apply};
 use effect_search::{Believed, Options, Problem, all_candidates, believed, with_effects};
 
+use super::blame::blame;
+use super::effects::RecordNumbers;
 use super::file::{OwnModelFile, Records};
-use super::fitted::blame;
 use super::time_unit::unit_of;
 use crate::effort::EffortLevel;
 use crate::{Error, interrupt, numbers};
-
-/// Numbers of a record that the effects contain, by the effects' identifiers.
-pub type RecordNumbers = BTreeMap<String, BTreeMap<String, f64>>;
 
 /// Options of a search that Ctrl-C ends.
 pub(crate) fn options(seed: u64, effort: EffortLevel) -> Options<'static> {

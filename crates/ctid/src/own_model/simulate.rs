@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ct_signals::{Heading, ReadSummary, Record, record_names};
+use ct_signals::{Columns, Heading, ReadSummary, Reading, Record, record_names};
 use greybox::{FitOptions, FitUncertainty, InitialStates, ModelSetup, output_errors};
 
 use super::file::{OwnModelFile, Records};
@@ -68,11 +68,35 @@ pub(crate) fn simulate(
     Ok((found, summaries))
 }
 
+impl FittedModel {
+    /// The model on the inputs of another record. Where that has readings its initial states are fitted to the `first` of each output, or
+    /// more where these do not tell. `level`: the probability with which the band holds, within 0 and 1.
+    ///
+    /// # Errors
+    /// Where an input is not whole, or the simulation does not go on, with the place and the correction.
+    pub fn simulate(&self, reading: Reading, first: usize, level: f64) -> Result<Simulated, Error> {
+        let name = std::path::PathBuf::from(&reading.record.name);
+        let columns = Columns {
+            time: Some(reading.summary.time_header.clone()),
+            ..Columns::default()
+        };
+        let mut read = ReadInputs::of(&name, reading, &columns)?;
+        self.model().convert(&mut read.record)?;
+        let mut all = self.records().records.clone();
+        all.push(read.record);
+        crate::input::on_one_clock(&mut all);
+        read.record = all.pop().unwrap_or_default();
+        let whole = self.with_records(all);
+        let of = (self.model(), Some(&whole), whole.records().time_unit);
+        simulated(of, (&read, &name, first), level, self.options())
+    }
+}
+
 /// A model with its effects on the inputs of a record, with initial states fitted to the first readings. `path` is the name in errors.
 ///
 /// # Errors
 /// Where the simulation does not go on.
-pub(super) fn simulated(
+fn simulated(
     (file, fitted, time_unit): (&OwnModelFile, Option<&FittedModel>, f64),
     (read, path, first): (&ReadInputs, &Path, usize),
     level: f64,

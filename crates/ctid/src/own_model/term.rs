@@ -6,7 +6,7 @@ use ct_model::ModelSpec;
 use ct_model::effects::{Candidate, check_term_name};
 use ct_signals::quoted;
 
-use super::effects::{RawEffects, Setting, plain};
+use super::raw_effects::{RawEffects, Setting, plain};
 use crate::model_file::Source;
 use crate::{Error, names};
 

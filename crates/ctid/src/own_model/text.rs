@@ -4,14 +4,14 @@ use ct_signals::Clock;
 use effect_search::Step;
 
 use super::compare::{Comparison, Curves};
-use super::diagnose::{estimates, state_rows};
+use super::estimates::{estimates, state_rows};
 use super::file::OwnModelFile;
 use super::fitted::cut_short;
+use crate::csv_text::header;
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot::{self, Axis, Curve, plot};
 use crate::sentences::{FailureWords, of_gaps};
-use crate::simulate::header;
 use crate::terminal::{FAILURES, residual_tests, without_50};
 
 /// The complete comparison, with a plot of the first record.

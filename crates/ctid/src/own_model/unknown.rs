@@ -3,9 +3,9 @@
 use effect_search::Unknown;
 
 use super::words::{EffectWords, shown_unit};
+use crate::csv_text::header;
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
-use crate::simulate::header;
 use crate::term_file::of_curve;
 
 /// Describes the function in one or two sentences.

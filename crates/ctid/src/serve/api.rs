@@ -13,26 +13,22 @@ use axum::routing::{get, post};
 use axum::{Json, Router};
 use plants::{Domain, EffectInfo};
 use serde::Deserialize;
-use serde_json::{Value, json};
-use tokio::task::spawn_blocking;
+use serde_json::json;
 
 use self::run::{cancel, finish, run};
+use super::app::App;
 use super::body::whole;
 use super::guard::{LARGEST_BODY, Refusal, check_length};
-use super::session::{Session, lock};
-use super::sessions::Shared;
+use super::session::lock;
 use super::settings::Form;
-use super::upload::Upload;
-use super::{App, downloads, own, state};
+use super::tab::{Answer, Tab, aside, find, with};
+use super::upload::{Upload, plain_name};
+use super::{downloads, own_change, state};
 use crate::edit;
 use crate::term_file::TermFile;
 
 /// Largest request in JSON \[bytes\].
 pub(super) const LARGEST_REQUEST: usize = 1 << 20;
-/// Largest number of characters of a record's name.
-const LONGEST_NAME: usize = 100;
-
-type Answer = Result<Json<Value>, Refusal>;
 
 pub(super) fn routes(app: &Arc<App>) -> Router<Arc<App>> {
     Router::new()
@@ -70,50 +66,6 @@ async fn read_first(
     Ok(next.run(Request::from_parts(parts, body.into())).await)
 }
 
-/// The requesting tab.
-#[derive(Debug, Deserialize)]
-pub(super) struct Tab {
-    pub session: String,
-}
-
-/// The session of a request.
-pub(super) fn find(app: &App, id: &str) -> Result<Shared, Refusal> {
-    app.sessions.find(id).ok_or_else(|| {
-        Refusal::new(
-            StatusCode::GONE,
-            "this tab's work is no longer kept: ctid was started anew, or other tabs needed the room; load the page again",
-        )
-    })
-}
-
-/// Runs a slow operation, such as reading a large file, outside the threads of the server.
-pub(super) async fn aside<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, Refusal> + Send + 'static,
-) -> Result<T, Refusal> {
-    let broke = |_| {
-        Refusal::new(
-            StatusCode::INTERNAL_SERVER_ERROR,
-            "the request failed because of an error in ctid",
-        )
-    };
-    spawn_blocking(work).await.map_err(broke)?
-}
-
-/// Applies a function to the session, and answers with the session's state.
-async fn with(
-    app: &App,
-    id: &str,
-    work: impl FnOnce(&mut Session) -> Result<(), Refusal> + Send + 'static,
-) -> Answer {
-    let session = find(app, id)?;
-    aside(move || {
-        let mut session = lock(&session);
-        work(&mut session)?;
-        Ok(Json(state::state(&mut session)))
-    })
-    .await
-}
-
 #[derive(Debug, Deserialize)]
 struct Open {
     session: Option<String>,
@@ -129,7 +81,7 @@ async fn open(State(app): State<Arc<App>>, Json(open): Json<Open>) -> Answer {
         session.refresh();
         let state = state::state(&mut session);
         Ok(Json(
-            json!({ "session": id, "state": state, "plants": state::plants(), "examples": own::examples() }),
+            json!({ "session": id, "state": state, "plants": state::plants(), "examples": own_change::examples() }),
         ))
     })
     .await
@@ -162,17 +114,6 @@ struct NewRecord {
     name: String,
     #[serde(default)]
     held_out: bool,
-}
-
-/// A name for messages and tables; it is not used as a file name.
-pub(super) fn plain_name(name: &str) -> String {
-    let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
-    let printable = last.chars().filter(|c| !c.is_control());
-    let name: String = printable.take(LONGEST_NAME).collect();
-    match name.trim() {
-        "" => "record.csv".to_string(),
-        name => name.to_string(),
-    }
 }
 
 async fn record(
@@ -249,10 +190,10 @@ async fn text(
 async fn own(
     State(app): State<Arc<App>>,
     Query(tab): Query<Tab>,
-    Json(change): Json<own::Change>,
+    Json(change): Json<own_change::Change>,
 ) -> Answer {
     let answer = with(&app, &tab.session, move |session| {
-        own::change(session, change)
+        own_change::change(session, change)
     });
     let answer = answer.await?;
     let all = app.clone();

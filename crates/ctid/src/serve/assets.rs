@@ -7,7 +7,7 @@ use axum::http::header;
 use axum::response::IntoResponse;
 use axum::routing::get;
 
-use super::App;
+use super::app::App;
 use crate::report;
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";

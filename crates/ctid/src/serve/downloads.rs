@@ -13,10 +13,11 @@ use ct_signals::Clock;
 use missing_effect::Shown;
 use serde::Deserialize;
 
-use super::App;
-use super::api::{Tab, aside, find, plain_name};
+use super::app::App;
 use super::guard::Refusal;
 use super::session::{UNNAMED, lock};
+use super::tab::{Tab, aside, find};
+use super::upload::plain_name;
 use super::{own, words};
 use crate::design::Proposal;
 use crate::input;

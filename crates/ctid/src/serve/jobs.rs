@@ -14,8 +14,8 @@ use missing_effect::design::{Design, Limits, design};
 use missing_effect::{Diagnosis, Options, Problem, Progress, Verdict, compare, diagnose};
 
 use super::guard::Refusal;
-use super::own;
 use super::own_design::{self, AppliedInput};
+use super::own_work;
 use super::session::{Fitted, Found, Job, Kind, Session, lock};
 use super::sessions::Shared;
 use super::words;
@@ -51,7 +51,7 @@ pub(super) enum Task {
 /// Input of a task.
 enum Input {
     Plant(Box<Work>),
-    Own(Box<own::Work>),
+    Own(Box<own_work::Work>),
 }
 
 /// Outcome of a task.
@@ -149,11 +149,11 @@ pub(super) fn begin(shared: &Shared, task: Task) -> Result<(), Refusal> {
     session.stop();
     let work = match (&task, &session.own) {
         (Task::Compare | Task::Diagnose { .. }, Some(_)) => {
-            Input::Own(Box::new(own::Work::new(&mut session)?))
+            Input::Own(Box::new(own_work::Work::new(&mut session)?))
         }
-        (Task::Design { group, between, .. }, Some(_)) => {
-            Input::Own(Box::new(own::Work::beside(&mut session, *group, between)?))
-        }
+        (Task::Design { group, between, .. }, Some(_)) => Input::Own(Box::new(
+            own_work::Work::beside(&mut session, *group, between)?,
+        )),
         (Task::Chain(_), Some(_)) => {
             return Err(Refusal::input(
                 "chains are not on the page for models of your own yet: add an effect, and fit the model again",

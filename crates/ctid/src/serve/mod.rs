@@ -7,10 +7,10 @@
 //! | the page's files | `assets.rs`, `page/` |
 //! | what one tab works on | `session.rs`, its records `upload.rs`; all of them: `sessions.rs`; what they hold: `held.rs` |
 //! | the form of the model | `settings.rs` |
-//! | a model of its user's own, and its fits | `own.rs`; what is computed for it `own/work.rs`; what was found `own_findings.rs`; its experiments `own_design.rs` |
+//! | a model of its user's own, and its fits | `own.rs`; its changes `own_change.rs`; what is computed for it `own_work.rs`; what was found `own_findings.rs`; its experiments `own_design.rs` |
 //! | computations | `jobs.rs` |
 //! | what the page is told | `state.rs`, `words.rs` |
-//! | the routes | `api.rs`, those of computations `api/run.rs`; `downloads.rs` |
+//! | the routes | `api.rs`, those of computations `api/run.rs`; `downloads.rs`; what they share: `app.rs`, `tab.rs` |
 //!
 //! The state is a model file, that of `--model` or a text that is kept for the tab and can be downloaded. It is changed by the
 //! functions of `ctid add` and `ctid remove`, fitted by those of `ctid compare` and `ctid diagnose`; a file is read again at
@@ -55,6 +55,7 @@
 //! after its page has asked last.
 
 mod api;
+mod app;
 mod assets;
 mod body;
 mod connections;
@@ -63,12 +64,15 @@ mod guard;
 mod held;
 mod jobs;
 mod own;
+mod own_change;
 mod own_design;
 mod own_findings;
+mod own_work;
 mod session;
 mod sessions;
 mod settings;
 mod state;
+mod tab;
 mod upload;
 mod words;
 
@@ -80,19 +84,19 @@ use std::time::Duration;
 
 use axum::Router;
 use clap::Args;
+use ct_signals::ReadOptions;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 
 use self::api::LARGEST_REQUEST;
+use self::app::App;
 use self::connections::Bounds;
 use self::guard::{Guard, LARGEST_BODY};
 use self::own::Own;
 use self::sessions::Sessions;
 use self::upload::Upload;
 use crate::Error;
-use crate::commands::say;
-use ct_signals::ReadOptions;
-
+use crate::finish::say;
 use crate::input::Files;
 use crate::own_model::AnyModelFile;
 
@@ -120,16 +124,6 @@ pub struct Arguments {
     /// Port on 127.0.0.1; if it is in use, the next free one; 0 for any
     #[arg(long, value_name = "PORT", default_value_t = PORT)]
     port: u16,
-}
-
-/// Data that all requests share.
-#[derive(Debug)]
-struct App {
-    sessions: Sessions,
-    /// Number of bytes of files that may be transferred at once.
-    uploading: Semaphore,
-    /// Number of bytes of other requests.
-    asking: Semaphore,
 }
 
 impl Arguments {

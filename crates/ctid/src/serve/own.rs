@@ -1,9 +1,6 @@
-//! A user's own model on the page: its text and its model file are kept for the tab, checked as they are typed, and fitted to the records
-//! of the tab by the function of `ctid compare`.
+//! A user's own model on the page: its text and its model file are kept for the tab, and checked as they are typed.
 //!
 //! Nothing of it reaches the file system: the `model` that a model file names is the text that the page holds, whatever name stands there.
-
-mod work;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -11,53 +8,19 @@ use std::sync::Arc;
 use axum::body::Bytes;
 use ct_model::{ModelSpec, TextError};
 use ct_signals::{Columns, ReadOptions};
-use missing_effect::Progress;
 use serde_json::{Value, json};
 
-pub(super) use self::work::Work;
 use super::guard::Refusal;
 use super::held::of_diagnosis;
 use super::own_design::Designed;
 use super::own_findings::{self, Diagnosed};
-use super::session::Session;
-use super::upload::Upload;
 use crate::look::Look;
 use crate::model_file::read_text;
 use crate::own_model::{OwnModelFile, report, units};
-use crate::{Error, check, edit};
+use crate::{Error, check};
 
-/// Points of a curve that are drawn.
-const DRAWN: usize = 2000;
 /// Name of the model file in messages and downloads.
 pub(super) const FILE: &str = "model.toml";
-/// Initial text of the page.
-static TEMPLATE: &str = include_str!("page/template.mo");
-
-/// An example: name, text, model file, record.
-type Example = (&'static str, &'static str, &'static str, &'static str);
-
-macro_rules! examples {
-    ($($name:literal),*) => {
-        [$((
-            $name,
-            include_str!(concat!("../../models/", $name, ".mo")),
-            include_str!(concat!("../../models/", $name, ".toml")),
-            include_str!(concat!("../../models/", $name, ".csv")),
-        )),*]
-    };
-}
-
-static EXAMPLES: [Example; 8] = examples!(
-    "heated-block",
-    "coupled-heaters",
-    "quadruple-tank",
-    "house",
-    "dc-motor",
-    "mass-spring",
-    "battery",
-    "bioreactor"
-);
-
 /// The model of a tab.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Own {
@@ -82,37 +45,23 @@ pub(super) struct Own {
 pub(super) struct Fit {
     pub id: u64,
     /// Texts and records of the result.
-    text: String,
-    file: String,
-    data: u64,
+    pub text: String,
+    pub file: String,
+    pub data: u64,
     /// JSON for the page.
     pub body: Bytes,
 }
 
-/// A change of the model.
-#[derive(Debug, serde::Deserialize)]
-#[serde(tag = "do", rename_all = "lowercase")]
-pub(super) enum Change {
-    /// A user's own model instead of a plant.
-    Begin,
-    /// Return to the built-in plants.
-    End,
-    /// Loads an example in place of the present model and records.
-    Example { name: String },
-    /// Text, model file, or both.
-    Write {
-        text: Option<String>,
-        file: Option<String>,
-    },
-    /// Sets the column of a signal or of the time.
-    Column { signal: String, column: String },
-    /// Adds an effect to the model file, with its values from the diagnosis.
-    Add { effect: String },
-    /// Removes an effect from the model file.
-    Remove { effect: String },
-}
-
 impl Own {
+    /// A model of these texts, without results.
+    pub(super) fn of(text: &str, file: &str) -> Self {
+        Self {
+            text: text.to_string(),
+            file: file.to_string(),
+            ..Self::default()
+        }
+    }
+
     /// The model file from the command line, and its text.
     pub(super) fn read(path: &Path) -> Result<Self, Error> {
         let file = read_text(path)?;
@@ -146,7 +95,7 @@ impl Own {
     }
 
     /// Adds the columns of the texts, if they can be read.
-    fn looked_at(mut self) -> Self {
+    pub(super) fn looked_at(mut self) -> Self {
         if let Ok(model) = self.model() {
             self.read = (model.columns.clone(), model.hold.into());
         }
@@ -165,7 +114,7 @@ impl Own {
     }
 
     /// The text instead of the file that a model file names.
-    fn named_text(&self) -> impl Fn(&Path) -> Result<ModelSpec, Error> {
+    pub(super) fn named_text(&self) -> impl Fn(&Path) -> Result<ModelSpec, Error> {
         |named: &Path| {
             self.spec().map_err(|source| Error::Text {
                 file: named.display().to_string(),
@@ -248,99 +197,7 @@ impl Own {
     }
 }
 
-/// Names of the examples.
-pub(super) fn examples() -> Vec<&'static str> {
-    EXAMPLES.iter().map(|(name, ..)| *name).collect()
-}
-
-/// A minimal model file that only names its text.
-fn bare_file(text: &str) -> String {
-    let name = ModelSpec::parse(text).map_or("model".to_string(), |spec| spec.name);
-    format!("model = \"{name}.mo\"\n\n[columns]\n")
-}
-
-/// Changes the model of a tab.
-///
-/// # Errors
-/// Where an example or a signal is not there, or the model file cannot be changed.
-pub(super) fn change(session: &mut Session, change: Change) -> Result<(), Refusal> {
-    session.stop();
-    match change {
-        Change::End => session.own = None,
-        Change::Begin => {
-            session.own.get_or_insert_with(|| Own {
-                text: TEMPLATE.to_string(),
-                file: bare_file(TEMPLATE),
-                ..Own::default()
-            });
-        }
-        Change::Example { name } => {
-            let example = EXAMPLES.iter().find(|(known, ..)| *known == name);
-            let (name, text, file, record) = example.ok_or_else(|| {
-                Refusal::input(format!(
-                    "there is no example of this name; there are {}",
-                    examples().join(", ")
-                ))
-            })?;
-            let upload = Upload::new(&format!("{name}.csv"), false, record.as_bytes().into())?;
-            session.own = Some(Own {
-                text: (*text).to_string(),
-                file: (*file).to_string(),
-                ..Own::default()
-            });
-            session.take_alone(upload);
-        }
-        Change::Write { text, file } => {
-            let own = session.own.get_or_insert_with(Own::default);
-            if let Some(text) = text {
-                own.text = text;
-            }
-            match file {
-                Some(file) => own.file = file,
-                None if own.file.trim().is_empty() => own.file = bare_file(&own.text),
-                None => {}
-            }
-        }
-        Change::Column { signal, column } => {
-            let own = session.own.as_mut().ok_or_else(no_model)?;
-            own.file = edit::with_column(FILE, &own.file, &signal, &column)?;
-        }
-        Change::Add { effect } => {
-            let own = session.own.as_mut().ok_or_else(no_model)?;
-            let model = own.model()?;
-            let found = own.diagnosis.as_ref().map(|found| &found.findings);
-            let found = found.filter(|found| found.keeps(&model, &effect));
-            let path = Path::new(FILE);
-            let edited =
-                edit::own::with_effect(path, &own.file, &effect, found, &own.named_text())?;
-            own.file = edited.text;
-        }
-        Change::Remove { effect } => {
-            let own = session.own.as_mut().ok_or_else(no_model)?;
-            let path = Path::new(FILE);
-            let edited = edit::own::without_effect(path, &own.file, &effect, &own.named_text())?;
-            own.file = edited.text;
-        }
-    }
-    session.own = session.own.take().map(Own::looked_at);
-    session.failure = None;
-    session.version += 1;
-    Ok(())
-}
-
-fn no_model() -> Refusal {
+/// The refusal where a tab has none.
+pub(super) fn no_model() -> Refusal {
     Refusal::input("there is no model of your own yet")
 }
-
-/// Progress of a search with these phases.
-fn progress(now: effect_search::Progress, phases: &[&str]) -> Progress {
-    let done = phases.iter().position(|phase| *phase == now.phase);
-    Progress {
-        phase: now.phase,
-        done: done.unwrap_or(0),
-        total: phases.len(),
-    }
-}
-
-#[cfg(test)]
-mod tests;

@@ -11,6 +11,8 @@ use super::guard::Refusal;
 use super::held::of_record;
 use crate::input;
 
+/// Largest number of characters of a record's name.
+const LONGEST_NAME: usize = 100;
 /// Largest number of columns of a file: the page offers them for choice.
 const MOST_COLUMNS: usize = 500;
 /// The header has to end within this number of bytes.
@@ -128,6 +130,17 @@ fn head<'a>(name: &str, content: &'a [u8]) -> Result<&'a [u8], Refusal> {
         ))
     })?;
     Ok(&first[..=end])
+}
+
+/// A name for messages and tables; it is not used as a file name.
+pub(super) fn plain_name(name: &str) -> String {
+    let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
+    let printable = last.chars().filter(|c| !c.is_control());
+    let name: String = printable.take(LONGEST_NAME).collect();
+    match name.trim() {
+        "" => "record.csv".to_string(),
+        name => name.to_string(),
+    }
 }
 
 #[cfg(test)]

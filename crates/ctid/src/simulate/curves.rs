@@ -2,8 +2,9 @@
 
 use ct_signals::{Columns, Record};
 
-use super::{TimeColumn, cell, csv_text, header};
+use super::TimeColumn;
 use crate::Error;
+use crate::csv_text::{cell, csv_text, header};
 use crate::input::Files;
 
 /// A record that was fitted.

@@ -30,6 +30,7 @@ pub(crate) use self::plant_export::export as export_plant;
 pub use self::plant_export::text_of_plant;
 pub(crate) use self::text::said;
 pub use self::time_column::TimeColumn;
+use crate::csv_text::{cell, csv_text, header};
 use crate::output::Found;
 
 /// Coverage of the band.
@@ -119,34 +120,6 @@ impl Band {
                 .map(|error| quantile * error.hypot(noise))
                 .collect(),
         }
-    }
-}
-
-/// A name with its unit, as a header has it.
-pub(crate) fn header(name: &str, unit: &str) -> String {
-    match unit {
-        "" => name.to_string(),
-        unit => format!("{name} [{unit}]"),
-    }
-}
-
-/// Rows of cells as CSV.
-pub(crate) fn csv_text(rows: impl Iterator<Item = Vec<String>>) -> String {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        // Writing to memory does not fail.
-        let _ = writer.write_record(&row);
-    }
-    let bytes = writer.into_inner().unwrap_or_default();
-    String::from_utf8(bytes).unwrap_or_default()
-}
-
-/// A number as a cell; empty for NaN.
-pub(crate) fn cell(value: f64) -> String {
-    if value.is_nan() {
-        String::new()
-    } else {
-        format!("{value:?}")
     }
 }
 

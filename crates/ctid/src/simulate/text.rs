@@ -1,6 +1,7 @@
 //! Text output of a simulation.
 
-use super::{Simulated, SimulatedOutput, StateSource, header};
+use super::{Simulated, SimulatedOutput, StateSource};
+use crate::csv_text::header;
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::plot::{self, Axis};

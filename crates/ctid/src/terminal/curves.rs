@@ -4,10 +4,10 @@ use console::Style;
 use missing_effect::{Diagnosis, Shown, Step};
 
 use super::model_name;
+use crate::csv_text::header;
 use crate::findings;
 use crate::look::Look;
 use crate::plot::{self, Axis, Curve, plot};
-use crate::simulate::header;
 
 /// Measurement and model over time, in the first record, output by output.
 pub(crate) fn overlay(diagnosis: &Diagnosis, step: &Step, look: Look) -> String {

@@ -1,10 +1,9 @@
 //! An effect at its place, and the data that it may use there.
 
-use super::Known;
-use crate::Plant;
 use crate::effects::{EffectInfo, Place};
 use crate::plant::Outlet;
 use crate::scales::{OutputScales, Scales, quantile};
+use crate::{Known, Plant};
 
 /// An effect and its place.
 #[derive(Debug, Clone, Copy)]

@@ -6,7 +6,7 @@
 
 use crate::{Scalar, damped::Damped, inflow::Inflow, linear::Propagators};
 
-use super::{Levels, Vessels, fed::brought};
+use super::{Levels, Vessels};
 
 /// Linear vessels have an exact solution; the deviation that effects cause is integrated separately, so that it is exactly zero for effects
 /// at their absent values.
@@ -187,4 +187,10 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         }
         next
     }
+}
+
+/// The output of a lag after a step of length `h` under an inflow, from an initial value of zero.
+fn brought<T: Scalar>(lag: &mut Propagators<T>, h: T, inflow: &Inflow<T>) -> T {
+    let [level] = lag.advance(&[T::constant(0.0)], h, inflow);
+    level
 }

@@ -61,9 +61,3 @@ impl<T: Scalar, const N: usize> Vessels<T, N> {
         Some(feed.over(self.time(t), h))
     }
 }
-
-/// The output of a lag after a step of length `h` under an inflow, from an initial value of zero.
-pub(super) fn brought<T: Scalar>(lag: &mut Propagators<T>, h: T, inflow: &Inflow<T>) -> T {
-    let [level] = lag.advance(&[T::constant(0.0)], h, inflow);
-    level
-}

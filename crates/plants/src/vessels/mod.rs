@@ -20,8 +20,8 @@ mod torricelli;
 use crate::{
     Balance, Law, Outlet, Rim, Scalar, Side,
     inflow::{Feed, Inflow},
+    limits::SERIES,
     linear::Propagators,
-    structure::SERIES,
 };
 
 use exponential::LinearFlow;

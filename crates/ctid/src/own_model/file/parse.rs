@@ -13,8 +13,8 @@ use super::{OwnModelFile, OwnSettings, read_model};
 use crate::model_file::Source;
 use crate::own_model::candidates::RawCandidates;
 use crate::own_model::controller::RawControllers;
-use crate::own_model::effects::{OwnEffects, RawEffects};
-use crate::own_model::problem::RecordNumbers;
+use crate::own_model::effects::{OwnEffects, RecordNumbers};
+use crate::own_model::raw_effects::RawEffects;
 use crate::{Error, names};
 
 /// The keys of `[columns]` that are no signals of the model.

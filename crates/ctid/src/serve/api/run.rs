@@ -7,12 +7,13 @@ use serde::Deserialize;
 use std::num::NonZeroU8;
 use std::sync::Arc;
 
-use super::super::{App, jobs, state};
-use super::{Answer, Tab, aside, find, with};
 use crate::effort::EffortLevel;
-use crate::serve::jobs::Task;
+use crate::serve::app::App;
+use crate::serve::jobs::{self, Task};
 use crate::serve::own_design::AppliedInput;
 use crate::serve::session::lock;
+use crate::serve::state;
+use crate::serve::tab::{Answer, Tab, aside, find, with};
 
 #[derive(Debug, Deserialize)]
 #[serde(tag = "what", rename_all = "lowercase")]

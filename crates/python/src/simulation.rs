@@ -1,40 +1,12 @@
 //! Simulations as dictionaries of arrays.
 
-use ct_signals::Record;
-use ctid::effort::EffortLevel;
 use ctid::own_model::{Simulated, StateSource};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 use crate::error;
-
-/// Time limit of a search.
-pub fn limit(effort: &str, seconds: Option<f64>) -> PyResult<Duration> {
-    let effort = match effort {
-        "quick" => EffortLevel::Quick,
-        "normal" => EffortLevel::Normal,
-        "thorough" => EffortLevel::Thorough,
-        other => {
-            return Err(error::of_model(format!(
-                "effort is \"quick\", \"normal\" or \"thorough\", and not \"{other}\""
-            )));
-        }
-    };
-    match seconds {
-        None => Ok(effort.limit()),
-        Some(seconds) => Duration::try_from_secs_f64(seconds)
-            .map_err(|_| error::of_model("time_limit is a number of seconds above zero")),
-    }
-}
-
-/// Time limit of a search in s.
-#[pyfunction]
-pub fn time_limit(effort: &str, seconds: Option<f64>) -> PyResult<f64> {
-    Ok(limit(effort, seconds)?.as_secs_f64())
-}
 
 /// Checks the options of a simulation: the probability of its band, and the number of first readings that the initial states are fitted to.
 pub fn check_simulation(level: f64, first: usize) -> PyResult<()> {
@@ -75,10 +47,4 @@ pub fn simulation<'py>(py: Python<'py>, found: &Simulated) -> PyResult<Bound<'py
     let states: BTreeMap<&String, f64> = found.states.iter().map(|(n, v)| (n, *v)).collect();
     all.set_item("states", states)?;
     Ok(all)
-}
-
-/// The unit of each output of records, which is that of the first one.
-pub fn units_of(records: &[Record]) -> Vec<String> {
-    let outputs = records.first().map_or(&[][..], |record| &record.outputs);
-    outputs.iter().map(|output| output.unit.clone()).collect()
 }

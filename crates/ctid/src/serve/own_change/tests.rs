@@ -2,10 +2,13 @@
 
 #![allow(clippy::unwrap_used)]
 
+use super::super::own_findings::Diagnosed;
+use super::super::own_work::Work;
 use super::super::state::state;
 use super::*;
 use crate::edit::own::Findings;
 use crate::numbers;
+use serde_json::json;
 use std::sync::atomic::AtomicBool;
 
 fn write(session: &mut Session, text: Option<&str>, file: Option<&str>) {

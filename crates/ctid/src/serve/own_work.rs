@@ -1,4 +1,5 @@
-//! Computations for a user's own model: comparison, search and design.
+//! Computations for a user's own model: its records are those of the tab, and the functions are those of the commands `compare`, `diagnose`
+//! and `design`.
 
 use ct_signals::{ReadOptions, Reading};
 use effect_search::design::{Design, Limits};
@@ -10,21 +11,23 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::super::own_findings;
-use super::{DRAWN, FILE, Fit, Own, no_model, progress};
+use super::guard::Refusal;
+use super::own::{FILE, Fit, Own, no_model};
+use super::own_design::Designed;
+use super::own_findings::{self, Diagnosed};
+use super::session::Session;
 use crate::edit::own::Findings;
 use crate::effort::EffortLevel;
 use crate::own_model::{Comparison, OwnModelFile, Records, compare, design, diagnose, report};
 use crate::report::{min_max, rounded};
 use crate::sentences::of_gaps;
-use crate::serve::guard::Refusal;
-use crate::serve::own_design::Designed;
-use crate::serve::own_findings::Diagnosed;
-use crate::serve::session::Session;
 use crate::{Error, edit, numbers};
 
+/// Points of a curve that are drawn.
+const DRAWN: usize = 2000;
+
 /// Input of a fit or a diagnosis.
-pub(crate) struct Work {
+pub(super) struct Work {
     own: Own,
     pub(super) model: OwnModelFile,
     records: Records,
@@ -34,7 +37,7 @@ pub(crate) struct Work {
 impl Work {
     /// # Errors
     /// Where text, file or records do not allow a fit.
-    pub(crate) fn new(session: &mut Session) -> Result<Self, Refusal> {
+    pub(super) fn new(session: &mut Session) -> Result<Self, Refusal> {
         let own = session.own.clone().ok_or_else(no_model)?;
         Self::of(session, own)
     }
@@ -43,7 +46,7 @@ impl Work {
     ///
     /// # Errors
     /// Where nothing was diagnosed, or the records are others since.
-    pub(crate) fn beside(
+    pub(super) fn beside(
         session: &mut Session,
         group: usize,
         between: &[String; 2],
@@ -104,13 +107,13 @@ impl Work {
     }
 
     /// Fits the model, until the flag is set.
-    pub(crate) fn compute(&self, interrupt: &AtomicBool) -> Result<Comparison, Error> {
+    pub(super) fn compute(&self, interrupt: &AtomicBool) -> Result<Comparison, Error> {
         let options = options(EffortLevel::default(), interrupt);
         compare(&self.model, &self.records, &options)
     }
 
     /// Searches for missing effects, until the flag is set.
-    pub(crate) fn search(
+    pub(super) fn search(
         &self,
         max_effects: Option<NonZeroU8>,
         effort: EffortLevel,
@@ -133,7 +136,7 @@ impl Work {
     }
 
     /// Designs the experiment within these limits that distinguishes two effects, until the flag is set.
-    pub(crate) fn design(
+    pub(super) fn design(
         &self,
         between: &[String; 2],
         limits: &Limits,
@@ -161,7 +164,7 @@ impl Work {
     }
 
     /// Stores a design for the page.
-    pub(crate) fn settle_design(self, session: &mut Session, design: &Design) {
+    pub(super) fn settle_design(self, session: &mut Session, design: &Design) {
         let id = session.number();
         let designed = Designed::new(id, &self.model, design);
         if let Some(own) = &mut session.own {
@@ -170,7 +173,7 @@ impl Work {
     }
 
     /// Stores a diagnosis for the page.
-    pub(crate) fn settle_diagnosis(self, session: &mut Session, found: &Diagnosis) {
+    pub(super) fn settle_diagnosis(self, session: &mut Session, found: &Diagnosis) {
         let id = session.number();
         let json = serde_json::to_string(found).unwrap_or_default();
         let Ok(findings) = Findings::of_text(&json) else {
@@ -194,7 +197,7 @@ impl Work {
     }
 
     /// Puts what came out where the page finds it.
-    pub(crate) fn settle(self, session: &mut Session, found: &Comparison) {
+    pub(super) fn settle(self, session: &mut Session, found: &Comparison) {
         let id = session.number();
         let shown = report::compared(&self.model, &self.records, found);
         let fit = Fit {
@@ -271,5 +274,15 @@ fn options(effort: EffortLevel, interrupt: &AtomicBool) -> Options<'_> {
         time_limit: Some(effort.limit()),
         interrupt: Some(interrupt),
         ..Options::default()
+    }
+}
+
+/// Progress of a search with these phases.
+fn progress(now: effect_search::Progress, phases: &[&str]) -> Progress {
+    let done = phases.iter().position(|phase| *phase == now.phase);
+    Progress {
+        phase: now.phase,
+        done: done.unwrap_or(0),
+        total: phases.len(),
     }
 }

@@ -19,10 +19,12 @@ pub(super) struct Selected {
     /// The operations that guards and outputs need and whose results change although all inputs are held.
     pub readings: Vec<(Operation, Register)>,
     pub all: Vec<(Operation, Register)>,
+    /// Marks of operations, for the work of a selection.
+    marks: Vec<bool>,
 }
 
-/// Number of selections that are kept besides the present one.
-const EARLIER: usize = 8;
+/// Number of selections that are kept besides the present one: five thresholds on which a state moves to and fro have 32.
+const EARLIER: usize = 32;
 
 impl Selected {
     pub fn with_capacity(operations: usize) -> Self {
@@ -35,6 +37,7 @@ impl Selected {
             outputs: list(),
             readings: list(),
             all: list(),
+            marks: Vec::with_capacity(operations),
         }
     }
 }
@@ -87,16 +90,23 @@ impl Tape {
             outputs,
             readings,
             all,
+            marks,
         } = into;
         of.clear();
         of.extend_from_slice(taken);
-        self.needed(&self.derivatives, (taken, plain), slopes);
-        self.needed(&self.read_by_guards, (taken, plain), guards);
-        self.needed(&self.read_by_all, (taken, plain), all);
-        guards.retain(|guard| !slopes.contains(guard));
-        self.needed(&self.outputs, (taken, plain), outputs);
-        outputs.retain(|output| !slopes.contains(output) && !guards.contains(output));
-        self.needed(&self.read_by_samples, (taken, plain), readings);
+        self.needed(&self.derivatives, (taken, plain), marks, slopes);
+        self.needed(&self.read_by_guards, (taken, plain), marks, guards);
+        self.needed(&self.read_by_all, (taken, plain), marks, all);
+        self.needed(&self.outputs, (taken, plain), marks, outputs);
+        self.needed(&self.read_by_samples, (taken, plain), marks, readings);
+        // An operation is listed once, with the first results that need it.
+        marks.fill(false);
+        slopes
+            .iter()
+            .for_each(|(_, to)| marks[to - self.first_operation] = true);
+        for list in [guards, outputs] {
+            list.retain(|(_, to)| !std::mem::replace(&mut marks[to - self.first_operation], true));
+        }
         readings.retain(|(_, to)| !self.of_inputs[*to]);
         moving.clear();
         moving.extend(slopes.iter().filter(|(_, to)| !self.of_inputs[*to]));
@@ -107,6 +117,7 @@ impl Tape {
         &self,
         results: &[Register],
         (taken, plain): (&[bool], &[bool]),
+        needed: &mut Vec<bool>,
         into: &mut Vec<(Operation, Register)>,
     ) {
         let first = self.first_operation;
@@ -118,7 +129,8 @@ impl Tape {
             }
             register
         };
-        let mut needed = vec![false; self.operations.len()];
+        needed.clear();
+        needed.resize(self.operations.len(), false);
         for result in results {
             if let Some(i) = result.checked_sub(first) {
                 needed[i] = true;

@@ -87,7 +87,8 @@ impl Context<'_> {
             .filter(near)
             .filter_map(|node| self.refitted(&node, noise, FINE).ok());
         let mut others = best_first(fine.collect());
-        let own_last = self.in_limited_noise(last)?;
+        let of_users = others.iter().any(|node| self.ends_in_own(node));
+        let own_last = of_users.then(|| self.in_limited_noise(last)).transpose()?;
         others.retain(|node| {
             let deviance = (node.fit.deviance - last.fit.deviance) / slowness;
             let further = node.fit.parameters as f64 - last.fit.parameters as f64;
@@ -97,10 +98,12 @@ impl Context<'_> {
                 || deviance < self.thresholds.same_deviance
                     && node.fit.parameters <= last.fit.parameters
                 || self.ends_in_own(node)
-                    && !(own_last.noise.order() == 0 && bic > self.thresholds.own_candidate_bic)
-                    && self
-                        .explains_most((node, last), &without, &own_last)
-                        .unwrap_or(false)
+                    && own_last.as_ref().is_some_and(|own_last| {
+                        !(own_last.noise.order() == 0 && bic > self.thresholds.own_candidate_bic)
+                            && self
+                                .explains_most((node, last), &without, own_last)
+                                .unwrap_or(false)
+                    })
         });
         self.limit.leaves_out(OTHERS);
         Ok(others)

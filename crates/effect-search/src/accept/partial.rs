@@ -182,7 +182,7 @@ impl Context<'_> {
             node.fit.clone(),
             self.thresholds.noise_order,
             memory,
-            FINE,
+            ROUGH,
         )?)
     }
 

@@ -108,7 +108,11 @@ impl Context<'_> {
         // The sets are therefore compared by their simulation error.
         sets.extend(timeless);
         let part = self.largest_part(&base, &sets)?;
-        if let Some(part) = part.and_then(|part| self.without_small_effects(part, &base)) {
+        let part = part.and_then(|part| self.without_small_effects(part, &base));
+        // A part of the answer is worth more than the answer only if its noise model may describe slow physics, or if its functions of time do.
+        let is_part = |part: &Node| part.added.iter().all(|i| answer.set.added.contains(i));
+        let stands = !flexible && !self.is_slow(&answer.own.noise);
+        if let Some(part) = part.filter(|part| !(stands && is_part(part))) {
             let (singles, base) = searched.singles_by_error.clone();
             let grown = &mut searched.grown;
             (grown.singles, grown.base, grown.of_singles) = (singles, base.clone(), base.clone());

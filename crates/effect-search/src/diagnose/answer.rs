@@ -109,10 +109,8 @@ impl Context<'_> {
         sets.extend(timeless);
         let part = self.largest_part(&base, &sets)?;
         let part = part.and_then(|part| self.without_small_effects(part, &base));
-        // A part of the answer is worth more than the answer only if its noise model may describe slow physics, or if its functions of time do.
-        let is_part = |part: &Node| part.added.iter().all(|i| answer.set.added.contains(i));
-        let stands = !flexible && !self.is_slow(&answer.own.noise);
-        if let Some(part) = part.filter(|part| !(stands && is_part(part))) {
+        let part = part.filter(|part| flexible || !self.is_worth_less(part, &answer));
+        if let Some(part) = part {
             let (singles, base) = searched.singles_by_error.clone();
             let grown = &mut searched.grown;
             (grown.singles, grown.base, grown.of_singles) = (singles, base.clone(), base.clone());
@@ -132,6 +130,15 @@ impl Context<'_> {
             }
         }
         Ok(answer)
+    }
+
+    /// Whether a set is a part of an answer whose other effects need no replacement: they are no functions of time, which compensate for any
+    /// slow disturbance, and the answer's noise model is none that may describe slow physics.
+    fn is_worth_less(&self, part: &Node, answer: &Answer) -> bool {
+        let is_part = part.added.iter().all(|i| answer.set.added.contains(i));
+        let others = answer.set.added.iter().copied();
+        let others: Vec<usize> = others.filter(|i| !part.added.contains(i)).collect();
+        is_part && self.in_time(&others) == 0 && !self.is_slow(&answer.own.noise)
     }
 
     /// A set of the floating search as the answer, after the acceptance test. `better`: with the noise model of its own residual.

@@ -29,7 +29,10 @@ fn stiction_is_fitted_in_its_lowest_minimum() {
         let last = found.steps.last().unwrap();
         let parameter = |name: &str| last.parameters.iter().find(|p| p.name == name);
         let value = parameter("backlash_u_half_width").unwrap().value;
-        assert!((value / half_width - 1.0).abs() < 0.05, "{half_width} {value}");
+        assert!(
+            (value / half_width - 1.0).abs() < 0.05,
+            "{half_width} {value}"
+        );
         let error = last.outputs[0].rmse;
         assert!((error / 0.3 - 1.0).abs() < 0.1, "{half_width} {error}");
     }

@@ -225,6 +225,29 @@ def test_arguments_of_a_plant():
         says(ctid.ModelError, lambda: ctid.Model.tank("single-tank", **options), *words)
 
 
+def test_messages_name_arguments(model, block, tour):
+    def plain(message: str) -> None:
+        """Neither options of the program nor tables of its model file."""
+        assert not any(name in message for name in ("--", "[columns]", "[known]", "[prior]")), message
+
+    frame = block.copy()
+    frame["y [degC]"] = np.nan
+    plain(refused(model, frame, '"y [degC]"', "in inputs=[...] or outputs=[...]", "df.loc[FIRST:LAST]"))
+    frame["y [degC]"] = 20.0
+    plain(refused(model, frame, '"y [degC]"', "in inputs=[...] or outputs=[...]"))
+    with pytest.raises(ctid.DataError) as caught:
+        model.fit(block, priors={"k": (0.1, -1.0)})
+    assert 'priors["k"] = [0.1, -1.0]' in str(caught.value)
+    plain(str(caught.value))
+    with pytest.raises(ctid.DataError) as caught:
+        ctid.identify(tour.assign(**{"y [cm]": 20.0}), "srivc")
+    assert 'in inputs=[...] or output="..."' in str(caught.value)
+    plain(str(caught.value))
+    with pytest.raises(ctid.ModelError) as caught:
+        ctid.identify(tour, "ct-rls", bandwidth=-1.0)
+    assert str(caught.value).startswith("bandwidth is -1")
+
+
 def test_rows_of_a_monitor(model):
     mon = model.monitor()
     u, y = {"u": 1.0, "Ta": 20.0}, {"y": 20.0}

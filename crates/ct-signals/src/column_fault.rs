@@ -1,6 +1,6 @@
 //! Errors in the columns of a file. The correction depends on where the columns were named, which the caller knows.
 
-use crate::unit;
+use crate::{Names, unit};
 
 /// An error of a column, without the correction.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,14 +89,20 @@ impl ColumnFault {
         }
     }
 
-    /// The message with the correction for a model file, whose `[columns]` names the columns.
-    pub(crate) fn in_model(&self) -> String {
+    /// The message with the correction in the caller's names.
+    pub(crate) fn worded(&self, names: &Names) -> String {
+        let Names {
+            column: of_role,
+            in_columns,
+            ..
+        } = names;
         let mend = match self {
-            Self::Missing { role, .. } => format!("set {role} = \"...\" under [columns]"),
+            Self::Missing { role, .. } => format!("set {}", of_role(role)),
             Self::Ambiguous { role, .. } => format!(
-                "say which with {role} = \"...\" under [columns], and rename columns of the same name"
+                "say which with {}, and rename columns of the same name",
+                of_role(role)
             ),
-            Self::Shared { .. } => "give each its own column under [columns]".to_string(),
+            Self::Shared { .. } => format!("give each its own column {in_columns}"),
             Self::Unit {
                 column,
                 file_unit,
@@ -111,10 +117,10 @@ impl ColumnFault {
                 } else {
                     format!(" and give the model's constants in {file_unit}")
                 };
-                format!("convert the column, or write \"{column}\" under [columns]{then}")
+                format!("convert the column, or write \"{column}\" {in_columns}{then}")
             }
         };
-        self.said("the model", &mend)
+        self.said(names.namer, &mend)
     }
 }
 

@@ -1,11 +1,12 @@
 //! What can be wrong with a record or a setting: each message names the place, the numbers that
 //! disagree and the mend, in one line.
 
-use crate::{ColumnFault, duration, shown};
+use crate::{ColumnFault, Names, duration, shown};
 
-pub use read::ReadError;
+pub use read::{CellMend, ReadError};
 
 mod read;
+mod worded;
 
 /// Everything this crate can refuse.
 ///
@@ -17,19 +18,23 @@ pub enum Error {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// A limit of the part of a file that is wanted is not understood.
-    #[error("{option} \"{text}\": {mend}")]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     Bound {
-        /// The option.
-        option: &'static str,
+        /// Which limit.
+        limit: PartLimit,
         /// What was given.
         text: String,
         /// What to do.
         mend: String,
     },
+    /// The part of a file that is wanted ends before it begins.
+    #[error("{}", self.worded(&Names::LIBRARY))]
+    EmptyPart {
+        /// The end that was given.
+        text: String,
+    },
     /// A grid of too many rows.
-    #[error(
-        "{record}: one row every {interval:e} s would be {rows:.3e} rows, and {most:e} are the most; give a longer interval with --resample, or check the dates of the first and the last row"
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     Resampled {
         /// The record.
         record: String,
@@ -54,9 +59,7 @@ pub enum Error {
         limit: f64,
     },
     /// A column without any sample.
-    #[error(
-        "{file}, row {row}, column \"{column}\": from here on the samples of all {rows} rows are missing ({words}); name another column under [columns], or choose another part with --from and --to"
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     NoSample {
         /// The path as it was given.
         file: String,
@@ -70,11 +73,7 @@ pub enum Error {
         words: String,
     },
     /// Samples are missing.
-    #[error(
-        "{file}, row {row}, column \"{column}\": {missing} missing before this row (the time steps from {previous} to {time}, elsewhere by {interval} s); leave out --strict to go on over it, or split the file there",
-        missing = samples(*.missing),
-        interval = shown(*.interval)
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     Gap {
         /// The path as it was given.
         file: String,
@@ -92,10 +91,7 @@ pub enum Error {
         interval: f64,
     },
     /// The input never moves.
-    #[error(
-        "{file}, column \"{column}\": the input is {value} in all {rows} rows, so nothing can be learnt about the process; record an experiment in which it moves, or name another column under [columns]",
-        value = shown(*.value)
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     ConstantInput {
         /// The path as it was given.
         file: String,
@@ -107,10 +103,7 @@ pub enum Error {
         rows: usize,
     },
     /// The output never moves.
-    #[error(
-        "{file}, column \"{column}\": the output is {value} in all {rows} rows; check the sensor, or name another column under [columns]",
-        value = shown(*.value)
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     ConstantOutput {
         /// The path as it was given.
         file: String,
@@ -184,7 +177,7 @@ pub enum Error {
         limits: String,
     },
     /// The record is too short.
-    #[error("{record}: {rows} rows of data, but {needed} are needed{why}; give a longer record")]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     TooFewRows {
         /// The file or the record's name.
         record: String,
@@ -192,8 +185,8 @@ pub enum Error {
         rows: usize,
         /// Rows that are needed.
         needed: usize,
-        /// What they are needed for, or empty.
-        why: String,
+        /// What they are needed for, or where others are.
+        why: Shortage,
     },
     /// The signals of a record have different lengths.
     #[error(
@@ -287,10 +280,33 @@ impl Error {
     }
 }
 
-fn samples(count: u64) -> String {
-    if count == 1 {
-        "1 sample is".into()
-    } else {
-        format!("{count} samples are")
-    }
+/// A limit of the part of a file that is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PartLimit {
+    /// [`ReadOptions::from`](crate::ReadOptions::from).
+    From,
+    /// [`ReadOptions::to`](crate::ReadOptions::to).
+    To,
+}
+
+/// Why the rows of a record are too few.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Shortage {
+    /// The record is short.
+    Short,
+    /// Rows are outside the part that is wanted.
+    Outside {
+        /// Number of these rows.
+        rows: usize,
+    },
+    /// The grid of [`ReadOptions::resample`](crate::ReadOptions::resample) is coarse.
+    Resampled,
+    /// So many parameters need more.
+    Parameters {
+        /// Number of parameters.
+        parameters: usize,
+        /// Whether readings are missing, which do not count.
+        missing: bool,
+    },
 }

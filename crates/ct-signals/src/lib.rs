@@ -65,6 +65,7 @@ pub mod excitation;
 mod gaps;
 mod isolated;
 mod limits;
+mod names;
 pub mod noise;
 pub mod parts;
 mod quote;
@@ -88,10 +89,11 @@ pub use csv::{
     Converted, MissingSamples, ReadOptions, ReadSummary, Reading, csv_header, parse_csv,
     parse_inputs_csv, read_csv, read_inputs_csv,
 };
-pub use error::{Error, ReadError};
+pub use error::{CellMend, Error, PartLimit, ReadError, Shortage};
 pub use gaps::{Gaps, LongestHold};
 pub use isolated::{IsolatedReadings, isolated_readings};
 pub use limits::{LARGEST_RECORD, LONGEST_LINE, MOST_COLUMNS, read_file};
+pub use names::Names;
 pub use quote::{escaped, quoted, shown};
 pub use record::{
     Channel, Hold, MIN_ROWS, ROWS_PER_PARAMETER, Record, record_names, require_samples,

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use statrs::statistics::{Data, OrderStatistics};
 
 use crate::series::{constant, interpolated};
-use crate::{Calendar, Error};
+use crate::{Calendar, Error, Shortage};
 
 /// Least number of rows of a record for any model.
 pub const MIN_ROWS: usize = 20;
@@ -318,11 +318,9 @@ pub fn require_samples(records: &[Record], parameters: usize) -> Result<(), Erro
         record: record_names(records).join(" and "),
         rows,
         needed,
-        why: match records.iter().any(|record| samples(record) < record.len()) {
-            true => format!(
-                " to fit {parameters} parameters, and readings that are missing do not count"
-            ),
-            false => format!(" to fit {parameters} parameters"),
+        why: Shortage::Parameters {
+            parameters,
+            missing: records.iter().any(|record| samples(record) < record.len()),
         },
     })
 }

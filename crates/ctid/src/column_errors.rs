@@ -4,7 +4,7 @@ use ct_signals::{ColumnFault, Error as RecordError, ReadError};
 
 use crate::Error;
 
-/// The error with the correction for the option; that of `ct-signals` is for `[columns]` of a model file.
+/// The error with the correction for the option; otherwise that for `[columns]` of a model file.
 pub(crate) fn of_option(error: RecordError) -> Error {
     const OPTION: &str = "--columns TIME,INPUT,OUTPUT";
     let RecordError::Read(ReadError::Column { file, row, fault }) = &error else {

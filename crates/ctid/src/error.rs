@@ -4,6 +4,8 @@ use std::path::Path;
 
 use ct_signals::escaped;
 
+use crate::words::{self, Words};
+
 /// All errors that end the program with exit code 2.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -51,15 +53,35 @@ pub enum Error {
     /// The columns of a record that an option names.
     #[error("{0}")]
     Columns(String),
+    /// A setting; the message begins with its name, which is that of the option.
+    #[error("{}", self.worded(&Words::PROGRAM))]
+    Setting(String),
     /// A record.
-    #[error(transparent)]
+    #[error("{}", self.worded(&Words::PROGRAM))]
     Record(#[from] ct_signals::Error),
     /// A plant and its effects.
-    #[error(transparent)]
+    #[error("{}", self.worded(&Words::PROGRAM))]
     Plant(#[from] plants::Error),
     /// The computation.
-    #[error(transparent)]
+    #[error("{}", self.worded(&Words::PROGRAM))]
     Diagnosis(#[from] missing_effect::Error),
+    /// A fit or a search with the records of a file, or of several.
+    #[error("{}", self.worded(&Words::PROGRAM))]
+    Fit {
+        /// The names of the records.
+        file: String,
+        /// What is wrong and the correction.
+        source: Box<effect_search::Error>,
+    },
+    /// A search, where the fault is not in a record.
+    #[error("{}", self.worded(&Words::PROGRAM))]
+    Search(Box<effect_search::Error>),
+    /// An experiment with a model of the user's own.
+    #[error("{}", self.worded(&Words::PROGRAM))]
+    Experiment(#[from] effect_search::design::NoExperiment),
+    /// An identification, where the correction depends on how record and controller were given.
+    #[error("{}", self.worded(&Words::PROGRAM))]
+    Identification(Box<linear_identification::Error>),
     /// A recursive estimator.
     #[error(transparent)]
     Estimator(#[from] stabilized_oe::Error),
@@ -91,7 +113,7 @@ impl From<paper_tables::Error> for Error {
             E::Loop(error) => Self::Loop(error),
             // The message begins with the argument's name, which is the name of the option.
             E::TooFewRunsForRange { .. } | E::TooFewRunsForVariance { .. } => {
-                Self::Usage(format!("--{error}"))
+                Self::Setting(error.to_string())
             }
             error => Self::Usage(error.to_string()),
         }
@@ -108,77 +130,72 @@ impl From<linear_identification::Error> for Error {
             E::Linear(error) => Self::Linear(error),
             E::Loop(error) => Self::Loop(error),
             E::StabilityBorder { record }
-            | E::ControllerMismatch { record, .. }
             | E::MissingReadings { record, .. }
-            | E::InRecord { record, .. } => Self::of_record(record, &message, ""),
-            E::FirstFit { record, .. } => {
-                Self::of_record(record, &message, ": --from and --to, or --resample")
+            | E::InRecord { record, .. } => Self::of_record(record, &message),
+            error @ (E::ControllerMismatch { .. } | E::FirstFit { .. }) => {
+                Self::Identification(Box::new(error))
             }
             // The message begins with the setting's name, which is the name of the option.
             E::NotPositive { .. } | E::Bandwidth { .. } | E::LevelsEstimated { .. } => {
-                Self::Usage(format!("--{message}"))
+                Self::Setting(message)
             }
             _ => Self::Usage(message),
         }
     }
 }
 
-/// Where more time may help.
-const MORE_TIME: &str = "--effort thorough searches longer";
-
 impl From<missing_effect::design::NoExperiment> for Error {
     fn from(refused: missing_effect::design::NoExperiment) -> Self {
-        use missing_effect::design::NoExperiment as No;
-        Self::Usage(match &refused {
-            // The message begins with the argument's name, which is the name of the option.
-            No::SameEffect { .. }
-            | No::Range { .. }
-            | No::TooWide { .. }
-            | No::Beyond { .. }
-            | No::Duration { .. }
-            | No::TooLong { .. }
-            | No::Slew { .. } => format!("--{refused}"),
-            No::NoRange { .. } | No::Overfull { .. } => format!("{refused} with --range"),
-            No::NoFit { effect } => needs(&refused.to_string(), effect),
-            No::OutOfTime => format!("{refused}: {MORE_TIME}"),
-            _ => refused.to_string(),
-        })
+        Self::Usage(words::experiment(&refused))
     }
-}
-
-impl From<effect_search::design::NoExperiment> for Error {
-    fn from(refused: effect_search::design::NoExperiment) -> Self {
-        use effect_search::design::NoExperiment as No;
-        Self::Usage(match &refused {
-            // The message begins with the argument's name, which is the name of the option.
-            No::SameEffect { .. }
-            | No::UnknownInput { .. }
-            | No::Range { .. }
-            | No::Duration { .. }
-            | No::Slew { .. } => format!("--{refused}"),
-            No::NoRange { input, .. } => format!("{refused} with --input {input}=LOW..HIGH"),
-            No::InModel { effect } => {
-                format!("{refused}: `ctid remove '{effect}' --model M.toml`")
-            }
-            No::NoFit { effect } => needs(&refused.to_string(), effect),
-            No::OutOfTime => format!("{refused}: {MORE_TIME}"),
-            _ => refused.to_string(),
-        })
-    }
-}
-
-/// A message about an effect, with the command that says more of it.
-fn needs(message: &str, effect: &str) -> String {
-    format!("{message}; `ctid effects '{effect}'` says what it needs")
 }
 
 impl Error {
-    /// A message that begins with the name of a record, and what the program adds to it.
-    fn of_record(record: String, message: &str, options: &str) -> Self {
+    /// The message with these names for what the user gave.
+    #[must_use]
+    pub fn worded(&self, words: &Words) -> String {
+        match self {
+            Self::Setting(message) => format!("{}{message}", words.setting),
+            Self::Record(error) => error.worded(&words.fit.records),
+            Self::Plant(error) => error.worded(&words.fit.plants),
+            Self::Diagnosis(error) => error.worded(&words.fit),
+            Self::Fit { file, source } => format!("{file}: {}", source.worded(&words.fit)),
+            Self::Search(error) => error.worded(&words.fit),
+            Self::Experiment(refused) => (words.experiment)(refused),
+            Self::Identification(error) => match &**error {
+                linear_identification::Error::FirstFit { .. } => {
+                    format!("{error}{}", words.part_or_grid)
+                }
+                _ => error.worded(words.controller),
+            },
+            Self::AtLine { .. }
+            | Self::Text { .. }
+            | Self::File { .. }
+            | Self::Changed { .. }
+            | Self::UnknownEffect(_)
+            | Self::Usage(_)
+            | Self::Columns(_)
+            | Self::Estimator(_)
+            | Self::Linear(_)
+            | Self::Loop(_)
+            | Self::Output(_) => self.to_string(),
+        }
+    }
+
+    /// A message that begins with the name of a record.
+    fn of_record(record: String, message: &str) -> Self {
         let what = message.strip_prefix(&format!("{record}: "));
         Self::File {
-            what: format!("{}{options}", what.unwrap_or(message)),
+            what: what.unwrap_or(message).to_string(),
             file: record,
+        }
+    }
+
+    /// An error of a fit with the record of a file.
+    pub(crate) fn fit(path: &Path, error: impl Into<effect_search::Error>) -> Self {
+        Self::Fit {
+            file: path.display().to_string(),
+            source: Box::new(error.into()),
         }
     }
 

@@ -55,8 +55,10 @@ mod tables;
 pub mod term_file;
 pub mod terminal;
 pub mod tour;
+mod words;
 
 pub use commands::{Cli, run};
 pub use error::{Error, one_line};
 use missing_effect::numbers;
 pub use program::program;
+pub use words::Words;

@@ -1,5 +1,7 @@
 //! Errors of a search.
 
+use greybox::{Names, NoFit};
+
 /// Error of a search.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -45,4 +47,29 @@ pub enum Error {
         /// Identifier of the effect.
         id: String,
     },
+}
+
+impl Error {
+    /// The message with the caller's names for what it has to change.
+    #[must_use]
+    pub fn worded(&self, names: &Names) -> String {
+        match self {
+            Self::Signals(error) | Self::Estimation(NoFit::Series(error)) => {
+                error.worded(&names.records)
+            }
+            Self::Fit(error) => error.worded(names),
+            // Its message ends with the constants of the model.
+            Self::Estimation(error @ NoFit::NoFiniteStart { .. }) => {
+                format!("{error}{}", names.known)
+            }
+            Self::Estimation(_)
+            | Self::Own(_)
+            | Self::Apply(_)
+            | Self::Simulation(_)
+            | Self::Design(_)
+            | Self::TimeUnit { .. }
+            | Self::UnknownEffect { .. }
+            | Self::NoStart { .. } => self.to_string(),
+        }
+    }
 }

@@ -1,5 +1,7 @@
 //! Errors of a fit.
 
+use crate::{Names, NoFit};
+
 /// What can go wrong in a fit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -22,9 +24,7 @@ pub enum Error {
         known: String,
     },
     /// A prior is not a finite number with a positive standard error within the bounds.
-    #[error(
-        "[prior] {name} = [{value:?}, {std_error:?}]: the parameter lies between {lower:?} and {upper:?}; give a value there and a standard error above zero, in its unit"
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     Prior {
         /// The parameter.
         name: String,
@@ -88,9 +88,7 @@ pub enum Error {
     #[error("stopped before it was done")]
     Stopped,
     /// The loop cannot be simulated without its reference.
-    #[error(
-        "{record}: the record holds no reference, which a controller follows: name its column as reference in the model file, under [columns] or, for a model of your own, under its [controller.INPUT]"
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     NoReference {
         /// The record.
         record: String,
@@ -106,11 +104,110 @@ pub enum Error {
         value: f64,
     },
     /// A controller's command is held from sample to sample.
-    #[error(
-        "{record}: hold = \"first\" says that the command runs in straight lines, but a controller holds it: write hold = \"zero\", or delete [controller]"
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     CommandNotHeld {
         /// The record.
         record: String,
     },
+}
+
+impl Error {
+    /// The message with the caller's names for what it has to change.
+    #[must_use]
+    pub fn worded(&self, names: &Names) -> String {
+        match self {
+            Self::Record(error) | Self::Estimation(NoFit::Series(error)) => {
+                error.worded(&names.records)
+            }
+            Self::Structure(error) => error.worded(&names.plants),
+            // Its message ends with the constants of the model.
+            Self::Estimation(error @ NoFit::NoFiniteStart { .. }) => {
+                format!("{error}{}", names.known)
+            }
+            Self::Prior {
+                name,
+                value,
+                std_error,
+                lower,
+                upper,
+            } => format!(
+                "{} = [{value:?}, {std_error:?}]: the parameter lies between {lower:?} and {upper:?}; give a value there and a standard error above zero, in its unit",
+                (names.prior)(name)
+            ),
+            Self::NoReference { record } => format!(
+                "{record}: the record holds no reference, which a controller follows: {}",
+                names.reference
+            ),
+            Self::CommandNotHeld { record } => format!(
+                "{record}: hold = \"first\" says that the command runs in straight lines, but a controller holds it: {}",
+                names.held
+            ),
+            // These name nothing of the caller's.
+            Self::NoRecord
+            | Self::UnknownParameter { .. }
+            | Self::Outputs { .. }
+            | Self::LoopSignals { .. }
+            | Self::DirectTerm { .. }
+            | Self::Inputs { .. }
+            | Self::Estimation(_)
+            | Self::Stopped
+            | Self::ConstantReference { .. } => self.to_string(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every message that names something of the caller's.
+    fn messages() -> [Error; 4] {
+        [
+            Error::Estimation(NoFit::NoFiniteStart { starts: 12 }),
+            Error::Prior {
+                name: "k".into(),
+                value: 1.0,
+                std_error: -1.0,
+                lower: 0.0,
+                upper: 2.0,
+            },
+            Error::NoReference {
+                record: "a.csv".into(),
+            },
+            Error::CommandNotHeld {
+                record: "a.csv".into(),
+            },
+        ]
+    }
+
+    /// A caller of the library has neither options nor a model file.
+    #[test]
+    fn by_themselves_messages_name_items_of_the_library() {
+        for error in messages() {
+            let said = error.to_string();
+            let of_the_program = ["--", "[columns]", "[known]", "[prior]", "[controller"];
+            assert!(!of_the_program.iter().any(|s| said.contains(s)), "{said}");
+            assert_eq!(said, error.worded(&Names::LIBRARY));
+        }
+    }
+
+    #[test]
+    fn messages_have_the_names_of_the_caller() {
+        let names = Names {
+            known: " <known>",
+            prior: |parameter| format!("<prior {parameter}>"),
+            reference: "<reference>",
+            held: "<held>",
+            ..Names::LIBRARY
+        };
+        let own = [
+            "<known>",
+            "<prior k> = [1.0, -1.0]",
+            "<reference>",
+            "<held>",
+        ];
+        for (error, own) in messages().iter().zip(own) {
+            assert!(error.worded(&names).contains(own), "{error}");
+        }
+    }
 }

@@ -10,6 +10,7 @@ mod many_starts;
 mod model_observer;
 mod model_setup;
 mod model_starts;
+mod names;
 mod not_determined;
 mod output_noise;
 mod prediction;
@@ -34,6 +35,7 @@ pub use fit::{
 pub use ideal::{IdealRecords, NotIdeal, ideal_records};
 pub use many_starts::{keep_best_simulated, with_other_speeds};
 pub use model_setup::{LoopController, ModelSetup, SimulatedLoop};
+pub use names::Names;
 pub use not_determined::not_determined;
 pub use prediction::{FitUncertainty, InitialStates, output_errors};
 pub use reading_grid::{ReadingGrid, reading_grid};

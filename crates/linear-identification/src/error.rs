@@ -130,12 +130,7 @@ pub enum Error {
         record: String,
     },
     /// The controller's output is not the measured command.
-    #[error(
-        "{record}: the measured command disagrees with the controller of the model file, R/S (r - y), by {} {unit} rms, {:.0} % of its variation: \
-         check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
-        significant(*.mismatch, 3),
-        100.0 * .mismatch / .size
-    )]
+    #[error("{}", self.worded("the controller"))]
     ControllerMismatch {
         /// Name of the record.
         record: String,
@@ -208,6 +203,27 @@ impl From<ct_rls::Error> for Error {
     }
 }
 
+impl Error {
+    /// The message, where `controller` says which one is meant.
+    #[must_use]
+    pub fn worded(&self, controller: &str) -> String {
+        match self {
+            Self::ControllerMismatch {
+                record,
+                mismatch,
+                size,
+                unit,
+            } => format!(
+                "{record}: the measured command disagrees with {controller}, R/S (r - y), by {} {unit} rms, {:.0} % of its variation: \
+                 check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
+                significant(*mismatch, 3),
+                100.0 * mismatch / size
+            ),
+            _ => self.to_string(),
+        }
+    }
+}
+
 /// First suggestion: `order 2,0, or `; empty without a lower order.
 fn or_lower(order: Order) -> String {
     order
@@ -223,5 +239,25 @@ mod tests {
     fn a_lower_order_is_advised_where_there_is_one() {
         assert_eq!(or_lower(Order { n: 3, m: 3 }), "order 2,2, or ");
         assert_eq!(or_lower(Order { n: 1, m: 0 }), "");
+    }
+
+    #[test]
+    fn whose_controller_disagrees_is_for_the_caller_to_say() {
+        let error = Error::ControllerMismatch {
+            record: "a.csv".into(),
+            mismatch: 0.5,
+            size: 2.0,
+            unit: "V".into(),
+        };
+        let said = error.to_string();
+        assert!(
+            said.contains("disagrees with the controller, R/S"),
+            "{said}"
+        );
+        let said = error.worded("the controller of a.toml");
+        assert!(
+            said.contains("of a.toml, R/S (r - y), by 0.500 V"),
+            "{said}"
+        );
     }
 }

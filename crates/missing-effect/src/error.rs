@@ -1,5 +1,7 @@
 //! Errors of a diagnosis.
 
+use greybox::Names;
+
 /// Error of a diagnosis.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -51,6 +53,22 @@ pub enum Error {
         /// Largest magnitude of the sampled loop's eigenvalues.
         radius: f64,
     },
+}
+
+impl Error {
+    /// The message with the caller's names for what it has to change.
+    #[must_use]
+    pub fn worded(&self, names: &Names) -> String {
+        match self {
+            Self::Signals(error) => error.worded(&names.records),
+            Self::Structure(error) => error.worded(&names.plants),
+            Self::Fit(error) => error.worded(names),
+            Self::Design(_)
+            | Self::OtherOutput { .. }
+            | Self::ControlledOutput { .. }
+            | Self::UnstableLoop { .. } => self.to_string(),
+        }
+    }
 }
 
 /// Growth from one sample to the next, in short words.

@@ -1,7 +1,10 @@
-//! Errors of the program as Python exceptions with its messages.
+//! Errors of the program as Python exceptions, whose messages name arguments of Python.
 
+use ctid::Words;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+use crate::words::PYTHON;
 
 pyo3::create_exception!(
     ctid,
@@ -19,13 +22,27 @@ pyo3::create_exception!(
 
 /// The exception of an error of the program.
 pub fn of(error: &ctid::Error) -> PyErr {
+    worded(error, &PYTHON)
+}
+
+/// The exception of an error of the program, with names of arguments.
+pub fn worded(error: &ctid::Error, words: &Words) -> PyErr {
     use ctid::Error as E;
-    let message = ctid::one_line(&error.to_string());
+    let message = ctid::one_line(&error.worded(words));
     match error {
-        E::AtLine { .. } | E::Text { .. } | E::UnknownEffect(_) | E::Usage(_) | E::Plant(_) => {
-            ModelError::new_err(message)
-        }
-        E::File { .. } | E::Columns(_) | E::Record(_) => DataError::new_err(message),
+        E::AtLine { .. }
+        | E::Text { .. }
+        | E::UnknownEffect(_)
+        | E::Usage(_)
+        | E::Setting(_)
+        | E::Plant(_)
+        | E::Experiment(_) => ModelError::new_err(message),
+        E::File { .. }
+        | E::Columns(_)
+        | E::Record(_)
+        | E::Fit { .. }
+        | E::Search(_)
+        | E::Identification(_) => DataError::new_err(message),
         _ => Error::new_err(message),
     }
 }

@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 use crate::error;
 use crate::frame::{Frame, contents, hold_of};
 use crate::json::json;
+use crate::words::IDENTIFY;
 use crate::work;
 
 /// Time, measured output, simulated output.
@@ -113,7 +114,7 @@ pub fn identify<'py>(
             method.id()
         )));
     }
-    let found = work::run(py, None, |_, _| {
+    let found = work::run_worded(py, None, &IDENTIFY, |_, _| {
         let read = |frame: &crate::frame::Content| frame.record(&columns, &options);
         let all = frames
             .iter()

@@ -2,7 +2,7 @@
 //!
 //! | what | where |
 //! |---|---|
-//! | exceptions | `error.rs` |
+//! | exceptions | `error.rs`; the names of arguments in their messages: `words.rs` |
 //! | arguments that are arrays of numbers | `arrays.rs` |
 //! | long work: the interpreter's lock is released, Ctrl-C is heard | `work.rs` |
 //! | frames as the program reads its records | `frame.rs` |
@@ -42,6 +42,7 @@ mod tank_file;
 mod tank_model;
 mod tank_text;
 mod time_limit;
+mod words;
 mod work;
 
 use pyo3::prelude::*;

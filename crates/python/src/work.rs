@@ -5,10 +5,12 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
+use ctid::Words;
 use pyo3::prelude::*;
 use rayon::ThreadPoolBuilder;
 
 use crate::error;
+use crate::words::PYTHON;
 
 /// Interval of the checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
@@ -44,11 +46,21 @@ fn in_own_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     }
 }
 
-/// Runs work that may take long. Ctrl-C sets a flag that the work receives: the work ends soon then, and a `KeyboardInterrupt` replaces its
-/// result. `progress`: called with every new phase.
+/// Runs work as [`run_worded`] does, with the names of arguments that most calls have.
 pub fn run<T: Send>(
     py: Python<'_>,
     progress: Option<&Py<PyAny>>,
+    work: impl FnOnce(&AtomicBool, &Phases<Result<T, ctid::Error>>) -> Result<T, ctid::Error> + Send,
+) -> PyResult<T> {
+    run_worded(py, progress, &PYTHON, work)
+}
+
+/// Runs work that may take long. Ctrl-C sets a flag that the work receives: the work ends soon then, and a `KeyboardInterrupt` replaces its
+/// result. `progress`: called with every new phase. `words`: names of arguments in messages.
+pub fn run_worded<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    words: &Words,
     work: impl FnOnce(&AtomicBool, &Phases<Result<T, ctid::Error>>) -> Result<T, ctid::Error> + Send,
 ) -> PyResult<T> {
     let stop = AtomicBool::new(false);
@@ -91,7 +103,7 @@ pub fn run<T: Send>(
                 return Err(raised);
             }
             match (ended, found) {
-                (Ok(()), Some(found)) => found.map_err(|error| error::of(&error)),
+                (Ok(()), Some(found)) => found.map_err(|error| error::worded(&error, words)),
                 _ => Err(error::Error::new_err(
                     "this is an internal error of ctid: please report the line above",
                 )),

@@ -1,7 +1,7 @@
 //! Cells of a CSV file: numbers, and marks of missing samples.
 
 use super::place::Place;
-use crate::{Error, ReadError, TimestampError, quoted};
+use crate::{CellMend, Error, ReadError, TimestampError, quoted};
 
 /// Marks of missing samples in historians, loggers and spreadsheets, in small letters. A cell that begins with one of them and continues
 /// with a blank or a colon is a missing sample too (`Bad: sensor failure`).
@@ -140,17 +140,11 @@ impl CellFault {
                     error,
                 });
             }
-            Self::Thousands => THOUSANDS,
-            Self::NoNumber => TIME_AS_NUMBER,
-            Self::Strict => {
-                "[columns] says that it stands for a missing sample; leave out --strict to read on over it"
-            }
-            Self::Word if strict => {
-                "correct the cell, or leave out --strict where it says that the sample is missing"
-            }
-            Self::Word => {
-                "correct the cell, or list the word under [columns] where it says that the sample is missing: missing = [\"...\"]"
-            }
+            Self::Thousands => CellMend::Thousands,
+            Self::NoNumber => CellMend::TimeAsNumber,
+            Self::Strict => CellMend::Declared,
+            Self::Word if strict => CellMend::Strict,
+            Self::Word => CellMend::Declare,
         };
         Error::Read(ReadError::TextInCell {
             file,
@@ -162,9 +156,6 @@ impl CellFault {
     }
 }
 
-/// Correction for [`CellFault::Thousands`].
-pub(crate) const THOUSANDS: &str =
-    "write decimals with a point and without separators for thousands";
 /// Correction for [`CellFault::NoNumber`].
 pub(crate) const TIME_AS_NUMBER: &str =
     "the rows before have the time as a number: write it so throughout";

@@ -7,7 +7,7 @@ use crate::columns::{Found, Layout, Purpose};
 use crate::quote::rounded;
 use crate::record::median_step;
 use crate::series::constant;
-use crate::{Error, quoted};
+use crate::{Error, Shortage, quoted};
 
 /// A record is rejected if more than this share of the output is exactly at its limits ...
 const SATURATED_SHARE: f64 = 1.0 / 3.0;
@@ -41,10 +41,8 @@ impl Table {
         let needed = fewest_rows(purpose);
         if rows < needed {
             let why = match self.outside {
-                0 => String::new(),
-                outside => format!(
-                    " (--from and --to leave out {outside}; dates without a zone are those of time_zone, or UTC)"
-                ),
+                0 => Shortage::Short,
+                rows => Shortage::Outside { rows },
             };
             return Err(Error::TooFewRows {
                 record: file.into(),

@@ -25,7 +25,7 @@ pub use self::summary::{Converted, MissingSamples, ReadSummary};
 use self::table::read_table;
 use self::text::decode;
 pub(crate) use self::{
-    cells::{Cell, CellFault, Numbers, THOUSANDS, TIME_AS_NUMBER, says_missing},
+    cells::{Cell, CellFault, Numbers, TIME_AS_NUMBER, says_missing},
     text::{check_width, delimiter, delimiter_name, is_number},
     time::Times,
 };
@@ -76,7 +76,7 @@ pub struct Reading {
 /// [`ReadError::CannotOpen`], [`ReadError::Folder`], [`ReadError::NotText`], [`ReadError::EmptyFile`],
 /// [`ReadError::NoHeader`], [`ReadError::Column`], [`ReadError::UnknownTimeUnit`], [`ReadError::WrongFieldCount`],
 /// [`ReadError::UnitRow`], [`ReadError::TextInCell`], [`ReadError::MixedDecimalMarks`], [`ReadError::Timestamp`],
-/// [`ReadError::RepeatedTime`], [`ReadError::BackwardTime`], [`Error::Bound`], [`Error::TooFewRows`] (below
+/// [`ReadError::RepeatedTime`], [`ReadError::BackwardTime`], [`Error::Bound`], [`Error::EmptyPart`], [`Error::TooFewRows`] (below
 /// [`MIN_ROWS`](crate::MIN_ROWS)), [`Error::NoSample`], [`Error::ConstantOutput`], [`Error::InvalidInterval`], [`Error::TooLarge`],
 /// [`Error::TooSmall`], [`Error::Saturated`]; where it is to be strict [`ReadError::EmptyCell`], [`ReadError::NotFinite`] and [`Error::Gap`] too.
 pub fn read_csv(path: &Path, columns: &Columns, options: &ReadOptions) -> Result<Reading, Error> {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::{Calendar, IsolatedReadings, duration};
+use crate::{Calendar, IsolatedReadings, Names, duration};
 
 /// Samples of a column that are missing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -89,17 +89,17 @@ impl ReadSummary {
             && self.converted.is_empty()
             && self.resampled.is_none()
     }
-}
 
-fn rows(count: usize) -> String {
-    match count {
-        1 => "1 row".to_string(),
-        count => format!("{count} rows"),
+    /// The line with the caller's names for the settings of reading.
+    #[must_use]
+    pub fn worded(&self, names: &Names) -> String {
+        let mut line = String::new();
+        // Into memory nothing fails.
+        let _ = self.write(&mut line, names);
+        line
     }
-}
 
-impl fmt::Display for ReadSummary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn write(&self, f: &mut impl fmt::Write, names: &Names) -> fmt::Result {
         write!(f, "{}: {}", self.file, rows(self.rows))?;
         if let Some(calendar) = &self.calendar {
             let (first, last) = (calendar.at(0.0), calendar.at(self.duration));
@@ -125,8 +125,10 @@ impl fmt::Display for ReadSummary {
         if self.outside > 0 {
             write!(
                 f,
-                "; {} outside --from and --to left out",
-                rows(self.outside)
+                "; {} outside {} and {} left out",
+                rows(self.outside),
+                names.from,
+                names.to
             )?;
         }
         if self.without_time > 0 {
@@ -171,5 +173,18 @@ impl fmt::Display for ReadSummary {
             write!(f, "; resampled to one row every {}", duration(interval))?;
         }
         Ok(())
+    }
+}
+
+fn rows(count: usize) -> String {
+    match count {
+        1 => "1 row".to_string(),
+        count => format!("{count} rows"),
+    }
+}
+
+impl fmt::Display for ReadSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write(f, &Names::LIBRARY)
     }
 }

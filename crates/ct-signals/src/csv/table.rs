@@ -14,7 +14,7 @@ use super::{
 };
 use crate::columns::{Columns, Found, Layout, Purpose};
 use crate::{
-    Calendar, Channel, Error, ReadError, Record, escaped, isolated_readings, quoted, unit,
+    Calendar, Channel, Error, ReadError, Record, Shortage, escaped, isolated_readings, quoted, unit,
 };
 
 /// The columns in use, with where each row ends in the file.
@@ -267,7 +267,7 @@ impl Table {
                     record: file.into(),
                     rows: record.len(),
                     needed: fewest_rows(purpose),
-                    why: " on the grid of --resample".into(),
+                    why: Shortage::Resampled,
                 });
             }
         }

@@ -10,7 +10,9 @@ use super::{
 };
 use crate::columns::Columns;
 use crate::quote::rounded;
-use crate::{Calendar, Error, ReadError, Timestamp, TimestampError, TimestampReader, Zone, quoted};
+use crate::{
+    Calendar, Error, PartLimit, ReadError, Timestamp, TimestampError, TimestampReader, Zone, quoted,
+};
 
 /// Format of a time column.
 #[derive(Debug, Clone)]
@@ -99,20 +101,15 @@ impl Times {
                 time: self.shown(time).into(),
             }));
         }
-        let mend = match self {
-            // An hour occurs twice when clocks are set back.
-            Self::Dates { .. } if previous - time <= 3600.0 => {
-                "name the zone with time_zone = \"...\" under [columns] where clocks were set back, or sort the rows by time"
-            }
-            _ => "sort the rows by time, or split the file there: each part is a record of its own",
-        };
+        // An hour occurs twice when clocks are set back.
+        let clock = matches!(self, Self::Dates { .. }) && previous - time <= 3600.0;
         Err(Error::Read(ReadError::BackwardTime {
             file,
             row,
             column,
             time: self.shown(time).into(),
             previous: self.shown(previous).into(),
-            mend,
+            clock,
         }))
     }
 }
@@ -169,15 +166,12 @@ pub(super) struct Bounds {
 
 impl Bounds {
     pub fn of(times: &Times, seconds: f64, options: &ReadOptions) -> Result<Self, Error> {
-        let bound = |option: &'static str,
-                     text: &Option<String>,
-                     none: f64|
-         -> Result<f64, Error> {
+        let bound = |limit: PartLimit, text: &Option<String>, none: f64| -> Result<f64, Error> {
             let Some(text) = text else {
                 return Ok(none);
             };
             let refused = |mend: String| Error::Bound {
-                option,
+                limit,
                 text: quoted(text),
                 mend,
             };
@@ -195,13 +189,11 @@ impl Bounds {
                     .map_err(|error| refused(error.to_string())),
             }
         };
-        let from = bound("--from", &options.from, f64::NEG_INFINITY)?;
-        let to = bound("--to", &options.to, f64::INFINITY)?;
+        let from = bound(PartLimit::From, &options.from, f64::NEG_INFINITY)?;
+        let to = bound(PartLimit::To, &options.to, f64::INFINITY)?;
         if from >= to {
-            return Err(Error::Bound {
-                option: "--to",
+            return Err(Error::EmptyPart {
                 text: quoted(options.to.as_deref().unwrap_or_default()),
-                mend: "it is not behind --from: give a later one".into(),
             });
         }
         Ok(Self { from, to })

@@ -1,6 +1,6 @@
 //! What can be wrong with a file: each message names the file, the row, the column and the mend, in one line.
 
-use crate::{ColumnFault, TimestampError};
+use crate::{ColumnFault, Names, TimestampError};
 
 /// A file, or a stream, that cannot be read as a record.
 ///
@@ -106,7 +106,7 @@ pub enum ReadError {
         outputs: usize,
     },
     /// The columns of the file are not those that were named or are needed.
-    #[error("{file}, row {row}{}", .fault.in_model())]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     Column {
         /// The path as it was given.
         file: String,
@@ -146,9 +146,7 @@ pub enum ReadError {
         delimiter: &'static str,
     },
     /// A cell that is needed is empty.
-    #[error(
-        "{file}, row {row}, column \"{column}\": the cell is empty; fill it in, or leave out --strict: then its sample is missing"
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     EmptyCell {
         /// The path as it was given.
         file: String,
@@ -158,7 +156,7 @@ pub enum ReadError {
         column: String,
     },
     /// A cell holds something that is not a number.
-    #[error("{file}, row {row}, column \"{column}\": \"{text}\" is not a number; {mend}")]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     TextInCell {
         /// The path as it was given.
         file: String,
@@ -169,7 +167,7 @@ pub enum ReadError {
         /// The cell.
         text: String,
         /// What to do.
-        mend: &'static str,
+        mend: CellMend,
     },
     /// Below the header stands a row without a number.
     #[error(
@@ -198,9 +196,7 @@ pub enum ReadError {
         below: String,
     },
     /// A cell holds NaN or an infinity.
-    #[error(
-        "{file}, row {row}, column \"{column}\": \"{text}\" is not a finite number; replace it, or leave out --strict: then its sample is missing"
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     NotFinite {
         /// The path as it was given.
         file: String,
@@ -244,9 +240,7 @@ pub enum ReadError {
         time: Box<str>,
     },
     /// The time runs backward.
-    #[error(
-        "{file}, row {row}, column \"{column}\": the time goes back from {previous} to {time}; {mend}"
-    )]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     BackwardTime {
         /// The path as it was given.
         file: String,
@@ -258,8 +252,8 @@ pub enum ReadError {
         time: Box<str>,
         /// The time in the row before.
         previous: Box<str>,
-        /// What to do.
-        mend: &'static str,
+        /// Whether a clock that was set back explains it.
+        clock: bool,
     },
     /// A date or a time that is not understood.
     #[error("{file}, row {row}, column \"{column}\": {error}")]
@@ -273,6 +267,24 @@ pub enum ReadError {
         /// What is wrong, and the mend.
         error: Box<TimestampError>,
     },
+}
+
+/// What to do about a cell that is not a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CellMend {
+    /// Commas separate thousands.
+    Thousands,
+    /// The time is a number in the rows before.
+    TimeAsNumber,
+    /// [`Columns::missing`](crate::Columns::missing) lists the word, and missing samples are refused.
+    Declared,
+    /// The word may stand for a missing sample, and these are refused.
+    Strict,
+    /// The word may stand for a missing sample, and is not listed.
+    Declare,
+    /// The same in a stream.
+    DeclareInStream,
 }
 
 /// The mend for a file that is too large.

@@ -1,7 +1,7 @@
 //! Reasons why a line of a stream is not used.
 
-use crate::TimestampError;
 use crate::csv::TIME_AS_NUMBER;
+use crate::{CellMend, Names, TimestampError};
 
 /// Reason why a line is not used; later lines may be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -60,14 +60,14 @@ pub enum BadLine {
         error: Box<TimestampError>,
     },
     /// The cell contains no number.
-    #[error("column \"{column}\": \"{text}\" is not a number; {mend}")]
+    #[error("{}", self.worded(&Names::LIBRARY))]
     Text {
         /// The column's header.
         column: String,
         /// The cell.
         text: String,
-        /// The correction, in words.
-        mend: &'static str,
+        /// The correction.
+        mend: CellMend,
     },
     /// The column uses both decimal marks.
     #[error(
@@ -84,4 +84,26 @@ pub enum BadLine {
         "the line is not UTF-8 text; check the speed of the line and the program that writes the rows"
     )]
     NotText,
+}
+
+impl BadLine {
+    /// The message with the caller's names for what it has to change.
+    #[must_use]
+    pub fn worded(&self, names: &Names) -> String {
+        match self {
+            Self::Text { column, text, mend } => format!(
+                "column \"{column}\": \"{text}\" is not a number; {}",
+                mend.worded(names)
+            ),
+            // These name nothing of the caller's.
+            Self::Fields { .. }
+            | Self::Empty { .. }
+            | Self::Missing { .. }
+            | Self::NotFinite { .. }
+            | Self::NoNumber { .. }
+            | Self::Time { .. }
+            | Self::DecimalMark { .. }
+            | Self::NotText => self.to_string(),
+        }
+    }
 }

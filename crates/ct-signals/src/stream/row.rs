@@ -1,8 +1,8 @@
 //! A line of a stream as a row: its cells, their numbers and its time.
 
 use super::{BadLine, Line, Rows, cells, text};
-use crate::csv::{Cell, CellFault, THOUSANDS, Times, delimiter_name, says_missing};
-use crate::quoted;
+use crate::csv::{Cell, CellFault, Times, delimiter_name, says_missing};
+use crate::{CellMend, quoted};
 
 impl Rows {
     /// Reads a line, which was cut off at its end: a carriage return or a line feed within it is part of a cell.
@@ -103,16 +103,14 @@ impl Rows {
                     error,
                 });
             }
-            Err(CellFault::Thousands) => THOUSANDS,
+            Err(CellFault::Thousands) => CellMend::Thousands,
             Err(CellFault::NoNumber) => {
                 return Err(BadLine::NoNumber {
                     column: column(),
                     text: text(),
                 });
             }
-            Err(CellFault::Word | CellFault::Strict) => {
-                "check the program that writes the rows, or list the word under [columns] where it says that the sample is missing"
-            }
+            Err(CellFault::Word | CellFault::Strict) => CellMend::DeclareInStream,
         };
         Err(BadLine::Text {
             column: column(),

@@ -3,6 +3,7 @@
 
 mod ar;
 mod csv_file;
+mod names;
 mod residual_tests;
 mod signals;
 mod simulated_inputs;

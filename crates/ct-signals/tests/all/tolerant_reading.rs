@@ -83,7 +83,12 @@ fn a_historians_export_is_read_and_said_in_one_line() {
         &text,
         &all,
         &strict,
-        &["plant.csv, row 7", "Inhalt", "\"Bad\"", "--strict"],
+        &[
+            "plant.csv, row 7",
+            "Inhalt",
+            "\"Bad\"",
+            "leave out `strict`",
+        ],
     );
 }
 
@@ -151,7 +156,7 @@ fn a_part_is_read_by_dates_and_by_numbers() {
     assert!(
         summary
             .to_string()
-            .contains("30 rows outside --from and --to left out")
+            .contains("30 rows outside `from` and `to` left out")
     );
 
     let numbers = (0..100).map(|k| format!("{},{},{}\n", 0.5 * k as f64, k % 5, k % 7));
@@ -169,25 +174,25 @@ fn a_part_is_read_by_dates_and_by_numbers() {
         &numbers,
         &default,
         &part("2026-01-01", "25"),
-        &["--from", "number in their unit"],
+        &["`from`", "number in their unit"],
     );
     refused(
         &numbers,
         &default,
         &part("30", "25"),
-        &["--to", "not behind --from"],
+        &["`to`", "not behind `from`"],
     );
     refused(
         &numbers,
         &default,
         &part("48", "60"),
-        &["4 rows of data", "--from and --to leave out 96;"],
+        &["4 rows of data", "`from` and `to` leave out 96;"],
     );
     refused(
         &dated,
         &all,
         &part("yesterday", "2026-03-29"),
-        &["--from \"yesterday\""],
+        &["`from` \"yesterday\""],
     );
 }
 

@@ -18,7 +18,7 @@ pub use self::term::with_term;
 use self::term::with_waiting_term;
 use crate::model_file::{self, ModelFile};
 use crate::term_file;
-use crate::{Error, atomic, names};
+use crate::{Error, Words, atomic, names};
 
 /// Adds an effect to a model file; `place` is a vessel or a pump, if there is a choice. Returns a description of the change, in one line.
 ///
@@ -170,8 +170,8 @@ pub fn with_effect(
             effect.id
         )));
     }
-    Domain::check(effect, model.plant, model.columns.output_unit())
-        .map_err(|error| refuse(error.to_string()))?;
+    let wrong = |error: plants::Error| refuse(error.worded(&Words::PROGRAM.fit.plants));
+    Domain::check(effect, model.plant, model.columns.output_unit()).map_err(wrong)?;
     let vessel = place
         .map(|word| model_file::vessel(model.plant, &model.known, effect, word).map_err(&refuse))
         .transpose()?;
@@ -181,7 +181,7 @@ pub fn with_effect(
     };
     model_file::any_structure(model.plant, &model.known, model.columns.inputs.len() > 1)
         .with(placed)
-        .map_err(|error| refuse(error.to_string()))?;
+        .map_err(wrong)?;
 
     let mut document = document(file, text)?;
     push(&mut document, effect.id);

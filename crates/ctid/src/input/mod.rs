@@ -16,12 +16,12 @@ use self::checks::{
     check_height, check_input, check_levels, check_movement, check_rows, check_terms, check_units,
     controller,
 };
-use crate::Error;
 use crate::look::Look;
 use crate::model_file::{self, ModelFile};
 use crate::numbers;
 use crate::output::same_file;
 use crate::sentences::with_unit;
+use crate::{Error, Words};
 
 /// Error of a record whose file name suggests that it is a model.
 fn perhaps_a_model(path: &Path, error: ct_signals::Error) -> Error {
@@ -30,7 +30,8 @@ fn perhaps_a_model(path: &Path, error: ct_signals::Error) -> Error {
         .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
     if named_as_model {
         Error::Usage(format!(
-            "{error}; is this the model file? DATA takes the record, a .csv"
+            "{}; is this the model file? DATA takes the record, a .csv",
+            error.worded(&Words::PROGRAM.fit.records)
         ))
     } else {
         error.into()
@@ -80,7 +81,11 @@ fn interval(text: &str) -> Result<f64, String> {
 pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
     let worth = |summary: &&ReadSummary| !summary.is_plain() || summary.calendar.is_some();
     let noted = summaries.iter().filter(worth);
-    let notes = noted.map(|summary| look.paragraph("", &format!("note: {summary}")));
+    let note = |summary: &ReadSummary| {
+        let said = summary.worded(&Words::PROGRAM.fit.records);
+        look.paragraph("", &format!("note: {said}"))
+    };
+    let notes = noted.map(note);
     let warnings = summaries.iter().flat_map(|summary| {
         let lines = faults(summary);
         lines.map(|line| look.warning(format!("warning: {line}")) + "\n")
@@ -227,13 +232,13 @@ impl Files {
             error,
             UnstableLoop { .. } | ControlledOutput { .. } | Structure(_)
         ) {
-            return Error::file(&self.model, error.to_string());
+            return Error::file(&self.model, error.worded(&Words::PROGRAM.fit));
         }
         let error = match error {
             Design(refused) => return refused.into(),
             error => error,
         };
-        let what = error.to_string();
+        let what = error.worded(&Words::PROGRAM.fit);
         let named = |path: &PathBuf| what.contains(&self.name_of(path));
         if self.data.iter().chain(&self.test).any(named) {
             return error.into();

@@ -11,7 +11,7 @@ use super::{
     raw::{EffectTable, Entry, Number, RawTerm},
     source::Source,
 };
-use crate::{Error, names, term_file};
+use crate::{Error, Words, names, term_file};
 
 /// Content of an `[effect.X]` table.
 #[derive(Default)]
@@ -175,7 +175,9 @@ impl Source<'_> {
                 |structure, &on| structure.with(on),
             )
             .and_then(|structure| structure.with(placed))
-            .map_err(|error| self.at(name.span().start, error.to_string()))?;
+            .map_err(|error| {
+                self.at(name.span().start, error.worded(&Words::PROGRAM.fit.plants))
+            })?;
         Ok(placed)
     }
 }

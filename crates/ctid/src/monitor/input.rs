@@ -7,7 +7,7 @@ use ct_signals::{BadLine, LONGEST_LINE, Line, Rows, TimestampError, quoted};
 
 use super::{Halt, INPUT, Session, lines::Cut};
 use crate::sentences::Told;
-use crate::{Error, one_line};
+use crate::{Error, Words, one_line};
 
 /// Number of lines at the beginning that may be incomplete.
 const PARTS: usize = 2;
@@ -74,12 +74,12 @@ impl<'a> Session<'a> {
                 | BadLine::Fields { .. }),
             ) => {
                 if !self.header_again(line)? {
-                    self.bad(|| bad.to_string());
+                    self.bad(|| said(&bad));
                 }
                 Ok(())
             }
             Err(bad) => {
-                self.bad(|| bad.to_string());
+                self.bad(|| said(&bad));
                 Ok(())
             }
         }
@@ -194,7 +194,7 @@ impl<'a> Session<'a> {
             (None, None) => self.trouble.good(),
             (Some(bad), _) => {
                 let lost = self.words(LOST[0], LOST[1]);
-                self.trouble_in_row(|| format!("{bad}; {lost}"));
+                self.trouble_in_row(|| format!("{}; {lost}", said(&bad)));
             }
             (None, Some((output, lost))) => {
                 let text = format!(
@@ -285,6 +285,11 @@ impl<'a> Session<'a> {
         };
         format!("column \"{column}\": {what}; {mend}")
     }
+}
+
+/// Why a line is not used, in the words of the program.
+fn said(bad: &BadLine) -> String {
+    bad.worded(&Words::PROGRAM.fit.records)
 }
 
 /// Whether a row may be rejected because the preceding row, which determined the format, was only the end of a row.

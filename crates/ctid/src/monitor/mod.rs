@@ -18,10 +18,10 @@ use ::monitor::{CandidateModel, Model, Monitor, OwnModel, Settings, Units, Watch
 use clap::Args;
 use ct_signals::{Columns, Conversion, Rows};
 
-use crate::Error;
 use crate::look::Look;
 use crate::model_file::ModelFile;
 use crate::own_model::{AnyModelFile, OwnModelFile};
+use crate::{Error, Words};
 use lines::Lines;
 use saver::Saver;
 use screen::{DRAWN_EVERY, Screen};
@@ -322,7 +322,10 @@ fn blame(error: ::monitor::Error, arguments: &Arguments) -> Error {
                 arguments.model.display()
             ),
         ),
-        (Structure(_) | Time | NoParameters, _) => Error::file(&arguments.model, error.to_string()),
+        (Structure(wrong), _) => {
+            Error::file(&arguments.model, wrong.worded(&Words::PROGRAM.fit.plants))
+        }
+        (Time | NoParameters, _) => Error::file(&arguments.model, error.to_string()),
         _ => Error::Usage(error.to_string()),
     }
 }

@@ -116,7 +116,7 @@ impl FittedModel {
 fn compared(fitted: &FittedModel) -> Result<Comparison, Error> {
     let (file, records, fit) = (fitted.model(), fitted.records(), fitted.estimate());
     let spec = file.model.spec();
-    let blame = |error: greybox::Error| blame(&records.records, &error);
+    let blame = |error: greybox::Error| blame(&records.records, error);
     let options = fitted.options();
     let mut effort = fitted.effort().clone();
     let share = effort

@@ -49,7 +49,7 @@ pub fn design(
     found.map_err(|error| match error {
         // An error in the options, not in a file.
         effect_search::Error::Design(refused) => refused.into(),
-        error => blame(&problem.records, &error),
+        error => blame(&problem.records, error),
     })
 }
 

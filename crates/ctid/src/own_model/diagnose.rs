@@ -34,7 +34,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, Error> {
     let problem = problem(file, records)?;
     effect_search::diagnose(&problem, options, progress)
-        .map_err(|error| blame(&problem.records, &error))
+        .map_err(|error| blame(&problem.records, error))
 }
 
 /// Text output of a diagnosis.

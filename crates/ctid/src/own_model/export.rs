@@ -153,7 +153,7 @@ pub(crate) fn export(
     let spec = file.model.spec();
     let own = &records.records;
     let Some(model) = fitted.setup()?.simulate(&fitted.estimate().x) else {
-        return Err(blame(own, &greybox::Error::Stopped));
+        return Err(blame(own, greybox::Error::Stopped));
     };
     let name = |column: &String| Heading::of(column).name;
     let input_names = file.columns.inputs.iter().map(name);

@@ -102,7 +102,7 @@ impl FittedModel {
         }
         let setup = setup.with_time_limit(time.clone(), limit.interrupt);
         let fit = setup.fit(options);
-        let fit = fit.map_err(|error| blame(&records.records, &error))?;
+        let fit = fit.map_err(|error| blame(&records.records, error))?;
         let (fit, simulated_loop, control_loop) =
             in_loop(file, &records, (setup, fit), (options, simulate_loop))?;
         if time.passed() {
@@ -252,7 +252,7 @@ impl FittedModel {
     pub(super) fn uncertainty(&self, setup: &ModelSetup) -> Result<Option<FitUncertainty>, Error> {
         let count = setup.parameter_count();
         let known = FitUncertainty::of(setup, &self.fit, count, self.options.noise_order);
-        let mut known = known.map_err(|error| blame(&self.records.records, &error))?;
+        let mut known = known.map_err(|error| blame(&self.records.records, error))?;
         if let Some(known) = &mut known
             && let Some(moved) = self.bias_of_feedback(setup)?
         {
@@ -276,7 +276,7 @@ impl FittedModel {
         }
         let moved = moved_by_weighting(setup, &self.fit, noise_order, stopping);
         let moved =
-            moved.map_err(|error| blame(&self.records.records, &greybox::Error::from(error)))?;
+            moved.map_err(|error| blame(&self.records.records, greybox::Error::from(error)))?;
         Ok(Some(moved))
     }
 
@@ -338,5 +338,5 @@ fn setup_of<'a>(model: &'a OwnModelFile, records: &'a Records) -> Result<ModelSe
         records.time_unit,
     );
     let setup = setup.and_then(|setup| setup.with_priors(&model.priors));
-    setup.map_err(|error| blame(&records.records, &error))
+    setup.map_err(|error| blame(&records.records, error))
 }

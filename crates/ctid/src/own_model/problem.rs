@@ -74,7 +74,7 @@ impl OwnModelFile {
             None => self.as_it_stands()?,
             Some(records) => {
                 let problem = problem(self, records)?;
-                believed(&problem, options).map_err(|e| blame(&problem.records, &e))?
+                believed(&problem, options).map_err(|e| blame(&problem.records, e))?
             }
         };
         Ok(Self {

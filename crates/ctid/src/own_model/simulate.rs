@@ -106,7 +106,7 @@ fn simulated(
     let spec = file.model.spec();
     let count = spec.parameters.len();
     let own = std::slice::from_ref(record);
-    let wrong = |error: greybox::Error| Error::file(path, error.to_string());
+    let wrong = |error: greybox::Error| Error::fit(path, error);
     let fit = match fitted {
         None => None,
         Some(fitted) => Some((fitted, fitted.setup()?)),

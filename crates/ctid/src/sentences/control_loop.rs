@@ -2,6 +2,8 @@
 
 use effect_search::{ControlLoop, NotSimulated};
 
+use crate::Words;
+
 /// Consequence of running a model on the measured command of a loop.
 const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and values of the criterion are biased; the standard errors are enlarged to allow for this.";
 
@@ -32,24 +34,22 @@ pub fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
         NotSimulated::MissingReadings { record } => format!(
             "readings are missing in {record}, so the controller cannot be checked against its commands"
         ),
-        NotSimulated::NoReference { record } => greybox::Error::NoReference {
+        NotSimulated::NoReference { record } => said(&greybox::Error::NoReference {
             record: record.clone(),
+        }),
+        NotSimulated::ConstantReference { record, value } => {
+            said(&greybox::Error::ConstantReference {
+                record: record.clone(),
+                value: *value,
+            })
         }
-        .to_string(),
-        NotSimulated::ConstantReference { record, value } => greybox::Error::ConstantReference {
+        NotSimulated::CommandNotHeld { record } => said(&greybox::Error::CommandNotHeld {
             record: record.clone(),
-            value: *value,
-        }
-        .to_string(),
-        NotSimulated::CommandNotHeld { record } => greybox::Error::CommandNotHeld {
-            record: record.clone(),
-        }
-        .to_string(),
-        NotSimulated::DirectTerm { output, input } => greybox::Error::DirectTerm {
+        }),
+        NotSimulated::DirectTerm { output, input } => said(&greybox::Error::DirectTerm {
             output: output.clone(),
             input: input.clone(),
-        }
-        .to_string(),
+        }),
         NotSimulated::Unstable { radius } => format!(
             "the controller makes the fitted model unstable ({}), so it cannot have produced the record: check its sign, gain and times, and their units",
             match radius {
@@ -68,6 +68,10 @@ pub fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
         ),
     };
     format!("The loop is not simulated: {why}. {MEASURED}")
+}
+
+fn said(error: &greybox::Error) -> String {
+    error.worded(&Words::PROGRAM.fit)
 }
 
 fn chance(p: f64) -> String {

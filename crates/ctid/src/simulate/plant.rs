@@ -171,7 +171,7 @@ fn simulated(
     (path, first, level): (&Path, usize, f64),
     record: &Record,
 ) -> Result<Found, Error> {
-    let wrong = |error: greybox::Error| Error::file(path, error.to_string());
+    let wrong = |error: greybox::Error| Error::fit(path, error);
     let Fitted {
         setup: own,
         fit,

@@ -92,7 +92,7 @@ fn what_a_builder_is_given_is_checked() {
     assert!(
         build(whole().prior("k", prior))
             .unwrap_err()
-            .contains("[prior] k")
+            .contains("prior of k")
     );
     assert!(
         build(whole().time_unit(0.0, "s"))

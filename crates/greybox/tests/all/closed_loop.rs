@@ -217,7 +217,10 @@ fn a_loop_that_cannot_be_simulated_says_why() {
         ..good.clone()
     });
     assert!(matches!(error, Error::NoReference { .. }));
-    assert!(error.to_string().contains("[columns]"), "{error}");
+    assert!(
+        error.to_string().contains("`Record::references`"),
+        "{error}"
+    );
     let constant = Channel::new("r", "cm", vec![14.0; good.len()]);
     let error = said(Record {
         references: vec![constant],

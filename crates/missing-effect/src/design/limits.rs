@@ -84,13 +84,7 @@ pub enum NoExperiment {
         most: f64,
     },
     /// The range exceeds the plant's limits.
-    #[error(
-        "range {} {} leaves {} .. {}, {what}; stay within it",
-        shown(*low),
-        shown(*high),
-        shown(*from),
-        shown(*to)
-    )]
+    #[error("{}", self.worded("the model"))]
     Beyond {
         /// First end.
         low: f64,
@@ -100,7 +94,7 @@ pub enum NoExperiment {
         from: f64,
         /// Upper end of the possible range.
         to: f64,
-        /// Name of the bound.
+        /// Name of the bound: `tank_height` or `input_range`.
         what: &'static str,
     },
     /// The applied signal is constant in the records, and no range is given.
@@ -181,6 +175,29 @@ pub enum NoExperiment {
     },
 }
 
+impl NoExperiment {
+    /// The message, where `place` says in what the limits of the plant are given.
+    #[must_use]
+    pub fn worded(&self, place: &str) -> String {
+        match self {
+            Self::Beyond {
+                low,
+                high,
+                from,
+                to,
+                what,
+            } => format!(
+                "range {} {} leaves {} .. {}, the {what} of {place}; stay within it",
+                shown(*low),
+                shown(*high),
+                shown(*from),
+                shown(*to)
+            ),
+            _ => self.to_string(),
+        }
+    }
+}
+
 /// Largest number of samples of an experiment: a week at one sample per second is too long for the search.
 const MOST_SAMPLES: usize = 200_000;
 
@@ -223,12 +240,12 @@ fn visited(records: &[Record], looped: bool) -> (f64, f64) {
 fn possible(problem: &Problem, looped: bool) -> Option<(f64, f64, &'static str)> {
     if looped {
         let height = problem.known.tank_height?;
-        return Some((0.0, height, "the tank_height of the model file"));
+        return Some((0.0, height, "tank_height"));
     }
     let most = problem.known.input_range?;
     // A command that has been negative may be negative again.
     let low = visited(&problem.records, false).0.min(0.0);
-    Some((low, most, "the input_range of the model file"))
+    Some((low, most, "input_range"))
 }
 
 impl Bounds {

@@ -76,12 +76,12 @@ fn missing_column_lists_those_that_are_there_and_the_closest() {
             "row 1",
             "\"leve [cm]\"",
             "\"t [s]\", \"pump [V]\", \"level [cm]\"",
-            "did you mean \"level [cm]\"? Set output = ",
+            "did you mean \"level [cm]\"? Set `Columns::outputs`",
         ],
     );
     let error = read(&text).unwrap_err();
     assert!(missing(&error, "input"));
-    says(&error, &["beginning with \"u\"", "input = "]);
+    says(&error, &["beginning with \"u\"", "`Columns::inputs`"]);
     assert!(!error.to_string().contains("did you mean"));
 }
 
@@ -96,7 +96,7 @@ fn ambiguous_column() {
         fault(&error),
         Some(ColumnFault::Ambiguous { role: "output", .. })
     ));
-    says(&error, &["\"y1\", \"y2\"", "output = "]);
+    says(&error, &["\"y1\", \"y2\"", "`Columns::outputs`"]);
     let error = read("t,u,y,y\n").unwrap_err();
     assert!(matches!(
         fault(&error),

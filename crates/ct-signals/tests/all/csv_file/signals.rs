@@ -63,7 +63,7 @@ fn one_missing_sample_is_a_gap() {
         ),
         "{error}"
     );
-    says(&error, &["4 samples are missing", "leave out --strict"]);
+    says(&error, &["4 samples are missing", "leave out `strict`"]);
 }
 
 /// Steps of 1 to 3 s are uneven, not full of gaps; 9 s among them are a gap.

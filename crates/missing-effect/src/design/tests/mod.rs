@@ -170,10 +170,16 @@ fn what_cannot_be_is_refused() {
         ));
     }
     for (low, high) in [(-1.0, 5.0), (2.0, 10.5)] {
-        assert!(matches!(
-            refused(pair, range(low, high)),
-            NoExperiment::Beyond { .. }
-        ));
+        let refused = refused(pair, range(low, high));
+        assert!(matches!(refused, NoExperiment::Beyond { .. }));
+        // Where the limit is written only the caller knows.
+        assert!(
+            refused
+                .to_string()
+                .contains("the input_range of the model;")
+        );
+        let said = refused.worded("tank.toml");
+        assert!(said.contains("the input_range of tank.toml;"), "{said}");
     }
     for duration in [-5.0, 0.0, 20.0, f64::NAN] {
         let limits = Limits {

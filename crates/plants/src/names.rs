@@ -1,0 +1,24 @@
+//! How messages name what a caller gave.
+
+/// Names, in messages, of what a caller may change in a plant and of where it finds the effects.
+///
+/// [`Display`](std::fmt::Display) of an error has [`Names::LIBRARY`]; a program or a binding hands its own names to
+/// [`Error::worded`](crate::Error::worded).
+#[derive(Debug, Clone, Copy)]
+pub struct Names {
+    /// What lists the plants of an effect, as a clause.
+    pub plants_of: fn(effect: &str) -> String,
+    /// What lists the effects that the model may have, in brackets after a blank; empty for nothing.
+    pub effects: &'static str,
+    /// How the command of the second pump is given, as a clause.
+    pub second_command: &'static str,
+}
+
+impl Names {
+    /// Names of this crate.
+    pub const LIBRARY: Self = Self {
+        plants_of: |_| "`EffectInfo::sites` says where it acts".to_string(),
+        effects: " (`Structure::candidates` lists them)",
+        second_command: "give the range of its command, `Scales::input_2`",
+    };
+}

@@ -1,0 +1,63 @@
+//! How messages name what the user gave: the arguments of the Python package.
+
+use ctid::Words;
+use effect_search::design::NoExperiment;
+
+/// Names of arguments of fits, diagnoses and designs.
+pub const PYTHON: Words = Words {
+    fit: greybox::Names {
+        records: ct_signals::Names {
+            part: "of the frame, df.loc[FIRST:LAST]",
+            in_columns: "in inputs=[...] or outputs=[...]",
+            column,
+            namer: "the model",
+            // Frames are read whole, and missing samples are NaN: no call has arguments for the others.
+            ..ct_signals::Names::LIBRARY
+        },
+        plants: plants::Names {
+            plants_of: |effect| format!("leave {effect} out of effects=[...]"),
+            effects: "",
+            second_command: "name the columns of both commands, inputs=[..., ...]",
+        },
+        known: " in known={...}",
+        prior: |parameter| format!("priors[\"{parameter}\"]"),
+        reference: "name its column as reference in the model file, under its [controller.INPUT]",
+        held: "give hold=\"zero\", or delete [controller.INPUT] from the model file",
+    },
+    setting: "",
+    controller: "the argument controller",
+    part_or_grid: "",
+    experiment,
+};
+
+/// Names of arguments of `identify`, which knows one output.
+pub const IDENTIFY: Words = Words {
+    fit: greybox::Names {
+        records: ct_signals::Names {
+            in_columns: "in inputs=[...] or output=\"...\"",
+            ..PYTHON.fit.records
+        },
+        ..PYTHON.fit
+    },
+    ..PYTHON
+};
+
+/// The argument for the column of a role.
+fn column(role: &str) -> String {
+    match role {
+        "time" => "the index of the frame".to_string(),
+        "reference" => "reference=\"...\"".to_string(),
+        _ => format!("{role}s=[...]"),
+    }
+}
+
+/// An experiment that cannot be proposed.
+fn experiment(refused: &NoExperiment) -> String {
+    match refused {
+        NoExperiment::NoRange { input, .. } => {
+            format!("{refused}, ranges={{\"{input}\": (LOW, HIGH)}}")
+        }
+        NoExperiment::OutOfTime => format!("{refused}: effort=\"thorough\", or time_limit"),
+        _ => refused.to_string(),
+    }
+}

@@ -83,6 +83,8 @@ pub(crate) struct Registers<T> {
     earlier: Vec<Selected>,
     /// Values without derivatives: parameters, constants of the text, and expressions of these.
     plain: Vec<bool>,
+    /// Marks of operations, for the work of a selection.
+    marks: Vec<bool>,
     /// All inputs are held, and the results that depend on inputs and parameters only are computed.
     pub held: bool,
     /// Roots, powers and logarithms of invalid arguments are zero: they occur only on a branch that ends the step.
@@ -99,6 +101,7 @@ impl<T: Clone> Registers<T> {
             selected: self.selected.clone(),
             earlier: Vec::new(),
             plain: self.plain.clone(),
+            marks: Vec::new(),
             held: self.held,
             extended: self.extended,
         }
@@ -130,6 +133,7 @@ impl Tape {
             selected: Selected::with_capacity(self.operations.len()),
             earlier: Vec::new(),
             plain: Vec::new(),
+            marks: Vec::with_capacity(self.operations.len()),
             held: false,
             extended: false,
         };
@@ -139,7 +143,11 @@ impl Tape {
         for register in numbers {
             registers.plain[register] = registers.values[register].same_derivatives(zero);
         }
-        self.select(&registers.taken, &registers.plain, &mut registers.selected);
+        self.select(
+            (&registers.taken, &registers.plain),
+            &mut registers.marks,
+            &mut registers.selected,
+        );
         registers
     }
 

@@ -100,6 +100,13 @@ pub struct Thresholds {
     /// "positive" evidence in A. E. Raftery, Sociological Methodology 25 (1995) 111-163.
     pub growth_margin: f64,
 
+    // Other minima of a set's fit.
+    /// Number of starts with other values of an effect's thresholds, those with the lowest predicted cost, that are fitted (1 or more).
+    /// Chosen, for time.
+    pub minima_fitted: usize,
+    /// Number of times that the effects of a set are tried one after another (1 or more). Chosen, for time.
+    pub minima_rounds: usize,
+
     // The floating search.
     /// Number of best sets, for each noise model, from which the floating search may begin (1 or more). Chosen, for time.
     pub floating_seeds: usize,
@@ -238,6 +245,8 @@ impl Thresholds {
         fall_factor: 2.0,
         fall_margin: 6.0,
         growth_margin: 2.0,
+        minima_fitted: 4,
+        minima_rounds: 3,
         floating_seeds: 8,
         floating_small_set: 2,
         floating_swaps: 4,

@@ -19,12 +19,10 @@ pub(super) struct Selected {
     /// The operations that guards and outputs need and whose results change although all inputs are held.
     pub readings: Vec<(Operation, Register)>,
     pub all: Vec<(Operation, Register)>,
-    /// Marks of operations, for the work of a selection.
-    marks: Vec<bool>,
 }
 
-/// Number of selections that are kept besides the present one: five thresholds on which a state moves to and fro have 32.
-const EARLIER: usize = 32;
+/// Number of selections that are kept besides the present one: five branches that switch have 32 combinations.
+const EARLIER: usize = 31;
 
 impl Selected {
     pub fn with_capacity(operations: usize) -> Self {
@@ -37,7 +35,6 @@ impl Selected {
             outputs: list(),
             readings: list(),
             all: list(),
-            marks: Vec::with_capacity(operations),
         }
     }
 }
@@ -50,6 +47,7 @@ impl Tape {
             selected,
             earlier,
             plain,
+            marks,
             ..
         } = registers;
         // The latest is the last.
@@ -62,7 +60,7 @@ impl Tape {
                 } else {
                     earlier.remove(0)
                 };
-                self.select(taken, plain, &mut next);
+                self.select((taken, plain), marks, &mut next);
                 next
             }
         };
@@ -81,7 +79,12 @@ impl Tape {
     }
 
     /// Leaves out the operations that only other branches need.
-    pub(super) fn select(&self, taken: &[bool], plain: &[bool], into: &mut Selected) {
+    pub(super) fn select(
+        &self,
+        (taken, plain): (&[bool], &[bool]),
+        marks: &mut Vec<bool>,
+        into: &mut Selected,
+    ) {
         let Selected {
             taken: of,
             slopes,
@@ -90,7 +93,6 @@ impl Tape {
             outputs,
             readings,
             all,
-            marks,
         } = into;
         of.clear();
         of.extend_from_slice(taken);

@@ -85,7 +85,12 @@ impl Context<'_> {
         let fine = rough
             .into_par_iter()
             .filter(near)
-            .filter_map(|node| self.refitted(&node, noise, FINE).ok());
+            .filter_map(|node| self.refitted(&node, noise, FINE).ok())
+            // The set that they are compared with is in its lowest minimum too.
+            .map(|node| {
+                let last = node.added.len() - 1;
+                self.in_lowest_minimum(node, last, noise)
+            });
         let mut others = best_first(fine.collect());
         let of_users = others.iter().any(|node| self.ends_in_own(node));
         let own_last = of_users.then(|| self.in_limited_noise(last)).transpose()?;

@@ -19,7 +19,7 @@
 
 use ct_model::effects::{EffectParameter, Role};
 use ct_signals::{ArModel, Record};
-use estimation::{Fit, Noise, fit_from, linearise, prewhitened};
+use estimation::{Fit, Noise, Stopping, fit_from, linearise, prewhitened};
 use greybox::ModelSetup;
 use rayon::prelude::*;
 
@@ -29,6 +29,8 @@ use crate::search::grow::{best_first, same_set};
 
 /// An initial state is determined by the readings after the beginning if its influence on them is at least this share of that on all.
 const REMEMBERED: f64 = 0.1;
+/// A fit with a noise model of its own ends where a step predicts a smaller fall of the deviance.
+const DEVIANCE: f64 = 0.1;
 
 /// A set as a partial explanation.
 #[derive(Clone)]
@@ -177,12 +179,17 @@ impl Context<'_> {
     pub fn in_limited_noise(&self, node: &Node) -> Result<Fit, Error> {
         let setup = self.setup(&node.model)?;
         let memory = Some(self.longest_memory());
+        // The deviance is then known to a small part of the margins that it is compared with.
+        let stopping = Stopping {
+            cost: ROUGH.cost.min(DEVIANCE / self.samples()),
+            ..ROUGH
+        };
         Ok(prewhitened(
             &setup,
             node.fit.clone(),
             self.thresholds.noise_order,
             memory,
-            ROUGH,
+            stopping,
         )?)
     }
 

@@ -107,6 +107,8 @@ pub(crate) enum Phase {
     White,
     /// The search, prewhitened by a noise model.
     Coloured,
+    /// The fits of the best set from other values of its thresholds.
+    Minima,
     /// The acceptance test of the effects.
     Confirm,
     /// Sets of effects that do not follow time, grown once more.
@@ -123,7 +125,8 @@ impl Phase {
             Self::Believed => 0.2,
             Self::White => 0.4,
             Self::Coloured => 0.6,
-            Self::Confirm => 0.65,
+            Self::Minima => 0.63,
+            Self::Confirm => 0.67,
             Self::Floating => 0.8,
             Self::Part => 0.9,
             Self::Groups => 1.0,

@@ -6,6 +6,7 @@ use greybox::weighted_rms;
 
 use super::searched::Searched;
 use crate::Error;
+use crate::accept::partial::explained;
 use crate::base::problem::Phase;
 use crate::fit::node::{Context, FINE, Node};
 use crate::residual_tests::NotNoise;
@@ -21,7 +22,7 @@ pub(super) struct Answer {
     pub noise: Noise,
     /// Samples per independent sample, if that is not the noise model of the set's residual.
     pub slowness: f64,
-    /// The set is a part of one that leaves noise.
+    /// The set is a subset of an accepted set.
     pub reduced: bool,
 }
 
@@ -47,27 +48,26 @@ impl Context<'_> {
 
     /// The effects of the best set that pass the acceptance test.
     pub(super) fn accepted(&self, searched: &Searched) -> Result<Answer, Error> {
-        self.limit.begin(Phase::Confirm);
         let (grown, noise) = (&searched.grown, &searched.noise);
         let effects = grown.base.added.len();
-        let mut set = self.confirm(grown.best.clone(), &grown.base, noise)?;
+        self.limit.begin(Phase::Minima);
+        let best = self.in_lowest_minimum(grown.best.clone(), effects, noise);
+        self.limit.begin(Phase::Confirm);
+        let mut set = self.confirm(best.clone(), &grown.base, noise)?;
         if grown.cut_short && set.added.len() == effects {
             // After a search that was cut short, the noise model also describes effects that were not tried; the test below decides without
             // it.
-            set = grown.best.clone();
+            set = best;
         }
-        if set.added.len() > effects {
-            set = self.in_lowest_minimum(set, effects, noise);
-            if !self.stands_in_own_noise(&set, &grown.base)? {
-                set = grown.base.clone();
-            }
+        if set.added.len() > effects && !self.better_with_own_noise_model(&set, &grown.base)? {
+            set = grown.base.clone();
         }
         self.answer(set, noise.clone())
     }
 
     /// Whether a set is better than the model without it when each has the noise model of its own residual: what autocorrelated noise
     /// explains needs no effect.
-    fn stands_in_own_noise(&self, set: &Node, base: &Node) -> Result<bool, Error> {
+    fn better_with_own_noise_model(&self, set: &Node, base: &Node) -> Result<bool, Error> {
         let own = self.in_own_noise(set)?;
         let bare = self.in_own_noise(base)?;
         let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
@@ -99,7 +99,7 @@ impl Context<'_> {
         if answer.not_noise.is_none()
             && let Some(better) = self.better_in_own_noise(timeless.clone(), &answer.own)
         {
-            return self.taken(better, searched);
+            return self.of_floating_search(better, searched);
         }
         if answer.not_noise.is_none() && !flexible {
             return Ok(answer);
@@ -109,7 +109,7 @@ impl Context<'_> {
         sets.extend(timeless);
         let part = self.largest_part(&base, &sets)?;
         let part = part.and_then(|part| self.without_small_effects(part, &base));
-        let part = part.filter(|part| flexible || !self.is_worth_less(part, &answer));
+        let part = part.filter(|part| flexible || !self.contains_part(&answer, part, &base));
         if let Some(part) = part {
             let (singles, base) = searched.singles_by_error.clone();
             let grown = &mut searched.grown;
@@ -132,17 +132,22 @@ impl Context<'_> {
         Ok(answer)
     }
 
-    /// Whether a set is a part of an answer whose other effects need no replacement: they are no functions of time, which compensate for any
-    /// slow disturbance, and the answer's noise model is none that may describe slow physics.
-    fn is_worth_less(&self, part: &Node, answer: &Answer) -> bool {
+    /// Whether an answer that explains enough contains a partial explanation, and further effects that passed the acceptance test. These are no
+    /// functions of time, which compensate for any slow disturbance, and the answer's noise model is none that may describe slow physics.
+    fn contains_part(&self, answer: &Answer, part: &Node, base: &Node) -> bool {
         let is_part = part.added.iter().all(|i| answer.set.added.contains(i));
-        let others = answer.set.added.iter().copied();
-        let others: Vec<usize> = others.filter(|i| !part.added.contains(i)).collect();
-        is_part && self.in_time(&others) == 0 && !self.is_slow(&answer.own.noise)
+        let further = answer.set.added.iter().copied();
+        let further: Vec<usize> = further.filter(|i| !part.added.contains(i)).collect();
+        let floors: Vec<f64> = answer.own.noise.iter().map(ArModel::sigma).collect();
+        is_part
+            && !further.is_empty()
+            && self.in_time(&further) == 0
+            && !self.is_slow(&answer.own.noise)
+            && explained(&base.fit, &answer.set.fit, &floors) >= self.thresholds.partial_share
     }
 
     /// A set of the floating search as the answer, after the acceptance test. `better`: with the noise model of its own residual.
-    fn taken(&self, better: Node, searched: &mut Searched) -> Result<Answer, Error> {
+    fn of_floating_search(&self, better: Node, searched: &mut Searched) -> Result<Answer, Error> {
         let grown = &mut searched.grown;
         // So many effects may imitate other effects, and the noise model may describe the rest of the error.
         let noise = better.fit.noise.clone();
@@ -153,13 +158,18 @@ impl Context<'_> {
         let set = refitted.unwrap_or_else(|_| better.clone());
         let size = set.added.len();
         let set = self.confirm(set, &grown.base, &noise)?;
-        let mut answer = self.answer(set, noise)?;
-        if answer.set.added.len() == size {
-            // The deviance of a fit with its own noise model is lower than that of a fit with the same model given.
-            answer.not_noise = self.not_noise(&answer.set, &better.fit)?;
-            answer.own = better.fit;
+        if set.added.len() < size {
+            return self.answer(set, noise);
         }
-        Ok(answer)
+        // The deviance of a fit with its own noise model is lower than that of a fit with the same model given.
+        Ok(Answer {
+            not_noise: self.not_noise(&set, &better.fit)?,
+            own: better.fit,
+            set,
+            noise,
+            slowness: 1.0,
+            reduced: false,
+        })
     }
 
     /// The model without effects, if a level shift of a reading explains more than those of the answer, or an abrupt change that they leave.

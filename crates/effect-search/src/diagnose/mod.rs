@@ -3,11 +3,11 @@
 //! 1. The believed model is fitted with white noise, from many starts; the candidates follow from the ranges that it simulates.
 //! 2. A search with white noise adds many effects; the noise model is estimated from the residual of the best set. If this noise
 //!    model is not white, the search is repeated with it (prewhitened fits; [`searched`]).
-//! 3. The effects of the best set that pass the acceptance test are kept: with one common noise model first, then with a noise model from
-//!    each model's own residual ([`answer`]).
+//! 3. The best set is fitted from other values of its thresholds. Its effects that pass the acceptance test are kept: with one common noise
+//!    model first, then with a noise model from each model's own residual ([`answer`]).
 //! 4. Residual tests check whether the residual is noise. If it is not, or if many effects were needed, sets of effects that do not depend
 //!    on time are searched once more; if the residual is still not noise, or several of the effects depend on time only, a set that explains
-//!    a large part of the error is selected from all sets ([`answer`]).
+//!    a large part of the error is selected from all sets, unless the kept set contains it ([`answer`]).
 //! 5. The result of the residual tests determines the verdict ([`verdict`]); effects that the data cannot distinguish form groups. Rounding
 //!    that the readings show is added without a test: the criterion hardly falls.
 

@@ -1,4 +1,4 @@
-//! The searches: with white noise, and with the noise model of what the best set leaves.
+//! The searches: with white noise, and with the noise model of the best set's residual.
 
 use estimation::Noise;
 
@@ -66,12 +66,10 @@ impl Context<'_> {
         let Ok(begin) = self.refitted(&by_error.base, &noise, FINE) else {
             return Ok((by_error, Noise::white(noise.outputs())));
         };
-        // The best set of the search with white noise may also be better with this noise model.
-        let other = self.refitted(&by_error.best, &noise, FINE);
         if late {
             // Sets are compared with one noise model, even if no time is left.
             let mut grown = by_error;
-            let Ok(best) = other else {
+            let Ok(best) = self.refitted(&grown.best, &noise, FINE) else {
                 return Ok((grown, Noise::white(noise.outputs())));
             };
             (grown.base, grown.best) = (begin, best);
@@ -80,7 +78,8 @@ impl Context<'_> {
         }
         let all: Vec<usize> = (0..self.candidates.len()).collect();
         let mut grown = self.grow(begin, (&all, &by_error.singles), &noise, most)?;
-        if let Ok(other) = other
+        // The best set of the search with white noise may also be better with this noise model.
+        if let Ok(other) = self.refitted(&by_error.best, &noise, FINE)
             && other.fit.bic() < grown.best.fit.bic()
         {
             grown.best = other;

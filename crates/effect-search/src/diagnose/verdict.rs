@@ -1,4 +1,4 @@
-//! The verdict: what the answer is worth.
+//! The verdict: whether the answer is a whole explanation, a partial one or none.
 
 use ct_signals::ArModel;
 use estimation::Fit;

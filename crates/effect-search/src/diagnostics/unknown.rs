@@ -15,8 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::accept::partial::{explained, fall};
-use crate::fit::estimate::Estimate;
-use crate::fit::estimate::sizes;
+use crate::fit::estimate::{Estimate, sizes};
 use crate::fit::node::{Context, FINE, Node, ROUGH};
 use crate::search::grow::best_first;
 

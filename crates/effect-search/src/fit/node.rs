@@ -11,8 +11,7 @@ use greybox::{FitOptions, ModelSetup, SimulatedLoop};
 use crate::Error;
 use crate::base::control_loop::ControlLoop;
 use crate::base::problem::{Limit, Problem};
-use crate::fit::relations::Absorbed;
-use crate::fit::relations::Tie;
+use crate::fit::relations::{Absorbed, Tie};
 use crate::thresholds::Thresholds;
 
 /// Stopping criteria of a first fit, which only has to give a rank.

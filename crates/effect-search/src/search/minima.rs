@@ -3,32 +3,36 @@
 //! The cost of a limit, of a dead zone or of an actuator that sticks has several minima: each reading that changes sides adds one. While a
 //! set grows, an effect explains a part of the error together with others that are replaced later, and its fit may stay in a minimum that is
 //! not the lowest beside the final ones.
+//!
+//! Tried are the effects that the search added. Those of the model file are fitted from their own starts only, and terms of the user's own have
+//! no thresholds.
 
 use ct_model::effects::{Candidate, Role};
 use estimation::{Noise, Residuals, linearise, within};
 use rayon::prelude::*;
 
 use crate::fit::node::{Context, FINE, Node};
-use crate::search::score::{step_within, thinned};
+use crate::search::score::{QUANTISATION, step_within, thinned};
 
-/// Values that are tried near that of the fit: its distance from the absent value, times these factors.
+/// Values that are tried near that of the fit: its distance from the absent value, times these factors. Chosen, for time.
 const NEAR: [f64; 8] = [0.8, 0.88, 0.93, 0.97, 1.03, 1.08, 1.15, 1.25];
-/// First positions that are tried, as [`Role::Begin`] says.
+/// First positions that are tried: they are from -1 to 1. Chosen, for time.
 const BEGINS: [f64; 7] = [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9];
-/// Number of starts of one effect, those with the lowest predicted cost, that are fitted.
-const FITTED: usize = 4;
-/// Number of times that the effects are tried one after another.
-const ROUNDS: usize = 3;
+/// Step that is left out if the time is over.
+const OTHER_VALUES: &str = "other values of thresholds";
 
 impl Context<'_> {
     /// The set in the lowest minimum that its effects with thresholds reach from other values of theirs, one effect at a time. `first`: the
     /// position of the first effect that is tried.
     pub fn in_lowest_minimum(&self, node: Node, first: usize, noise: &Noise) -> Node {
         let mut node = node;
-        for _ in 0..ROUNDS {
+        for _ in 0..self.thresholds.minima_rounds {
             let before = node.fit.deviance;
             for position in first..node.added.len() {
-                if self.limit.passed() {
+                if self.candidates[node.added[position]].is_smooth() {
+                    continue;
+                }
+                if self.limit.leaves_out(OTHER_VALUES) {
                     return node;
                 }
                 let starts = self.other_starts(&node, position, noise);
@@ -52,6 +56,13 @@ impl Context<'_> {
     /// Starts of a set's fit with other values of one effect's thresholds, those with the lowest predicted cost.
     fn other_starts(&self, node: &Node, position: usize, noise: &Noise) -> Option<Vec<Vec<f64>>> {
         let candidate = &self.candidates[node.added[position]];
+        // Its step is that of the readings; with another one hard steps may fit single readings.
+        if candidate
+            .effect
+            .is_some_and(|effect| effect.id == QUANTISATION)
+        {
+            return None;
+        }
         let setup = self.setup(&node.model).ok()?;
         let place = |of: &str| -> Option<usize> {
             let mut all = node.spec().parameters.iter();
@@ -80,10 +91,10 @@ impl Context<'_> {
             let predicted = triangle.predicted(&step);
             predicted.is_finite().then_some((predicted, x))
         };
-        let mut scored: Vec<(f64, Vec<f64>)> =
-            starts.into_par_iter().filter_map(predicted).collect();
+        let starts = starts.into_par_iter().filter(|_| !self.limit.passed());
+        let mut scored: Vec<(f64, Vec<f64>)> = starts.filter_map(predicted).collect();
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-        scored.truncate(FITTED);
+        scored.truncate(self.thresholds.minima_fitted);
         Some(scored.into_iter().map(|(_, x)| x).collect())
     }
 }

@@ -1,4 +1,4 @@
-//! The search: scores of candidates, their fits, and sets of several effects.
+//! The search: scores of candidates, their fits, sets of several effects, and other minima of these.
 
 pub(crate) mod factor_score;
 pub(crate) mod floating;

@@ -98,3 +98,27 @@ fn the_noise_is_not_larger_than_the_residual() {
         assert!(level <= 1.02 * residual, "{level} {residual}");
     }
 }
+
+/// A residual test that rejects noise does not take a small effect away that passed the acceptance test.
+#[test]
+fn a_false_alarm_does_not_reduce_an_answer_to_a_part() {
+    let hidden = block("g*max(u - 8, 0) - k*(1 + 0.00022*(T - 40))*(T - Ta)");
+    let problem = problem(BLOCK, record(&hidden, 0.0, 0.3, 15));
+    let whole = found(&problem);
+    let [.., one, both] = whole.steps.as_slice() else {
+        panic!("{:?}", whole.effects);
+    };
+    // A partial explanation leaves such a small effect out.
+    let ratio = (both.rmse.unwrap() / one.rmse.unwrap()).powi(2);
+    assert!(ratio > Thresholds::DEFAULT.partial_error, "{ratio}");
+    let alarmed = with(
+        &problem,
+        Thresholds {
+            function_chance: f64::INFINITY,
+            ..Thresholds::DEFAULT
+        },
+    );
+    assert_eq!(whole.effects.len(), 2);
+    assert_eq!(alarmed.effects, whole.effects);
+    assert_eq!(alarmed.verdict, Verdict::Partial);
+}

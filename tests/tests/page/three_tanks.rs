@@ -16,7 +16,13 @@ fn wait_for_models(browser: &mut Browser, count: usize) {
 }
 
 fn written(browser: &mut Browser, id: &str, text: &str) {
-    browser.click(&format!("#{id}"));
+    // An answer to what was written before may move the field away from the mouse.
+    for _ in 0..10 {
+        browser.click(&format!("#{id}"));
+        if browser.evaluate("document.activeElement.id") == json!(id) {
+            break;
+        }
+    }
     browser.type_text(text);
     browser.press("Enter", 13, "\r");
 }

@@ -2,7 +2,7 @@
 
 use effect_search::{ControlLoop, NotSimulated};
 
-use crate::Words;
+use crate::MessageNames;
 
 /// Consequence of running a model on the measured command of a loop.
 const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and values of the criterion are biased; the standard errors are enlarged to allow for this.";
@@ -71,7 +71,7 @@ pub fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
 }
 
 fn said(error: &greybox::Error) -> String {
-    error.worded(&Words::PROGRAM.fit)
+    error.worded(&MessageNames::PROGRAM.fit)
 }
 
 fn chance(p: f64) -> String {

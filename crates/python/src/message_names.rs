@@ -1,10 +1,10 @@
 //! How messages name what the user gave: the arguments of the Python package.
 
-use ctid::Words;
+use ctid::MessageNames;
 use effect_search::design::NoExperiment;
 
 /// Names of arguments of fits, diagnoses and designs.
-pub const PYTHON: Words = Words {
+pub const PYTHON: MessageNames = MessageNames {
     fit: greybox::Names {
         records: ct_signals::Names {
             part: "of the frame, df.loc[FIRST:LAST]",
@@ -31,7 +31,7 @@ pub const PYTHON: Words = Words {
 };
 
 /// Names of arguments of `identify`, which knows one output.
-pub const IDENTIFY: Words = Words {
+pub const IDENTIFY: MessageNames = MessageNames {
     fit: greybox::Names {
         records: ct_signals::Names {
             in_columns: "in inputs=[...] or output=\"...\"",

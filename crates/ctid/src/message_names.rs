@@ -5,7 +5,7 @@ use effect_search::design::NoExperiment;
 
 /// Names of everything that messages refer to.
 #[derive(Debug, Clone, Copy)]
-pub struct Words {
+pub struct MessageNames {
     /// Names in errors of fits, and of the records and plants in them.
     pub fit: greybox::Names,
     /// What stands before the name of a setting with which a message begins.
@@ -18,7 +18,7 @@ pub struct Words {
     pub experiment: fn(&NoExperiment) -> String,
 }
 
-impl Words {
+impl MessageNames {
     /// Names of the program.
     pub const PROGRAM: Self = Self {
         fit: greybox::Names {

@@ -25,7 +25,7 @@ pub const PYTHON: MessageNames = MessageNames {
         held: "give hold=\"zero\", or delete [controller.INPUT] from the model file",
     },
     setting: "",
-    controller: "the argument controller",
+    controller: "the controller of the model file",
     part_or_grid: "",
     experiment,
 };
@@ -35,19 +35,30 @@ pub const IDENTIFY: MessageNames = MessageNames {
     fit: greybox::Names {
         records: ct_signals::Names {
             in_columns: "in inputs=[...] or output=\"...\"",
+            column: column_of_identify,
+            namer: "the argument",
             ..PYTHON.fit.records
         },
         ..PYTHON.fit
     },
+    controller: "the argument controller",
     ..PYTHON
 };
 
-/// The argument for the column of a role.
+/// What gives the column of a role. The calls of a model have no argument for the reference.
 fn column(role: &str) -> String {
     match role {
         "time" => "the index of the frame".to_string(),
-        "reference" => "reference=\"...\"".to_string(),
+        "reference" => "reference in the model file, under its [controller.INPUT]".to_string(),
         _ => format!("{role}s=[...]"),
+    }
+}
+
+/// The argument of `identify` for the column of a role.
+fn column_of_identify(role: &str) -> String {
+    match role {
+        "output" | "reference" => format!("{role}=\"...\""),
+        _ => column(role),
     }
 }
 

@@ -12,6 +12,8 @@ pub struct MessageNames {
     pub setting: &'static str,
     /// Where the controller is given.
     pub controller: &'static str,
+    /// What searches for what a model lacks.
+    pub diagnose: &'static str,
     /// How a part of a record, or another grid, is chosen, after a message that advises it; empty for nothing.
     pub part_or_grid: &'static str,
     /// An experiment with a model of the user's own that cannot be proposed.
@@ -41,10 +43,11 @@ impl MessageNames {
             known: " under [known]",
             prior: |parameter| format!("[prior] {parameter}"),
             reference: "name its column as reference in the model file, under [columns] or, for a model of your own, under its [controller.INPUT]",
-            held: "write hold = \"zero\", or delete [controller]",
+            held: "write hold = \"zero\", or delete [controller] or, for a model of your own, [controller.INPUT]",
         },
         setting: "--",
         controller: "the controller of the model file",
+        diagnose: "`ctid diagnose`",
         part_or_grid: ": --from and --to, or --resample",
         experiment: own_experiment,
     };

@@ -26,6 +26,7 @@ pub const PYTHON: MessageNames = MessageNames {
     },
     setting: "",
     controller: "the controller of the model file",
+    diagnose: "`diagnose`",
     part_or_grid: "",
     experiment,
 };

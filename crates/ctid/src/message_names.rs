@@ -43,6 +43,7 @@ impl MessageNames {
             known: " under [known]",
             prior: |parameter| format!("[prior] {parameter}"),
             reference: "name its column as reference in the model file, under [columns] or, for a model of your own, under its [controller.INPUT]",
+            straight: "hold = \"first\"",
             held: "write hold = \"zero\", or delete [controller] or, for a model of your own, [controller.INPUT]",
         },
         setting: "--",

@@ -139,8 +139,8 @@ impl Error {
                 names.reference
             ),
             Self::CommandNotHeld { record } => format!(
-                "{record}: hold = \"first\" says that the command runs in straight lines, but a controller holds it: {}",
-                names.held
+                "{record}: {} says that the command runs in straight lines, but a controller holds it: {}",
+                names.straight, names.held
             ),
             // These name nothing of the caller's.
             Self::NoRecord
@@ -185,7 +185,14 @@ mod tests {
     fn by_themselves_messages_name_items_of_the_library() {
         for error in messages() {
             let said = error.to_string();
-            let of_the_program = ["--", "[columns]", "[known]", "[prior]", "[controller"];
+            let of_the_program = [
+                "--",
+                "hold =",
+                "[columns]",
+                "[known]",
+                "[prior]",
+                "[controller",
+            ];
             assert!(!of_the_program.iter().any(|s| said.contains(s)), "{said}");
             assert_eq!(said, error.worded(&Names::LIBRARY));
         }
@@ -197,6 +204,7 @@ mod tests {
             known: " <known>",
             prior: |parameter| format!("<prior {parameter}>"),
             reference: "<reference>",
+            straight: "<straight>",
             held: "<held>",
             ..Names::LIBRARY
         };
@@ -204,7 +212,7 @@ mod tests {
             "<known>",
             "<prior k> = [1.0, -1.0]",
             "<reference>",
-            "<held>",
+            "<straight> says that the command runs in straight lines, but a controller holds it: <held>",
         ];
         for (error, own) in messages().iter().zip(own) {
             assert!(error.worded(&names).contains(own), "{error}");

@@ -22,6 +22,7 @@ pub const PYTHON: MessageNames = MessageNames {
         known: " in known={...}",
         prior: |parameter| format!("priors[\"{parameter}\"]"),
         reference: "name its column as reference in the model file, under its [controller.INPUT]",
+        straight: "hold=\"first\"",
         held: "give hold=\"zero\", or delete [controller.INPUT] from the model file",
     },
     setting: "",

@@ -79,7 +79,7 @@ pub enum Error {
     /// An experiment with a model of the user's own.
     #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Experiment(#[from] effect_search::design::NoExperiment),
-    /// An identification, where the correction depends on how record and controller were given.
+    /// An identification, with the name of its record.
     #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Identification(Box<linear_identification::Error>),
     /// A recursive estimator.
@@ -129,12 +129,11 @@ impl From<linear_identification::Error> for Error {
             E::Estimator(error) => Self::Estimator(error),
             E::Linear(error) => Self::Linear(error),
             E::Loop(error) => Self::Loop(error),
-            E::StabilityBorder { record }
-            | E::MissingReadings { record, .. }
-            | E::InRecord { record, .. } => Self::of_record(record, &message),
-            error @ (E::ControllerMismatch { .. } | E::FirstFit { .. }) => {
-                Self::Identification(Box::new(error))
-            }
+            error @ (E::StabilityBorder { .. }
+            | E::MissingReadings { .. }
+            | E::InRecord { .. }
+            | E::ControllerMismatch { .. }
+            | E::FirstFit { .. }) => Self::Identification(Box::new(error)),
             // The message begins with the setting's name, which is the name of the option.
             E::NotPositive { .. } | E::Bandwidth { .. } | E::LevelsEstimated { .. } => {
                 Self::Setting(message)
@@ -179,15 +178,6 @@ impl Error {
             | Self::Linear(_)
             | Self::Loop(_)
             | Self::Output(_) => self.to_string(),
-        }
-    }
-
-    /// A message that begins with the name of a record.
-    fn of_record(record: String, message: &str) -> Self {
-        let what = message.strip_prefix(&format!("{record}: "));
-        Self::File {
-            what: what.unwrap_or(message).to_string(),
-            file: record,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Errors of a fit.
 
-use crate::{Names, NoFit};
+use crate::Names;
 
 /// What can go wrong in a fit.
 #[derive(Debug, thiserror::Error)]
@@ -116,14 +116,9 @@ impl Error {
     #[must_use]
     pub fn worded(&self, names: &Names) -> String {
         match self {
-            Self::Record(error) | Self::Estimation(NoFit::Series(error)) => {
-                error.worded(&names.records)
-            }
+            Self::Record(error) => error.worded(&names.records),
             Self::Structure(error) => error.worded(&names.plants),
-            // Its message ends with the constants of the model.
-            Self::Estimation(error @ NoFit::NoFiniteStart { .. }) => {
-                format!("{error}{}", names.known)
-            }
+            Self::Estimation(error) => error.worded(&names.records, names.known),
             Self::Prior {
                 name,
                 value,
@@ -149,7 +144,6 @@ impl Error {
             | Self::LoopSignals { .. }
             | Self::DirectTerm { .. }
             | Self::Inputs { .. }
-            | Self::Estimation(_)
             | Self::Stopped
             | Self::ConstantReference { .. } => self.to_string(),
         }
@@ -159,6 +153,7 @@ impl Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::NoFit;
 
     /// Every message that names something of the caller's.
     fn messages() -> [Error; 4] {

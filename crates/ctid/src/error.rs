@@ -4,7 +4,7 @@ use std::path::Path;
 
 use ct_signals::escaped;
 
-use crate::message_names::{self, MessageNames};
+use crate::MessageNames;
 
 /// All errors that end the program with exit code 2.
 #[derive(Debug, thiserror::Error)]
@@ -79,6 +79,9 @@ pub enum Error {
     /// An experiment with a model of the user's own.
     #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Experiment(#[from] effect_search::design::NoExperiment),
+    /// An experiment with a plant.
+    #[error("{}", self.worded(&MessageNames::PROGRAM))]
+    PlantExperiment(#[from] missing_effect::design::NoExperiment),
     /// An identification, with the name of its record.
     #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Identification(Box<linear_identification::Error>),
@@ -143,12 +146,6 @@ impl From<linear_identification::Error> for Error {
     }
 }
 
-impl From<missing_effect::design::NoExperiment> for Error {
-    fn from(refused: missing_effect::design::NoExperiment) -> Self {
-        Self::Usage(message_names::experiment(&refused))
-    }
-}
-
 impl Error {
     /// The message with these names for what the user gave.
     #[must_use]
@@ -161,6 +158,7 @@ impl Error {
             Self::Fit { file, source } => format!("{file}: {}", source.worded(&names.fit)),
             Self::Search(error) => error.worded(&names.fit),
             Self::Experiment(refused) => (names.experiment)(refused),
+            Self::PlantExperiment(refused) => (names.plant_experiment)(refused),
             Self::Identification(error) => match &**error {
                 linear_identification::Error::FirstFit { .. } => {
                     format!("{error}{}", names.part_or_grid)

@@ -2,6 +2,7 @@
 //! and the Python package names its own.
 
 use effect_search::design::NoExperiment;
+use missing_effect::design::NoExperiment as NoPlantExperiment;
 
 /// Names of everything that messages refer to.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +19,8 @@ pub struct MessageNames {
     pub part_or_grid: &'static str,
     /// An experiment with a model of the user's own that cannot be proposed.
     pub experiment: fn(&NoExperiment) -> String,
+    /// An experiment with a plant that cannot be proposed.
+    pub plant_experiment: fn(&NoPlantExperiment) -> String,
 }
 
 impl MessageNames {
@@ -50,7 +53,8 @@ impl MessageNames {
         controller: "the controller of the model file",
         diagnose: "`ctid diagnose`",
         part_or_grid: ": --from and --to, or --resample",
-        experiment: own_experiment,
+        experiment,
+        plant_experiment,
     };
 }
 
@@ -58,7 +62,7 @@ impl MessageNames {
 const MORE_TIME: &str = "--effort thorough searches longer";
 
 /// An experiment with a model of the user's own that cannot be proposed.
-fn own_experiment(refused: &NoExperiment) -> String {
+fn experiment(refused: &NoExperiment) -> String {
     use NoExperiment as No;
     match refused {
         // The message begins with the argument's name, which is the name of the option.
@@ -78,8 +82,8 @@ fn own_experiment(refused: &NoExperiment) -> String {
 }
 
 /// An experiment with a plant that cannot be proposed.
-pub(crate) fn experiment(refused: &missing_effect::design::NoExperiment) -> String {
-    use missing_effect::design::NoExperiment as No;
+fn plant_experiment(refused: &NoPlantExperiment) -> String {
+    use NoPlantExperiment as No;
     let message = refused.worded("the model file");
     match refused {
         // The message begins with the argument's name, which is the name of the option.

@@ -36,7 +36,8 @@ pub fn worded(error: &ctid::Error, names: &MessageNames) -> PyErr {
         | E::Usage(_)
         | E::Setting(_)
         | E::Plant(_)
-        | E::Experiment(_) => ModelError::new_err(message),
+        | E::Experiment(_)
+        | E::PlantExperiment(_) => ModelError::new_err(message),
         E::File { .. }
         | E::Columns(_)
         | E::Record(_)

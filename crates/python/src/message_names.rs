@@ -2,6 +2,7 @@
 
 use ctid::MessageNames;
 use effect_search::design::NoExperiment;
+use missing_effect::design::NoExperiment as NoPlantExperiment;
 
 /// Names of arguments of fits, diagnoses and designs.
 pub const PYTHON: MessageNames = MessageNames {
@@ -30,6 +31,7 @@ pub const PYTHON: MessageNames = MessageNames {
     diagnose: "`diagnose`",
     part_or_grid: "",
     experiment,
+    plant_experiment,
 };
 
 /// Names of arguments of `identify`, which knows one output.
@@ -64,13 +66,28 @@ fn column_of_identify(role: &str) -> String {
     }
 }
 
-/// An experiment that cannot be proposed.
+/// Where more time may help.
+const MORE_TIME: &str = "effort=\"thorough\", or time_limit";
+
+/// An experiment with a model of the user's own that cannot be proposed.
 fn experiment(refused: &NoExperiment) -> String {
     match refused {
         NoExperiment::NoRange { input, .. } => {
             format!("{refused}, ranges={{\"{input}\": (LOW, HIGH)}}")
         }
-        NoExperiment::OutOfTime => format!("{refused}: effort=\"thorough\", or time_limit"),
+        NoExperiment::OutOfTime => format!("{refused}: {MORE_TIME}"),
+        _ => refused.to_string(),
+    }
+}
+
+/// An experiment with a plant that cannot be proposed.
+fn plant_experiment(refused: &NoPlantExperiment) -> String {
+    use NoPlantExperiment as No;
+    match refused {
+        No::NoRange { .. } | No::Overfull { .. } => {
+            format!("{refused}, ranges={{INPUT: (LOW, HIGH)}}")
+        }
+        No::OutOfTime => format!("{refused}: {MORE_TIME}"),
         _ => refused.to_string(),
     }
 }

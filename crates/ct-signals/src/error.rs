@@ -5,8 +5,8 @@ use crate::{ColumnFault, Names, duration, shown};
 
 pub use read::{CellMend, ReadError};
 
+mod messages;
 mod read;
-mod worded;
 
 /// Everything this crate can refuse.
 ///

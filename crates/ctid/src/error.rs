@@ -4,7 +4,7 @@ use std::path::Path;
 
 use ct_signals::escaped;
 
-use crate::words::{self, Words};
+use crate::MessageNames;
 
 /// All errors that end the program with exit code 2.
 #[derive(Debug, thiserror::Error)]
@@ -54,33 +54,36 @@ pub enum Error {
     #[error("{0}")]
     Columns(String),
     /// A setting; the message begins with its name, which is that of the option.
-    #[error("{}", self.worded(&Words::PROGRAM))]
+    #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Setting(String),
     /// A record.
-    #[error("{}", self.worded(&Words::PROGRAM))]
+    #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Record(#[from] ct_signals::Error),
     /// A plant and its effects.
-    #[error("{}", self.worded(&Words::PROGRAM))]
+    #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Plant(#[from] plants::Error),
     /// The computation.
-    #[error("{}", self.worded(&Words::PROGRAM))]
+    #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Diagnosis(#[from] missing_effect::Error),
     /// A fit or a search with the records of a file, or of several.
-    #[error("{}", self.worded(&Words::PROGRAM))]
+    #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Fit {
         /// The names of the records.
         file: String,
         /// What is wrong and the correction.
         source: Box<effect_search::Error>,
     },
-    /// A search, where the fault is not in a record.
-    #[error("{}", self.worded(&Words::PROGRAM))]
+    /// A search, without the names of records.
+    #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Search(Box<effect_search::Error>),
     /// An experiment with a model of the user's own.
-    #[error("{}", self.worded(&Words::PROGRAM))]
+    #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Experiment(#[from] effect_search::design::NoExperiment),
-    /// An identification, where the correction depends on how record and controller were given.
-    #[error("{}", self.worded(&Words::PROGRAM))]
+    /// An experiment with a plant.
+    #[error("{}", self.worded(&MessageNames::PROGRAM))]
+    PlantExperiment(#[from] missing_effect::design::NoExperiment),
+    /// An identification, with the name of its record.
+    #[error("{}", self.worded(&MessageNames::PROGRAM))]
     Identification(Box<linear_identification::Error>),
     /// A recursive estimator.
     #[error(transparent)]
@@ -129,12 +132,11 @@ impl From<linear_identification::Error> for Error {
             E::Estimator(error) => Self::Estimator(error),
             E::Linear(error) => Self::Linear(error),
             E::Loop(error) => Self::Loop(error),
-            E::StabilityBorder { record }
-            | E::MissingReadings { record, .. }
-            | E::InRecord { record, .. } => Self::of_record(record, &message),
-            error @ (E::ControllerMismatch { .. } | E::FirstFit { .. }) => {
-                Self::Identification(Box::new(error))
-            }
+            error @ (E::StabilityBorder { .. }
+            | E::MissingReadings { .. }
+            | E::InRecord { .. }
+            | E::ControllerMismatch { .. }
+            | E::FirstFit { .. }) => Self::Identification(Box::new(error)),
             // The message begins with the setting's name, which is the name of the option.
             E::NotPositive { .. } | E::Bandwidth { .. } | E::LevelsEstimated { .. } => {
                 Self::Setting(message)
@@ -144,29 +146,24 @@ impl From<linear_identification::Error> for Error {
     }
 }
 
-impl From<missing_effect::design::NoExperiment> for Error {
-    fn from(refused: missing_effect::design::NoExperiment) -> Self {
-        Self::Usage(words::experiment(&refused))
-    }
-}
-
 impl Error {
     /// The message with these names for what the user gave.
     #[must_use]
-    pub fn worded(&self, words: &Words) -> String {
+    pub fn worded(&self, names: &MessageNames) -> String {
         match self {
-            Self::Setting(message) => format!("{}{message}", words.setting),
-            Self::Record(error) => error.worded(&words.fit.records),
-            Self::Plant(error) => error.worded(&words.fit.plants),
-            Self::Diagnosis(error) => error.worded(&words.fit),
-            Self::Fit { file, source } => format!("{file}: {}", source.worded(&words.fit)),
-            Self::Search(error) => error.worded(&words.fit),
-            Self::Experiment(refused) => (words.experiment)(refused),
+            Self::Setting(message) => format!("{}{message}", names.setting),
+            Self::Record(error) => error.worded(&names.fit.records),
+            Self::Plant(error) => error.worded(&names.fit.plants),
+            Self::Diagnosis(error) => error.worded(&names.fit),
+            Self::Fit { file, source } => format!("{file}: {}", source.worded(&names.fit)),
+            Self::Search(error) => error.worded(&names.fit),
+            Self::Experiment(refused) => (names.experiment)(refused),
+            Self::PlantExperiment(refused) => (names.plant_experiment)(refused),
             Self::Identification(error) => match &**error {
                 linear_identification::Error::FirstFit { .. } => {
-                    format!("{error}{}", words.part_or_grid)
+                    format!("{error}{}", names.part_or_grid)
                 }
-                _ => error.worded(words.controller),
+                _ => error.worded(names.controller),
             },
             Self::AtLine { .. }
             | Self::Text { .. }
@@ -179,15 +176,6 @@ impl Error {
             | Self::Linear(_)
             | Self::Loop(_)
             | Self::Output(_) => self.to_string(),
-        }
-    }
-
-    /// A message that begins with the name of a record.
-    fn of_record(record: String, message: &str) -> Self {
-        let what = message.strip_prefix(&format!("{record}: "));
-        Self::File {
-            what: what.unwrap_or(message).to_string(),
-            file: record,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Errors of a search.
 
-use greybox::{Names, NoFit};
+use greybox::Names;
 
 /// Error of a search.
 #[derive(Debug, thiserror::Error)]
@@ -54,16 +54,10 @@ impl Error {
     #[must_use]
     pub fn worded(&self, names: &Names) -> String {
         match self {
-            Self::Signals(error) | Self::Estimation(NoFit::Series(error)) => {
-                error.worded(&names.records)
-            }
+            Self::Signals(error) => error.worded(&names.records),
             Self::Fit(error) => error.worded(names),
-            // Its message ends with the constants of the model.
-            Self::Estimation(error @ NoFit::NoFiniteStart { .. }) => {
-                format!("{error}{}", names.known)
-            }
-            Self::Estimation(_)
-            | Self::Own(_)
+            Self::Estimation(error) => error.worded(&names.records, names.known),
+            Self::Own(_)
             | Self::Apply(_)
             | Self::Simulation(_)
             | Self::Design(_)

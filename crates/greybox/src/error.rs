@@ -1,6 +1,6 @@
 //! Errors of a fit.
 
-use crate::{Names, NoFit};
+use crate::Names;
 
 /// What can go wrong in a fit.
 #[derive(Debug, thiserror::Error)]
@@ -116,14 +116,9 @@ impl Error {
     #[must_use]
     pub fn worded(&self, names: &Names) -> String {
         match self {
-            Self::Record(error) | Self::Estimation(NoFit::Series(error)) => {
-                error.worded(&names.records)
-            }
+            Self::Record(error) => error.worded(&names.records),
             Self::Structure(error) => error.worded(&names.plants),
-            // Its message ends with the constants of the model.
-            Self::Estimation(error @ NoFit::NoFiniteStart { .. }) => {
-                format!("{error}{}", names.known)
-            }
+            Self::Estimation(error) => error.worded(&names.records, names.known),
             Self::Prior {
                 name,
                 value,
@@ -139,8 +134,8 @@ impl Error {
                 names.reference
             ),
             Self::CommandNotHeld { record } => format!(
-                "{record}: hold = \"first\" says that the command runs in straight lines, but a controller holds it: {}",
-                names.held
+                "{record}: {} says that the command runs in straight lines, but a controller holds it: {}",
+                names.straight, names.held
             ),
             // These name nothing of the caller's.
             Self::NoRecord
@@ -149,7 +144,6 @@ impl Error {
             | Self::LoopSignals { .. }
             | Self::DirectTerm { .. }
             | Self::Inputs { .. }
-            | Self::Estimation(_)
             | Self::Stopped
             | Self::ConstantReference { .. } => self.to_string(),
         }
@@ -159,6 +153,7 @@ impl Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::NoFit;
 
     /// Every message that names something of the caller's.
     fn messages() -> [Error; 4] {
@@ -185,7 +180,14 @@ mod tests {
     fn by_themselves_messages_name_items_of_the_library() {
         for error in messages() {
             let said = error.to_string();
-            let of_the_program = ["--", "[columns]", "[known]", "[prior]", "[controller"];
+            let of_the_program = [
+                "--",
+                "hold =",
+                "[columns]",
+                "[known]",
+                "[prior]",
+                "[controller",
+            ];
             assert!(!of_the_program.iter().any(|s| said.contains(s)), "{said}");
             assert_eq!(said, error.worded(&Names::LIBRARY));
         }
@@ -197,6 +199,7 @@ mod tests {
             known: " <known>",
             prior: |parameter| format!("<prior {parameter}>"),
             reference: "<reference>",
+            straight: "<straight>",
             held: "<held>",
             ..Names::LIBRARY
         };
@@ -204,7 +207,7 @@ mod tests {
             "<known>",
             "<prior k> = [1.0, -1.0]",
             "<reference>",
-            "<held>",
+            "<straight> says that the command runs in straight lines, but a controller holds it: <held>",
         ];
         for (error, own) in messages().iter().zip(own) {
             assert!(error.worded(&names).contains(own), "{error}");

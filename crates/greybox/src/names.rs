@@ -16,6 +16,8 @@ pub struct Names {
     pub prior: fn(parameter: &str) -> String,
     /// How a record gets its reference, as a clause.
     pub reference: &'static str,
+    /// What lets a command run in straight lines between samples.
+    pub straight: &'static str,
     /// How a command is held, or the controller left out, as a clause.
     pub held: &'static str,
 }
@@ -28,6 +30,7 @@ impl Names {
         known: "",
         prior: |parameter| format!("prior of {parameter}"),
         reference: "put it into `Record::references`",
+        straight: "`Hold::First`",
         held: "take `Hold::Zero`, or leave out the controller",
     };
 }

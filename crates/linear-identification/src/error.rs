@@ -118,7 +118,7 @@ pub enum Error {
     /// Every one of several methods has failed.
     #[error("{reason}")]
     AllRefused {
-        /// Message of the first error.
+        /// Message of the first error, in the names of the caller.
         reason: String,
     },
     /// The fit ended where the loop would become unstable.

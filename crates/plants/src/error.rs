@@ -14,14 +14,6 @@ pub enum Error {
         /// The given name.
         name: String,
     },
-    /// No effect of that name.
-    #[error("unknown effect `{name}`: `CATALOGUE` lists them{suggestion}")]
-    UnknownEffect {
-        /// The given name.
-        name: String,
-        /// The closest name of the catalogue as a suggestion, or empty.
-        suggestion: String,
-    },
     /// The structure already has the effect.
     #[error("effect `{effect}` is listed twice: delete one of them")]
     EffectTwice {
@@ -107,7 +99,6 @@ impl Error {
             ),
             // These name nothing of the caller's.
             Self::UnknownPlant { .. }
-            | Self::UnknownEffect { .. }
             | Self::EffectTwice { .. }
             | Self::NoSuchVessel { .. }
             | Self::Count { .. }

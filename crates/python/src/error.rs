@@ -1,10 +1,10 @@
 //! Errors of the program as Python exceptions, whose messages name arguments of Python.
 
-use ctid::Words;
+use ctid::MessageNames;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::words::PYTHON;
+use crate::message_names::PYTHON;
 
 pyo3::create_exception!(
     ctid,
@@ -26,9 +26,9 @@ pub fn of(error: &ctid::Error) -> PyErr {
 }
 
 /// The exception of an error of the program, with names of arguments.
-pub fn worded(error: &ctid::Error, words: &Words) -> PyErr {
+pub fn worded(error: &ctid::Error, names: &MessageNames) -> PyErr {
     use ctid::Error as E;
-    let message = ctid::one_line(&error.worded(words));
+    let message = ctid::one_line(&error.worded(names));
     match error {
         E::AtLine { .. }
         | E::Text { .. }
@@ -36,7 +36,8 @@ pub fn worded(error: &ctid::Error, words: &Words) -> PyErr {
         | E::Usage(_)
         | E::Setting(_)
         | E::Plant(_)
-        | E::Experiment(_) => ModelError::new_err(message),
+        | E::Experiment(_)
+        | E::PlantExperiment(_) => ModelError::new_err(message),
         E::File { .. }
         | E::Columns(_)
         | E::Record(_)

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::diagnosis::Diagnosis;
 use crate::frame::{Content, Frame, contents};
 use crate::json::json;
+use crate::message_names::PYTHON;
 use crate::model::Model;
 use crate::own::{Inner, Kept, records};
 use crate::series::{Covariance, NamedBin, bins, units_of};
@@ -269,7 +270,7 @@ impl Fit {
     #[getter]
     fn control_loop(&self) -> Option<String> {
         let known = self.comparison.control_loop.as_ref()?;
-        Some(self.model.file.loop_sentence(known))
+        Some(self.model.file.loop_sentence(known, &PYTHON))
     }
 
     /// The result as `ctid compare --json` writes it, without its mark.

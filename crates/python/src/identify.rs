@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use crate::error;
 use crate::frame::{Frame, contents, hold_of};
 use crate::json::json;
-use crate::words::IDENTIFY;
+use crate::message_names::IDENTIFY;
 use crate::work;
 
 /// Time, measured output, simulated output.

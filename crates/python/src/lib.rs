@@ -2,7 +2,7 @@
 //!
 //! | what | where |
 //! |---|---|
-//! | exceptions | `error.rs`; the names of arguments in their messages: `words.rs` |
+//! | exceptions | `error.rs`; the names of arguments in their messages: `message_names.rs` |
 //! | arguments that are arrays of numbers | `arrays.rs` |
 //! | long work: the interpreter's lock is released, Ctrl-C is heard | `work.rs` |
 //! | frames as the program reads its records | `frame.rs` |
@@ -28,6 +28,7 @@ mod frame;
 mod identify;
 mod json;
 mod linear;
+mod message_names;
 mod model;
 mod monitor;
 mod oe;
@@ -42,7 +43,6 @@ mod tank_file;
 mod tank_model;
 mod tank_text;
 mod time_limit;
-mod words;
 mod work;
 
 use pyo3::prelude::*;

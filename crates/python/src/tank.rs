@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::{Content, Frame, contents};
 use crate::json::json;
+use crate::message_names::PYTHON;
 use crate::series::{Covariance, NamedBin, RecordSeries, bins, simulated_series, units_of};
 use crate::simulation::{check_simulation, simulation};
 use crate::tank_file::{NAME, parsed};
@@ -208,7 +209,8 @@ impl TankFit {
     #[getter]
     fn control_loop(&self) -> Option<String> {
         let known = self.found.control_loop.as_ref()?;
-        Some(ctid::sentences::of_the_loop(known, &self.found.input_unit))
+        let unit = &self.found.input_unit;
+        Some(ctid::sentences::of_the_loop(known, unit, &PYTHON))
     }
 
     #[getter]

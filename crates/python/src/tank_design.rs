@@ -60,7 +60,7 @@ pub fn tank_design(
         );
         found.map_err(|error| match error {
             // What is wrong with the limits is no fault of a record.
-            missing_effect::Error::Design(refused) => ctid::Error::Usage(refused.to_string()),
+            missing_effect::Error::Design(refused) => refused.into(),
             error => error.into(),
         })
     })?;

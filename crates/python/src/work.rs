@@ -5,12 +5,12 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
-use ctid::Words;
+use ctid::MessageNames;
 use pyo3::prelude::*;
 use rayon::ThreadPoolBuilder;
 
 use crate::error;
-use crate::words::PYTHON;
+use crate::message_names::PYTHON;
 
 /// Interval of the checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
@@ -56,11 +56,11 @@ pub fn run<T: Send>(
 }
 
 /// Runs work that may take long. Ctrl-C sets a flag that the work receives: the work ends soon then, and a `KeyboardInterrupt` replaces its
-/// result. `progress`: called with every new phase. `words`: names of arguments in messages.
+/// result. `progress`: called with every new phase. `names`: names of arguments in messages.
 pub fn run_worded<T: Send>(
     py: Python<'_>,
     progress: Option<&Py<PyAny>>,
-    words: &Words,
+    names: &MessageNames,
     work: impl FnOnce(&AtomicBool, &Phases<Result<T, ctid::Error>>) -> Result<T, ctid::Error> + Send,
 ) -> PyResult<T> {
     let stop = AtomicBool::new(false);
@@ -103,7 +103,7 @@ pub fn run_worded<T: Send>(
                 return Err(raised);
             }
             match (ended, found) {
-                (Ok(()), Some(found)) => found.map_err(|error| error::worded(&error, words)),
+                (Ok(()), Some(found)) => found.map_err(|error| error::worded(&error, names)),
                 _ => Err(error::Error::new_err(
                     "this is an internal error of ctid: please report the line above",
                 )),

@@ -331,13 +331,8 @@ impl Identify {
             .iter()
             .map(|path| self.read_test(path, layout, &record).map(&mut noted))
             .collect::<Result<Vec<_>, _>>()?;
-        let inputs: Vec<&Path> = self
-            .data
-            .iter()
-            .chain(&self.test)
-            .chain(&self.model)
-            .map(PathBuf::as_path)
-            .collect();
+        let inputs = self.data.iter().chain(&self.test).chain(&self.model);
+        let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
         let outputs = self.results.plan(&inputs, None)?;
         let transfer = match own {
             Some(own) => own.transfer_function(data)?,
@@ -378,7 +373,8 @@ impl Identify {
             high > low
         });
         let records = (&fitted[0], &test[..], controller.is_some() || moves);
-        let found = side_by_side::compare(records, &requests, &self.order.0, &tell);
+        let worded = |error: linear_identification::Error| Error::from(error).to_string();
+        let found = side_by_side::compare(records, &requests, &self.order.0, &worded, &tell);
         bar.clear();
         let found = found?;
         let mut text = notes + &side_by_side_text::text(&found, look);

@@ -18,7 +18,7 @@ pub use self::term::with_term;
 use self::term::with_waiting_term;
 use crate::model_file::{self, ModelFile};
 use crate::term_file;
-use crate::{Error, Words, atomic, names};
+use crate::{Error, MessageNames, atomic, names};
 
 /// Adds an effect to a model file; `place` is a vessel or a pump, if there is a choice. Returns a description of the change, in one line.
 ///
@@ -170,7 +170,7 @@ pub fn with_effect(
             effect.id
         )));
     }
-    let wrong = |error: plants::Error| refuse(error.worded(&Words::PROGRAM.fit.plants));
+    let wrong = |error: plants::Error| refuse(error.worded(&MessageNames::PROGRAM.fit.plants));
     Domain::check(effect, model.plant, model.columns.output_unit()).map_err(wrong)?;
     let vessel = place
         .map(|word| model_file::vessel(model.plant, &model.known, effect, word).map_err(&refuse))

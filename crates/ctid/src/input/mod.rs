@@ -21,7 +21,7 @@ use crate::model_file::{self, ModelFile};
 use crate::numbers;
 use crate::output::same_file;
 use crate::sentences::with_unit;
-use crate::{Error, Words};
+use crate::{Error, MessageNames};
 
 /// Error of a record whose file name suggests that it is a model.
 fn perhaps_a_model(path: &Path, error: ct_signals::Error) -> Error {
@@ -31,7 +31,7 @@ fn perhaps_a_model(path: &Path, error: ct_signals::Error) -> Error {
     if named_as_model {
         Error::Usage(format!(
             "{}; is this the model file? DATA takes the record, a .csv",
-            error.worded(&Words::PROGRAM.fit.records)
+            error.worded(&MessageNames::PROGRAM.fit.records)
         ))
     } else {
         error.into()
@@ -82,7 +82,7 @@ pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
     let worth = |summary: &&ReadSummary| !summary.is_plain() || summary.calendar.is_some();
     let noted = summaries.iter().filter(worth);
     let note = |summary: &ReadSummary| {
-        let said = summary.worded(&Words::PROGRAM.fit.records);
+        let said = summary.worded(&MessageNames::PROGRAM.fit.records);
         look.paragraph("", &format!("note: {said}"))
     };
     let notes = noted.map(note);
@@ -232,13 +232,13 @@ impl Files {
             error,
             UnstableLoop { .. } | ControlledOutput { .. } | Structure(_)
         ) {
-            return Error::file(&self.model, error.worded(&Words::PROGRAM.fit));
+            return Error::file(&self.model, error.worded(&MessageNames::PROGRAM.fit));
         }
         let error = match error {
             Design(refused) => return refused.into(),
             error => error,
         };
-        let what = error.worded(&Words::PROGRAM.fit);
+        let what = error.worded(&MessageNames::PROGRAM.fit);
         let named = |path: &PathBuf| what.contains(&self.name_of(path));
         if self.data.iter().chain(&self.test).any(named) {
             return error.into();

@@ -11,7 +11,7 @@ use super::{
     raw::{EffectTable, Entry, Number, RawTerm},
     source::Source,
 };
-use crate::{Error, Words, names, term_file};
+use crate::{Error, MessageNames, names, term_file};
 
 /// Content of an `[effect.X]` table.
 #[derive(Default)]
@@ -176,7 +176,10 @@ impl Source<'_> {
             )
             .and_then(|structure| structure.with(placed))
             .map_err(|error| {
-                self.at(name.span().start, error.worded(&Words::PROGRAM.fit.plants))
+                self.at(
+                    name.span().start,
+                    error.worded(&MessageNames::PROGRAM.fit.plants),
+                )
             })?;
         Ok(placed)
     }

@@ -7,7 +7,7 @@ use ct_signals::{BadLine, LONGEST_LINE, Line, Rows, TimestampError, quoted};
 
 use super::{Halt, INPUT, Session, lines::Cut};
 use crate::sentences::Told;
-use crate::{Error, Words, one_line};
+use crate::{Error, MessageNames, one_line};
 
 /// Number of lines at the beginning that may be incomplete.
 const PARTS: usize = 2;
@@ -289,7 +289,7 @@ impl<'a> Session<'a> {
 
 /// Why a line is not used, in the words of the program.
 fn said(bad: &BadLine) -> String {
-    bad.worded(&Words::PROGRAM.fit.records)
+    bad.worded(&MessageNames::PROGRAM.fit.records)
 }
 
 /// Whether a row may be rejected because the preceding row, which determined the format, was only the end of a row.

@@ -21,7 +21,7 @@ use ct_signals::{Columns, Conversion, Rows};
 use crate::look::Look;
 use crate::model_file::ModelFile;
 use crate::own_model::{AnyModelFile, OwnModelFile};
-use crate::{Error, Words};
+use crate::{Error, MessageNames};
 use lines::Lines;
 use saver::Saver;
 use screen::{DRAWN_EVERY, Screen};
@@ -322,9 +322,10 @@ fn blame(error: ::monitor::Error, arguments: &Arguments) -> Error {
                 arguments.model.display()
             ),
         ),
-        (Structure(wrong), _) => {
-            Error::file(&arguments.model, wrong.worded(&Words::PROGRAM.fit.plants))
-        }
+        (Structure(wrong), _) => Error::file(
+            &arguments.model,
+            wrong.worded(&MessageNames::PROGRAM.fit.plants),
+        ),
         (Time | NoParameters, _) => Error::file(&arguments.model, error.to_string()),
         _ => Error::Usage(error.to_string()),
     }

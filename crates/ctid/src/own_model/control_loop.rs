@@ -6,9 +6,9 @@ use greybox::LoopController;
 
 use super::controller::OwnController;
 use super::file::{OwnModelFile, Records, convert};
-use crate::Error;
 use crate::look::Look;
 use crate::sentences::of_the_loop;
+use crate::{Error, MessageNames};
 
 impl OwnModelFile {
     /// Columns of a record that is fitted, with the references of the controllers: those that the record has and that are no signals of the
@@ -85,10 +85,10 @@ impl OwnModelFile {
     }
 
     /// What a result says of the loop of its records.
-    pub fn loop_sentence(&self, known: &ControlLoop) -> String {
+    pub fn loop_sentence(&self, known: &ControlLoop, names: &MessageNames) -> String {
         let driven = self.controllers.first().map(|controller| controller.input);
         let unit = driven.map_or("", |input| self.base.inputs[input].about.unit.as_str());
-        of_the_loop(known, unit)
+        of_the_loop(known, unit, names)
     }
 
     /// Warning of a command that does not simulate the loop although the file declares a controller; empty if it declares none.

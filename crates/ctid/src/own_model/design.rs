@@ -19,7 +19,7 @@ use crate::findings::Reader;
 use crate::look::{Look, Side};
 use crate::output::Found;
 use crate::sentences::{interval, with_unit};
-use crate::{Error, numbers};
+use crate::{Error, MessageNames, numbers};
 
 /// A significant effect lowers the criterion by this much.
 const NEEDED: f64 = 6.0;
@@ -346,7 +346,7 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         all.push(format!("Repeated {times} times it would decide."));
     }
     let known = design.control_loop.iter();
-    all.extend(known.map(|known| file.loop_sentence(known)));
+    all.extend(known.map(|known| file.loop_sentence(known, &MessageNames::PROGRAM)));
     if !file.controllers.is_empty() && !design.twins() {
         all.push("The experiment is in open loop: switch the controller to manual.".to_string());
     }

@@ -11,13 +11,13 @@ use super::text::{failures, undetermined};
 use super::unknown;
 use super::words::{EffectWords, shown_unit};
 use super::{held_out, singles};
-use crate::Error;
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::sentences::of_gaps;
 use crate::sentences::remarks::{absorbed, rounding, single_minimum};
 use crate::sentences::with_unit;
 use crate::terminal::without_50;
+use crate::{Error, MessageNames};
 
 /// Noise of which this share of the variance follows from the readings before is called correlated.
 const CORRELATED: f64 = 0.25;
@@ -190,7 +190,7 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
     all.extend(diagnosis.absorbed.iter().map(absorbed));
     all.extend(diagnosis.gaps.as_ref().and_then(of_gaps));
     let known = diagnosis.control_loop.iter();
-    all.extend(known.map(|known| file.loop_sentence(known)));
+    all.extend(known.map(|known| file.loop_sentence(known, &MessageNames::PROGRAM)));
     let mut known = diagnosis.control_loop.iter();
     if known.any(|known| known.simulated) && diagnosis.not_noise.is_some() {
         all.push("The errors and estimates of the models are those of fits on the measured inputs; the effects were found in the simulated loop.".to_string());

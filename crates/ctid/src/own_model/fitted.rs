@@ -15,8 +15,8 @@ use missing_effect::Effort;
 use super::blame::{blame, blame_search};
 use super::enclosed::in_loop;
 use super::file::{OwnModelFile, Records};
-use crate::Error;
 use crate::findings::{self, Reader};
+use crate::{Error, MessageNames};
 
 /// Share of the time for adding the effects of the file one after the other.
 const OF_EFFECTS: f64 = 0.5;
@@ -217,7 +217,7 @@ impl FittedModel {
     /// What the reader has to know of the fit: whether it was cut short, and whether the loop of its records is not simulated.
     pub(super) fn warnings(&self) -> Vec<String> {
         let known = self.control_loop.as_ref().filter(|known| !known.simulated);
-        let of_loop = known.map(|known| self.given.loop_sentence(known));
+        let of_loop = known.map(|known| self.given.loop_sentence(known, &MessageNames::PROGRAM));
         cut_short(&self.effort).into_iter().chain(of_loop).collect()
     }
 

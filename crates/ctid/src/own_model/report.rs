@@ -14,6 +14,7 @@ use super::compare::Comparison;
 use super::diagnose::sentences;
 use super::file::{OwnModelFile, Records};
 use super::words::{EffectWords, Site, shown_unit};
+use crate::MessageNames;
 use crate::output::Found;
 use crate::report::{self, ComparedPort, MissingTerm};
 use crate::sentences::of_gaps;
@@ -113,7 +114,7 @@ pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> D
         sentences: {
             let gaps = found.gaps.as_ref().and_then(of_gaps).into_iter();
             let known = found.control_loop.iter();
-            gaps.chain(known.map(|known| file.loop_sentence(known)))
+            gaps.chain(known.map(|known| file.loop_sentence(known, &MessageNames::PROGRAM)))
                 .collect()
         },
         term: None,

@@ -7,6 +7,7 @@ use super::compare::{Comparison, Curves};
 use super::estimates::{estimates, state_rows};
 use super::file::OwnModelFile;
 use super::fitted::cut_short;
+use crate::MessageNames;
 use crate::csv_text::header;
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
@@ -73,7 +74,7 @@ pub(crate) fn said(file: &OwnModelFile, comparison: &Comparison, look: Look) -> 
         text += &look.paragraph("  ", &gaps);
     }
     if let Some(known) = &comparison.control_loop {
-        text += &look.paragraph("  ", &file.loop_sentence(known));
+        text += &look.paragraph("  ", &file.loop_sentence(known, &MessageNames::PROGRAM));
     }
     let agree = format!(
         "{} of {} starts ended in this minimum",

@@ -2,13 +2,14 @@
 
 use effect_search::{ControlLoop, NotSimulated};
 
-use crate::Words;
+use crate::MessageNames;
 
 /// Consequence of running a model on the measured command of a loop.
 const MEASURED: &str = "The model runs on the measured command, which contains fed-back noise. Where the spectrum of the noise differs from the noise model, estimates and values of the criterion are biased; the standard errors are enlarged to allow for this.";
 
 /// Description of the loop; `input_unit`: unit of the command.
-pub fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
+pub fn of_the_loop(known: &ControlLoop, input_unit: &str, names: &MessageNames) -> String {
+    let said = |error: &greybox::Error| error.worded(&names.fit);
     let mismatch = known.mismatch.unwrap_or(f64::NAN);
     if known.simulated {
         return format!(
@@ -59,19 +60,17 @@ pub fn of_the_loop(known: &ControlLoop, input_unit: &str) -> String {
             }
         ),
         NotSimulated::ModelError { output, change } => format!(
-            "in it the error at {output} would change by {:+.1} %, so the model lacks an effect; `ctid diagnose` simulates the loop to find it",
-            100.0 * change
+            "in it the error at {output} would change by {:+.1} %, so the model lacks an effect; {} simulates the loop to find it",
+            100.0 * change,
+            names.diagnose
         ),
         NotSimulated::OtherController { share } => format!(
-            "the measured command disagrees with the controller of the model file, R/S (r - y), by {mismatch:.3} {input_unit} rms, {:.0} % of its variation: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
+            "the measured command disagrees with {}, R/S (r - y), by {mismatch:.3} {input_unit} rms, {:.0} % of its variation: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
+            names.controller,
             100.0 * share
         ),
     };
     format!("The loop is not simulated: {why}. {MEASURED}")
-}
-
-fn said(error: &greybox::Error) -> String {
-    error.worded(&Words::PROGRAM.fit)
 }
 
 fn chance(p: f64) -> String {
@@ -79,5 +78,55 @@ fn chance(p: f64) -> String {
         "< 1e-9".to_string()
     } else {
         format!("= {p:.0e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_correction_has_the_names_of_the_reader() {
+        let fit = greybox::Names {
+            reference: "<reference>",
+            held: "<held>",
+            ..MessageNames::PROGRAM.fit
+        };
+        let names = MessageNames {
+            fit,
+            controller: "<controller>",
+            diagnose: "<diagnose>",
+            ..MessageNames::PROGRAM
+        };
+        let record = "a.csv".to_string();
+        for (why, own) in [
+            (
+                NotSimulated::NoReference {
+                    record: record.clone(),
+                },
+                "<reference>",
+            ),
+            (NotSimulated::CommandNotHeld { record }, "<held>"),
+            (
+                NotSimulated::OtherController { share: 0.3 },
+                "<controller>, R/S",
+            ),
+            (
+                NotSimulated::ModelError {
+                    output: "y".to_string(),
+                    change: 0.1,
+                },
+                "<diagnose> simulates",
+            ),
+        ] {
+            let known = ControlLoop {
+                simulated: false,
+                feedback_p: None,
+                mismatch: None,
+                not_simulated: Some(why),
+            };
+            let said = of_the_loop(&known, "V", &names);
+            assert!(said.contains(own), "{said}");
+        }
     }
 }

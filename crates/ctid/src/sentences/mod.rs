@@ -24,6 +24,8 @@ mod warnings;
 use missing_effect::numbers;
 use missing_effect::{Diagnosis, Parameter, PerOutput, Remark};
 
+use crate::MessageNames;
+
 pub use self::alarm::{Told, of_alarm, of_scatter};
 pub use self::control_loop::of_the_loop;
 pub use self::design::of_design;
@@ -70,7 +72,9 @@ pub fn of_diagnosis(diagnosis: &Diagnosis) -> Vec<String> {
     );
     said.extend(remarks::of_rankings(&diagnosis.rankings));
     let control_loop = diagnosis.control_loop.iter();
-    said.extend(control_loop.map(|known| of_the_loop(known, &diagnosis.input_unit)));
+    said.extend(
+        control_loop.map(|known| of_the_loop(known, &diagnosis.input_unit, &MessageNames::PROGRAM)),
+    );
     said.extend(diagnosis.gaps.as_ref().and_then(of_gaps));
     said
 }

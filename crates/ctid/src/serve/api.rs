@@ -25,7 +25,7 @@ use super::tab::{Answer, Tab, aside, find, with};
 use super::upload::{Upload, plain_name};
 use super::{downloads, own_change, state};
 use crate::term_file::TermFile;
-use crate::{Words, edit};
+use crate::{MessageNames, edit};
 
 /// Largest request in JSON \[bytes\].
 pub(super) const LARGEST_REQUEST: usize = 1 << 20;
@@ -241,7 +241,7 @@ async fn effect(
         if let (Way::Add, Ok(model), Some(info)) = (way, session.model(), EffectInfo::find(&effect))
         {
             Domain::check(info, model.plant, session.output_unit(&model))
-                .map_err(|error| Refusal::input(error.worded(&Words::PROGRAM.fit.plants)))?;
+                .map_err(|error| Refusal::input(error.worded(&MessageNames::PROGRAM.fit.plants)))?;
         }
         session.change(|file, text| match (way, &shape) {
             (Way::Keep, Some(shape)) => edit::with_term(file, text, &effect, "the shape", shape),

@@ -21,6 +21,7 @@ use crate::{Error, check};
 
 /// Name of the model file in messages and downloads.
 pub(super) const FILE: &str = "model.toml";
+
 /// The model of a tab.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Own {

@@ -21,7 +21,7 @@ use crate::effort::EffortLevel;
 use crate::own_model::{Comparison, OwnModelFile, Records, compare, design, diagnose, report};
 use crate::report::{min_max, rounded};
 use crate::sentences::of_gaps;
-use crate::{Error, edit, numbers};
+use crate::{Error, MessageNames, edit, numbers};
 
 /// Points of a curve that are drawn.
 const DRAWN: usize = 2000;
@@ -263,7 +263,7 @@ impl Work {
             "starts_agree": step.starts_agree,
             "not_determined": step.not_determined.iter().map(|of| of.join(", ")).collect::<Vec<_>>(),
             "gaps": found.gaps.as_ref().and_then(of_gaps),
-            "loop": found.control_loop.as_ref().map(|known| self.model.loop_sentence(known)),
+            "loop": found.control_loop.as_ref().map(|known| self.model.loop_sentence(known, &MessageNames::PROGRAM)),
             "curves": curves.collect::<Vec<_>>(),
         })
     }

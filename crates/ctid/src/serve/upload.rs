@@ -9,7 +9,7 @@ use ct_signals::{
 
 use super::guard::Refusal;
 use super::held::of_record;
-use crate::{Words, input};
+use crate::{MessageNames, input};
 
 /// Largest number of characters of a record's name.
 const LONGEST_NAME: usize = 100;
@@ -75,7 +75,8 @@ impl Upload {
     pub(super) fn remark(&self) -> Option<String> {
         let (_, _, read) = self.read.as_ref()?;
         let (_, summary) = read.as_ref().ok()?;
-        let note = (!summary.is_plain()).then(|| summary.worded(&Words::PROGRAM.fit.records));
+        let note =
+            (!summary.is_plain()).then(|| summary.worded(&MessageNames::PROGRAM.fit.records));
         let said: Vec<String> = note.into_iter().chain(input::faults(summary)).collect();
         (!said.is_empty()).then(|| said.join("; "))
     }
@@ -109,7 +110,7 @@ impl Upload {
                 // Whether a fitted record has to change depends on the other records.
                 let reading = parse_csv(&self.name, &self.content, columns, options);
                 let read = reading.map(|reading| (Arc::new(reading.record), reading.summary));
-                let read = read.map_err(|error| error.worded(&Words::PROGRAM.fit.records));
+                let read = read.map_err(|error| error.worded(&MessageNames::PROGRAM.fit.records));
                 self.read = Some((columns.clone(), options.clone(), read.clone()));
                 read.map(|(record, _)| record)
             }

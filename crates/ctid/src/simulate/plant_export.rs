@@ -10,7 +10,7 @@ use crate::input::{Files, Input};
 use crate::model_file::ModelFile;
 use crate::numbers;
 use crate::own_model::{Exported, commented};
-use crate::{Error, Words};
+use crate::{Error, MessageNames};
 
 /// The text of a plant with fitted values: names and values of its parameters, then of its levels.
 fn text(problem: &Problem, values: &[(String, f64)], errors: &[Option<f64>]) -> Option<String> {
@@ -67,7 +67,7 @@ pub fn text_of_plant(
     let at_ports = AtPorts::of(problem)?;
     let of_fit = |fitted: &Fitted| (fitted.setup.records.to_vec(), fitted.fit.rmse.clone());
     let fitted = missing_effect::fitted(problem, options, |fitted| of_fit(&fitted));
-    let said = |error: missing_effect::Error| error.worded(&Words::PROGRAM.fit);
+    let said = |error: missing_effect::Error| error.worded(&MessageNames::PROGRAM.fit);
     let (records, rmse) = fitted.map_err(said)?;
     let errors = errors_of_text(problem, rmse, options).map_err(said)?;
     at_ports.fitted(problem, &records, (columns, hold), &errors, options)

@@ -6,7 +6,7 @@ use crate::common::Place;
 use crate::identify::{FIRST, Plant, SECOND};
 use ct_signals::Record;
 use linear_identification::side_by_side::{Orders, Row, SideBySide, Violation, compare};
-use linear_identification::{Method, Order, Request, mend};
+use linear_identification::{Error, Method, Order, Request, mend};
 
 fn all(record: &Record, test: &[Record], orders: &str) -> SideBySide {
     let orders: Orders = orders.parse().unwrap();
@@ -20,7 +20,9 @@ fn all(record: &Record, test: &[Record], orders: &str) -> SideBySide {
     ];
     let requests = methods.map(|method| Request::new(method, orders.0[0]));
     let (fitted, test) = mend(vec![record.clone()], test.to_vec(), orders.0[0], false).unwrap();
-    compare((&fitted[0], &test, false), &requests, &orders.0, &|| {}).unwrap()
+    let records = (&fitted[0], &test[..], false);
+    let worded = |error: Error| error.to_string();
+    compare(records, &requests, &orders.0, &worded, &|| {}).unwrap()
 }
 
 fn of(found: &SideBySide, method: Method) -> &Row {

@@ -70,7 +70,8 @@ impl Method {
 }
 
 /// Identifies by each of the methods with each of the orders, in parallel; `requests` contains the options of each method without its
-/// order. The record comes with other records that are not fitted, and with whether it is of a loop.
+/// order. The record comes with other records that are not fitted, and with whether it is of a loop. `worded`: the message of an error, in the
+/// names of the caller; `done`: called after each method with each order.
 ///
 /// # Errors
 /// [`Error::AllRefused`] where every method refuses, with the reason of the first.
@@ -78,6 +79,7 @@ pub fn compare(
     (mended, test, in_loop): (&Mended, &[Mended], bool),
     requests: &[Request],
     orders: &[Order],
+    worded: &(dyn Fn(Error) -> String + Sync),
     done: &(dyn Fn() + Sync),
 ) -> Result<SideBySide, Error> {
     let jobs: Vec<Request> = requests
@@ -93,7 +95,7 @@ pub fn compare(
     let mut rows: Vec<Row> = jobs
         .par_iter()
         .map(|request| {
-            let row = row(mended, test, request);
+            let row = row(mended, test, request, worded);
             done();
             row
         })
@@ -145,11 +147,16 @@ pub fn compare(
     })
 }
 
-fn row(record: &Mended, test: &[Mended], request: &Request) -> Row {
+fn row(
+    record: &Mended,
+    test: &[Mended],
+    request: &Request,
+    worded: &dyn Fn(Error) -> String,
+) -> Row {
     let begun = Instant::now();
     let found = identify_mended(std::slice::from_ref(record), request)
         .and_then(|found| outcome(record, test, &found))
-        .map_err(|error| error.to_string());
+        .map_err(worded);
     let (found, refused) = match found {
         Ok(found) => (Some(found), None),
         Err(reason) => (None, Some(reason)),

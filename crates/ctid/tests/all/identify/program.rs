@@ -75,7 +75,7 @@ fn what_cannot_be_is_refused() {
         &["--bandwidth is NaN"],
     );
     for bandwidth in ["1e-9", "1e-300", "1e300"] {
-        for method in ["ct-rls", "stabilized-oe"] {
+        for method in ["ct-rls", "stabilized-oe", "ct-rls,stabilized-oe"] {
             bad(
                 &format!("tour.csv --method {method} --bandwidth {bandwidth}"),
                 &["--bandwidth is", "for this record"],

@@ -130,6 +130,16 @@ fn what_cannot_be_is_refused() {
             &["loop.csv", "sign"],
         );
     }
+    // Several methods say the same, in the row of each and where all refuse.
+    let other = "the measured command disagrees with the controller of the model file";
+    bad(
+        "loop.csv --model other.toml --method ls,iv",
+        &["loop.csv", other],
+    );
+    place.succeeds("identify loop.csv --model other.toml --method ls,ct-rls --json both.json");
+    let json = place.json("both.json");
+    let refused = &json["methods"][1]["refused"];
+    assert!(refused.as_str().unwrap().contains(other), "{refused}");
     bad(
         &format!("{loops} iv --memory 100"),
         &["--memory does not go with"],

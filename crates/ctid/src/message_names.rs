@@ -2,23 +2,28 @@
 //! and the Python package names its own.
 
 use effect_search::design::NoExperiment;
+use missing_effect::design::NoExperiment as NoPlantExperiment;
 
 /// Names of everything that messages refer to.
 #[derive(Debug, Clone, Copy)]
-pub struct Words {
+pub struct MessageNames {
     /// Names in errors of fits, and of the records and plants in them.
     pub fit: greybox::Names,
     /// What stands before the name of a setting with which a message begins.
     pub setting: &'static str,
     /// Where the controller is given.
     pub controller: &'static str,
+    /// What searches for what a model lacks.
+    pub diagnose: &'static str,
     /// How a part of a record, or another grid, is chosen, after a message that advises it; empty for nothing.
     pub part_or_grid: &'static str,
     /// An experiment with a model of the user's own that cannot be proposed.
     pub experiment: fn(&NoExperiment) -> String,
+    /// An experiment with a plant that cannot be proposed.
+    pub plant_experiment: fn(&NoPlantExperiment) -> String,
 }
 
-impl Words {
+impl MessageNames {
     /// Names of the program.
     pub const PROGRAM: Self = Self {
         fit: greybox::Names {
@@ -41,12 +46,15 @@ impl Words {
             known: " under [known]",
             prior: |parameter| format!("[prior] {parameter}"),
             reference: "name its column as reference in the model file, under [columns] or, for a model of your own, under its [controller.INPUT]",
-            held: "write hold = \"zero\", or delete [controller]",
+            straight: "hold = \"first\"",
+            held: "write hold = \"zero\", or delete [controller] or, for a model of your own, [controller.INPUT]",
         },
         setting: "--",
         controller: "the controller of the model file",
+        diagnose: "`ctid diagnose`",
         part_or_grid: ": --from and --to, or --resample",
-        experiment: own_experiment,
+        experiment,
+        plant_experiment,
     };
 }
 
@@ -54,7 +62,7 @@ impl Words {
 const MORE_TIME: &str = "--effort thorough searches longer";
 
 /// An experiment with a model of the user's own that cannot be proposed.
-fn own_experiment(refused: &NoExperiment) -> String {
+fn experiment(refused: &NoExperiment) -> String {
     use NoExperiment as No;
     match refused {
         // The message begins with the argument's name, which is the name of the option.
@@ -74,8 +82,8 @@ fn own_experiment(refused: &NoExperiment) -> String {
 }
 
 /// An experiment with a plant that cannot be proposed.
-pub(crate) fn experiment(refused: &missing_effect::design::NoExperiment) -> String {
-    use missing_effect::design::NoExperiment as No;
+fn plant_experiment(refused: &NoPlantExperiment) -> String {
+    use NoPlantExperiment as No;
     let message = refused.worded("the model file");
     match refused {
         // The message begins with the argument's name, which is the name of the option.

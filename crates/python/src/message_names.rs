@@ -1,10 +1,11 @@
 //! How messages name what the user gave: the arguments of the Python package.
 
-use ctid::Words;
+use ctid::MessageNames;
 use effect_search::design::NoExperiment;
+use missing_effect::design::NoExperiment as NoPlantExperiment;
 
 /// Names of arguments of fits, diagnoses and designs.
-pub const PYTHON: Words = Words {
+pub const PYTHON: MessageNames = MessageNames {
     fit: greybox::Names {
         records: ct_signals::Names {
             part: "of the frame, df.loc[FIRST:LAST]",
@@ -22,42 +23,71 @@ pub const PYTHON: Words = Words {
         known: " in known={...}",
         prior: |parameter| format!("priors[\"{parameter}\"]"),
         reference: "name its column as reference in the model file, under its [controller.INPUT]",
+        straight: "hold=\"first\"",
         held: "give hold=\"zero\", or delete [controller.INPUT] from the model file",
     },
     setting: "",
-    controller: "the argument controller",
+    controller: "the controller of the model file",
+    diagnose: "`diagnose`",
     part_or_grid: "",
     experiment,
+    plant_experiment,
 };
 
 /// Names of arguments of `identify`, which knows one output.
-pub const IDENTIFY: Words = Words {
+pub const IDENTIFY: MessageNames = MessageNames {
     fit: greybox::Names {
         records: ct_signals::Names {
             in_columns: "in inputs=[...] or output=\"...\"",
+            column: column_of_identify,
+            namer: "the argument",
             ..PYTHON.fit.records
         },
         ..PYTHON.fit
     },
+    controller: "the argument controller",
     ..PYTHON
 };
 
-/// The argument for the column of a role.
+/// What gives the column of a role. The calls of a model have no argument for the reference.
 fn column(role: &str) -> String {
     match role {
         "time" => "the index of the frame".to_string(),
-        "reference" => "reference=\"...\"".to_string(),
+        "reference" => "reference in the model file, under its [controller.INPUT]".to_string(),
         _ => format!("{role}s=[...]"),
     }
 }
 
-/// An experiment that cannot be proposed.
+/// The argument of `identify` for the column of a role.
+fn column_of_identify(role: &str) -> String {
+    match role {
+        "output" | "reference" => format!("{role}=\"...\""),
+        _ => column(role),
+    }
+}
+
+/// Where more time may help.
+const MORE_TIME: &str = "effort=\"thorough\", or time_limit";
+
+/// An experiment with a model of the user's own that cannot be proposed.
 fn experiment(refused: &NoExperiment) -> String {
     match refused {
         NoExperiment::NoRange { input, .. } => {
             format!("{refused}, ranges={{\"{input}\": (LOW, HIGH)}}")
         }
-        NoExperiment::OutOfTime => format!("{refused}: effort=\"thorough\", or time_limit"),
+        NoExperiment::OutOfTime => format!("{refused}: {MORE_TIME}"),
+        _ => refused.to_string(),
+    }
+}
+
+/// An experiment with a plant that cannot be proposed.
+fn plant_experiment(refused: &NoPlantExperiment) -> String {
+    use NoPlantExperiment as No;
+    match refused {
+        No::NoRange { .. } | No::Overfull { .. } => {
+            format!("{refused}, ranges={{INPUT: (LOW, HIGH)}}")
+        }
+        No::OutOfTime => format!("{refused}: {MORE_TIME}"),
         _ => refused.to_string(),
     }
 }

@@ -1,4 +1,4 @@
-//! Messages that name settings of the caller.
+//! Messages with the names of the caller.
 
 use super::{CellMend, Error, PartLimit, ReadError, Shortage};
 use crate::{Names, shown};

@@ -35,6 +35,12 @@ impl TryFrom<Vec<Reflections>> for Noise {
 }
 
 impl Noise {
+    /// Standard deviation of the innovations of each output \[its unit\].
+    #[must_use]
+    pub fn sigmas(&self) -> Vec<f64> {
+        self.outputs.iter().map(ArModel::sigma).collect()
+    }
+
     /// White noise of unit variance at this number of outputs.
     #[must_use]
     pub fn white(outputs: usize) -> Self {

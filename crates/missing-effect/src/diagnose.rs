@@ -2,8 +2,6 @@
 
 use std::time::Instant;
 
-use ct_signals::ArModel;
-use greybox::Noise;
 use plants::Placed;
 
 use crate::{
@@ -124,7 +122,7 @@ fn diagnose_whole(
         || test.run(confirmed),
         || {
             rayon::join(
-                || scores(believed, &single, metric, &innovations(&found.noise)),
+                || scores(believed, &single, metric, &found.noise.sigmas()),
                 || detectable_size_ratio(&found.base, &single, &found.noise),
             )
         },
@@ -141,7 +139,7 @@ fn diagnose_whole(
         share_test: None,
         required: WHOLE,
         required_partial: PART,
-        floor: PerOutput::of(&problem.records[0].outputs, &innovations(&found.noise)),
+        floor: PerOutput::of(&problem.records[0].outputs, &found.noise.sigmas()),
         bic_fall: None,
         required_bic_fall: BIC_MARGIN,
         rejections: Vec::new(),
@@ -153,7 +151,7 @@ fn diagnose_whole(
     let unexplained = course.left.is_some() || found.limited || sticking;
     if accepted.grade != Grade::Whole || (course.last().added.is_empty() && unexplained) {
         let by_error = found.grown.best_singles();
-        let tested = largest_part(&base, &found, &by_error, &innovations(&found.noise), widen)?;
+        let tested = largest_part(&base, &found, &by_error, &found.noise.sigmas(), widen)?;
         if let Some(tested) = &tested {
             acceptance.effects = ids(&tested.node.added);
             acceptance.share = Some(tested.share);
@@ -288,9 +286,4 @@ fn diagnose_whole(
 fn ids(added: &[Placed]) -> Vec<String> {
     let ids = added.iter().map(|placed| placed.effect.id.to_string());
     ids.collect()
-}
-
-/// Standard deviation of the innovations at each output.
-fn innovations(noise: &Noise) -> Vec<f64> {
-    noise.iter().map(ArModel::sigma).collect()
 }

@@ -1,6 +1,5 @@
 //! Ambiguity: candidates that fit as well as an effect of the result. Each candidate replaces the effect, and everything is fitted again.
 
-use ct_signals::ArModel;
 use estimation::{Fit, Noise};
 use rayon::prelude::*;
 
@@ -129,7 +128,7 @@ impl Context<'_> {
         without: &Node,
         own_last: &Fit,
     ) -> Result<bool, Error> {
-        let floors: Vec<f64> = own_last.noise.iter().map(ArModel::sigma).collect();
+        let floors = own_last.noise.sigmas();
         let of_last = explained(&without.fit, &last.fit, &floors);
         if explained(&without.fit, &set.fit, &floors)
             < self.thresholds.own_candidate_share * of_last

@@ -18,7 +18,7 @@
 //! error in the cross-validation, lowers the squared error by a tenth, and is significant beside the smaller set's effects.
 
 use ct_model::effects::{EffectParameter, Role};
-use ct_signals::{ArModel, Record};
+use ct_signals::Record;
 use estimation::{Fit, Noise, Stopping, fit_from, linearise, prewhitened};
 use greybox::ModelSetup;
 use rayon::prelude::*;
@@ -147,7 +147,7 @@ impl Context<'_> {
             return Ok(None);
         }
         let own = self.in_limited_noise(&set)?;
-        let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
+        let floors = own.noise.sigmas();
         let share = explained(&base.set.fit, &set.fit, &floors);
         let least = if self.in_time(new) > 0 {
             self.thresholds.partial_share_of_time

@@ -1,6 +1,5 @@
 //! The answer: the effects of the best set that pass the acceptance test, or a set that explains a large part of the error.
 
-use ct_signals::ArModel;
 use estimation::{Fit, Noise};
 use greybox::weighted_rms;
 
@@ -70,7 +69,7 @@ impl Context<'_> {
     fn better_with_own_noise_model(&self, set: &Node, base: &Node) -> Result<bool, Error> {
         let own = self.in_own_noise(set)?;
         let bare = self.in_own_noise(base)?;
-        let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
+        let floors = own.noise.sigmas();
         let error =
             |node: &Node| weighted_rms(&node.fit.rmse, &floors, &node.fit.samples_per_output);
         // The simulation error must decrease too: in a prewhitened fit, a single reading can be a reason to add an effect.
@@ -138,7 +137,7 @@ impl Context<'_> {
         let is_part = part.added.iter().all(|i| answer.set.added.contains(i));
         let further = answer.set.added.iter().copied();
         let further: Vec<usize> = further.filter(|i| !part.added.contains(i)).collect();
-        let floors: Vec<f64> = answer.own.noise.iter().map(ArModel::sigma).collect();
+        let floors = answer.own.noise.sigmas();
         is_part
             && !further.is_empty()
             && self.in_time(&further) == 0

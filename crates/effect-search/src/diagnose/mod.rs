@@ -15,8 +15,6 @@ mod answer;
 mod searched;
 mod verdict;
 
-use ct_signals::ArModel;
-
 use crate::Error;
 use crate::base::problem::{Limit, Options, Phase, Problem};
 use crate::fit::believed::begin;
@@ -75,7 +73,7 @@ pub fn diagnose(
                 limit: context.limit.afterwards(),
                 ..context.clone()
             };
-            let floors: Vec<f64> = own.noise.iter().map(ArModel::sigma).collect();
+            let floors = own.noise.sigmas();
             context.unknown(last, &floors)?
         }
         _ => None,

@@ -1,6 +1,5 @@
 //! The verdict: whether the answer is a whole explanation, a partial one or none.
 
-use ct_signals::ArModel;
 use estimation::Fit;
 
 use super::answer::Answer;
@@ -37,10 +36,10 @@ impl Context<'_> {
         let open = grown.cut_short && answer.own.noise.order() > 0;
         let whole = answer.not_noise.is_none() && !open;
         // The noise level: the standard deviation of the whole residual if it is noise, otherwise that of its innovations.
-        let floors: Vec<f64> = if whole {
+        let floors = if whole {
             self.noise_levels(&answer.own)
         } else {
-            answer.own.noise.iter().map(ArModel::sigma).collect()
+            answer.own.noise.sigmas()
         };
         let share = found.then(|| explained(&base.fit, &answer.set.fit, &floors));
         let part = open || answer.reduced || answer.has_many(self, base);

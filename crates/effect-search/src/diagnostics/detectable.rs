@@ -7,7 +7,6 @@
 //! **Cost**: a simulation with the derivatives by the effect's own entries, for each effect that was fitted.
 
 use ct_model::effects::{Candidate, EffectParameter, Role};
-use ct_signals::ArModel;
 use estimation::{Noise, Rows, Signature, linearise};
 use rayon::prelude::*;
 
@@ -61,7 +60,7 @@ impl Context<'_> {
         let Some((candidate, size)) = candidate.and_then(|one| Some((one, leading(one)?))) else {
             return Ok(None);
         };
-        let scales: Vec<f64> = noise.iter().map(ArModel::sigma).collect();
+        let scales = noise.sigmas();
         let sigma = scales[0];
         // Outputs are weighted by their noise, not by residuals that may contain the effect.
         let setup = self.setup(&single.model)?.with_scales(scales);

@@ -46,7 +46,7 @@ pub(crate) fn detectable_size_ratio(base: &Node, single: &[Node], noise: &Noise)
         return None;
     }
     let white = base.setup.white_noise();
-    let innovations: Vec<f64> = noise.iter().map(ArModel::sigma).collect();
+    let innovations = noise.sigmas();
     let whole: Vec<f64> = noise.iter().map(ArModel::stationary_std).collect();
     let mut ratios: Vec<f64> = single
         .par_iter()

@@ -193,7 +193,7 @@ impl<const P: usize, I: Integrator> ContinuousRls<P, I> {
     }
 
     /// [`update`](RecursiveEstimator::update) with weights for this step alone.
-    #[inline]
+    #[inline(always)]
     pub fn update_with(&mut self, sample: &Sample<P>, dt: f64, weights: &Weights) -> Innovation {
         let epsilon = sample.y - factor::dot(sample.phi.as_slice(), self.theta.as_slice());
         let (step, outcome) = match self.guard.begin::<I>(sample.phi.as_slice(), dt, weights) {
@@ -223,7 +223,7 @@ impl<const P: usize, I: Integrator> RecursiveEstimator for ContinuousRls<P, I> {
     type Covariance = SMatrix<f64, P, P>;
     type Error = Error;
 
-    #[inline]
+    #[inline(always)]
     fn update(&mut self, sample: &Sample<P>, dt: f64) -> Innovation {
         let weights = self.weights;
         self.update_with(sample, dt, &weights)

@@ -59,14 +59,18 @@ impl<const P: usize> Online for Fixed<P> {
     fn run(&mut self, phi: &[f64], y: &[f64], dt: &[f64], theta: &mut [f64], epsilon: &mut [f64]) {
         // A copy of its own, which the compiler keeps in registers where it can.
         let mut own = self.clone();
-        let mut rows = theta.as_chunks_mut::<P>().0.iter_mut();
-        let samples = phi.as_chunks::<P>().0.iter().zip(y).zip(epsilon);
-        for (k, ((phi, y), epsilon)) in samples.enumerate() {
-            let step = if dt.len() > 1 { dt[k] } else { dt[0] };
-            let sample = Sample::new(*phi, *y);
-            *epsilon = RecursiveEstimator::update(&mut own, &sample, step).epsilon;
-            if let Some(row) = rows.next() {
-                row.copy_from_slice(RecursiveEstimator::theta(&own).as_slice());
+        let step = |k: usize| if dt.len() > 1 { dt[k] } else { dt[0] };
+        let samples = phi.as_chunks::<P>().0.iter().zip(y);
+        let samples = samples.map(|(phi, y)| Sample::new(*phi, *y)).zip(epsilon);
+        let rows = theta.as_chunks_mut::<P>().0;
+        if rows.is_empty() {
+            for (k, (sample, epsilon)) in samples.enumerate() {
+                *epsilon = RecursiveEstimator::update(&mut own, &sample, step(k)).epsilon;
+            }
+        } else {
+            for (k, ((sample, epsilon), row)) in samples.zip(rows).enumerate() {
+                *epsilon = RecursiveEstimator::update(&mut own, &sample, step(k)).epsilon;
+                *row = RecursiveEstimator::theta(&own).data.0[0];
             }
         }
         *self = own;

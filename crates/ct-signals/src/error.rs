@@ -181,7 +181,7 @@ pub enum Error {
     TooFewRows {
         /// The file or the record's name.
         record: String,
-        /// Rows that are there.
+        /// Available rows.
         rows: usize,
         /// Rows that are needed.
         needed: usize,
@@ -247,7 +247,7 @@ pub enum Error {
     TooFewSamples {
         /// What was asked.
         task: &'static str,
-        /// Samples that are there.
+        /// Available samples.
         found: usize,
         /// Samples that are needed.
         needed: usize,
@@ -267,7 +267,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Whether it is a header's unit that is refused: it is none of the time, or another than the model's.
+    /// Whether the unit of a header is refused: it is not a unit of time, or differs from that of the model.
     #[must_use]
     pub fn of_units(&self) -> bool {
         match self {

@@ -63,7 +63,7 @@ pub enum Error {
         "the state belongs to another model: {differences}; use another state file, or delete this one to start again"
     )]
     OtherModel {
-        /// The differences, in the words of the model file.
+        /// The differences, with the names of the model file.
         differences: String,
     },
     /// A state with inconsistent numbers.

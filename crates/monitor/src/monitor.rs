@@ -163,7 +163,7 @@ impl State {
         &self.units
     }
 
-    /// Seconds in one unit of the time of a user's own model, as the state has it.
+    /// Seconds in one unit of the time of a user's own model, as saved in the state.
     #[must_use]
     pub fn time_unit(&self) -> Option<f64> {
         self.model.get(TIME_UNIT)?.parse().ok()

@@ -1,7 +1,7 @@
 //! Recursive output error in continuous time, stabilised by an extended parameter vector. No `std`; no allocation per sample.
 //!
-//! A model runs beside the plant, on the same input; its parameters `theta^` and a filter `C^ = 1 + c_1 s + .. + c_n s^n` of its error are
-//! adapted together. The regressor comes from the model and not from the noisy output, so that noise does not bias `theta^`.
+//! A model runs in parallel with the plant, on the same input; its parameters `theta^` and a filter `C^ = 1 + c_1 s + .. + c_n s^n` of its
+//! error are adapted together. The regressor comes from the model and not from the noisy output, so that noise does not bias `theta^`.
 //!
 //! | question | answer |
 //! |---|---|

@@ -107,7 +107,7 @@ impl Findings {
     }
 }
 
-/// Whether a name may become that of a term: no effect has it, it has no port, and it is none of the catalogue, whose effects need one.
+/// Whether a name may become that of a term: no effect has it, it names no port, and it is not in the catalogue, whose effects need a port.
 fn is_free(all: &[Candidate], id: &str) -> bool {
     !id.contains('(')
         && !all_effects().any(|effect| effect.id == id)

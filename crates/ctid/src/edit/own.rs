@@ -57,7 +57,7 @@ impl Findings {
     /// Reads a result.
     ///
     /// # Errors
-    /// Where the file is none of a diagnosis or a comparison of a user's own model.
+    /// If the file is not the result of a diagnosis or a comparison of a user's own model.
     pub fn read(path: &Path) -> Result<Self, Error> {
         Self::of_text(&read_text(path)?).map_err(|what| Error::file(path, what))
     }

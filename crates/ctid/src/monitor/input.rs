@@ -287,7 +287,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Why a line is not used, in the words of the program.
+/// Why a line is not used, in the terms of the program.
 fn said(bad: &BadLine) -> String {
     bad.worded(&MessageNames::PROGRAM.fit.records)
 }

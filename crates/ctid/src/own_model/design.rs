@@ -234,7 +234,7 @@ fn listed(file: &OwnModelFile, design: &Design, look: Look) -> String {
     text::listed(&title, (&sides, &rows), design.experiments.len(), look)
 }
 
-/// Course of the inputs that change.
+/// Sequences of the inputs that change.
 fn applied(design: &Design, experiment: &Experiment) -> String {
     let inputs = experiment.inputs.iter();
     let inputs: Vec<String> = inputs.map(|own| sequence_words(design, own)).collect();

@@ -204,7 +204,7 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
     all
 }
 
-/// Outputs with correlated noise, which may be more than noise.
+/// Outputs with a correlated residual, which may not be noise alone.
 fn correlated(diagnosis: &Diagnosis) -> Option<String> {
     let correlated = diagnosis.noise.iter().filter_map(|noise| {
         let predictable = noise.predictable();

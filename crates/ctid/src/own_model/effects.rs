@@ -18,7 +18,7 @@ pub(crate) const RECORD: &str = "record";
 /// The key of the parameters that are not fitted.
 const FIXED: &str = "fixed";
 
-/// Numbers of a record that the effects contain, by the effects' identifiers.
+/// Values from a record (ranges, means, durations) that the effects' equations contain: by the effect's identifier, then by name.
 pub type RecordNumbers = BTreeMap<String, BTreeMap<String, f64>>;
 
 /// The effects of a model file.

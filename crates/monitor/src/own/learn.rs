@@ -15,7 +15,7 @@ use crate::{
     learn::{Learned, OutputNoise, READ, covariance, output_noise, record, stands_still},
 };
 
-/// Derivatives by so many states at once.
+/// Number of states for which one simulation computes derivatives.
 const LANES: usize = 4;
 /// An eigenvalue closer to one does not decay within the stored rows.
 const SETTLES: f64 = 1e-7;

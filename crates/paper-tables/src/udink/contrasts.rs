@@ -1,7 +1,7 @@
 //! Differences of the same cell in two of the paper's tables.
 //!
 //! Tables with the same noise differ by their settings alone, so that a difference of two cells varies much less from noise to noise than
-//! either of them: it tells far more than the cells do one by one.
+//! either of them: it is much more informative than the single cells.
 
 use serde::Serialize;
 

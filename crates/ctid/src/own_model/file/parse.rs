@@ -132,7 +132,7 @@ impl OwnModelFile {
     /// signals.
     ///
     /// # Errors
-    /// Where a name is none of a parameter, an effect cannot act in the model, or the numbers of columns are not those of its signals.
+    /// If a name is not that of a parameter, an effect cannot act in the model, or the numbers of columns are not those of its signals.
     pub fn new(name: &str, spec: ModelSpec, settings: OwnSettings) -> Result<Self, Error> {
         let OwnSettings {
             mut columns,

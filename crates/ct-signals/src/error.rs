@@ -47,7 +47,7 @@ pub enum Error {
     },
     /// No part of a record between its gaps has enough readings.
     #[error(
-        "{record}: no stretch of {readings} readings lies between gaps through which the input can be held (at most {}); leave the record out, or fill its gaps",
+        "{record}: no part between gaps has {readings} readings (the input can be held through gaps of at most {}); leave the record out, or fill its gaps",
         duration(*limit)
     )]
     NoStretch {
@@ -132,7 +132,7 @@ pub enum Error {
     },
     /// Values whose powers vanish.
     #[error(
-        "{file}, column \"{column}\": no value is beyond {value:e}, which is too small to compute with; give the column in a smaller unit: above {limit:e}"
+        "{file}, column \"{column}\": the largest absolute value is {value:e}, which is too small to compute with; give the column in a smaller unit, so that it is above {limit:e}"
     )]
     TooSmall {
         /// The path as it was given.

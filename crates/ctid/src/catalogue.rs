@@ -153,7 +153,7 @@ fn of_tanks(effect: &'static EffectInfo, look: Look) -> String {
             .collect::<Vec<_>>()
             .join(", "),
     );
-    let elsewhere = "not offered for linear plants whose output is no level";
+    let elsewhere = "not offered for linear plants whose output is not a level";
     text += &entry("no tank", effect.general.unwrap_or(elsewhere));
     text.push('\n');
     text += &parameters(effect, look);

@@ -224,7 +224,7 @@ impl Monitor {
         }
         if !state.intake.sound(model.0.inputs(), model.0.outputs()) {
             return Err(Error::Damaged {
-                what: "its counts of rows do not go together".into(),
+                what: "its counts of rows are inconsistent".into(),
             });
         }
         monitor.core = Core::restore(model, settings, state.units, state.checkpoint, &state.since)

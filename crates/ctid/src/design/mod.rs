@@ -264,7 +264,7 @@ impl Arguments {
         let one = |option: &str| {
             alone.clone().ok_or_else(|| {
                 Error::Usage(format!(
-                    "{option}: {} has the inputs {}; name the one that it is of with --input NAME",
+                    "{option}: {} has the inputs {}; choose one with --input NAME",
                     model.base.name,
                     all.join(", ")
                 ))

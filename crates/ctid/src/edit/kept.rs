@@ -25,7 +25,7 @@ impl Findings {
         let (spec, functions) = (&model.base, &model.effects.functions);
         if self.model != spec.name {
             return Err(refuse(format!(
-                "the result is of the model {}, and this file has {}: give a result of this model",
+                "the result is for model {}, but this file has {}: give a result of this model",
                 self.model, spec.name
             )));
         }

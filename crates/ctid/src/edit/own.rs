@@ -77,7 +77,7 @@ impl Findings {
         }
         serde_json::from_str(text).map_err(|error| {
             format!(
-                "this is no result of a model of your own: give what `ctid diagnose --json` wrote ({error})"
+                "this is not a result of a model of your own: give what `ctid diagnose --json` wrote ({error})"
             )
         })
     }

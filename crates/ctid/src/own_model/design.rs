@@ -343,7 +343,9 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         all.push(format!("Hold {}.", held.join(", ")));
     }
     if let Some(times) = design.times_as_long.filter(|_| !design.twins()) {
-        all.push(format!("Repeated {times} times it would decide."));
+        all.push(format!(
+            "Applied {times} times, it would decide between them."
+        ));
     }
     let known = design.control_loop.iter();
     all.extend(known.map(|known| file.loop_sentence(known, &MessageNames::PROGRAM)));

@@ -260,7 +260,7 @@ fn said_of(left: &NotNoise) -> String {
             from,
             to,
         } => format!(
-            "the residual of {output} in {record} from {} to {} is larger than noise with its correlation would be: a disturbance for a while",
+            "the residual of {output} in {record} from {} to {} is larger than noise with its correlation would be: a temporary disturbance",
             ct_signals::duration(*from),
             ct_signals::duration(*to)
         ),

@@ -216,7 +216,9 @@ pub fn of_design(design: &Design) -> Vec<String> {
             }
         ));
         if let Some(times) = design.times_as_long {
-            said.push(format!("Repeated {times} times it would decide."));
+            said.push(format!(
+                "Applied {times} times, it would decide between them."
+            ));
         }
     }
     if design.overfull > 0 {

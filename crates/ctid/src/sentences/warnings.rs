@@ -66,7 +66,7 @@ pub fn of_warning(warning: &Warning) -> String {
             let several = match inputs {
                 1 => "",
                 _ => {
-                    " (one A serves all inputs, so that time constants that differ need a higher order)"
+                    " (all inputs share one A, so different time constants need a higher order)"
                 }
             };
             format!(

@@ -228,13 +228,13 @@ pub(crate) fn notes(study: &Study) -> Vec<String> {
             mean(&counts.normalised_diagonal),
         ),
         format!(
-            "Table II took {} iterations in theta and {} in delta, from a start that is far off.",
+            "Table II took {} iterations in theta and {} in delta, from a start far from the minimum.",
             mean(&study.second.plain.iterations),
             mean(&study.second.normalised.iterations),
         ),
         format!(
-            "The emulated tank has K = {gain:.3} and tau = {tau:.2} s at its operating point: where it knows the sensor's filter, the output error finds them \
-             to {share} %, {beyond}; instruments on raw levels find the secant, which a dead zone of the pump moves."
+            "The emulated tank has K = {gain:.3} and tau = {tau:.2} s at its operating point: with the sensor's filter in its model, the output \
+             error estimates them to {share} %, {beyond}; instruments on raw levels estimate the secant gain, which depends on the pump's dead zone."
         ),
         format!(
             "With Ki = 0.074 as printed, in the rig and in the model, it finds K = {printed_k} and tau = {printed_tau} s: not what the paper prints."

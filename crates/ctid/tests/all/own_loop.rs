@@ -168,7 +168,7 @@ fn a_loop_that_is_not_simulated_says_why() {
     place.write("m.toml", file(0.8).replace("controller.u", "controller.w"));
     place.refuses(
         "compare loop.csv --model m.toml",
-        &["m.toml:6: w is no input of Plant: it has u"],
+        &["m.toml:6: w is not an input of Plant: it has u"],
     );
     place.write("m.toml", file(0.8).replace("r [mm]", "set [mm]"));
     // A reference that the record lacks.

@@ -209,7 +209,7 @@ fn is_parameter(spec: &ModelSpec, effects: &OwnEffects, name: &str) -> Result<()
         return Ok(());
     }
     Err(format!(
-        "{} is no parameter of {}: it has {}{}",
+        "{} is not a parameter of {}: it has {}{}",
         quoted(name),
         spec.name,
         parameters.join(", "),

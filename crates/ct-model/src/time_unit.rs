@@ -109,7 +109,7 @@ struct Sizes<'a> {
 }
 
 impl Sizes<'_> {
-    /// Size of a unit as written in the text. Percentages, angles and the like are plain numbers.
+    /// Size of a unit as written in the text. Dimensionless units other than `%`, and angles, are plain numbers.
     fn of_unit(&self, unit: &str) -> Size {
         let unit = match unit.trim() {
             "" => return Size::Open,

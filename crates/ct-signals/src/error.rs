@@ -8,7 +8,7 @@ pub use read::{CellMend, ReadError};
 mod messages;
 mod read;
 
-/// Everything this crate can refuse.
+/// Errors of this crate.
 ///
 /// `row` is the line number in the file as a text editor shows it, including the header.
 #[derive(Debug, thiserror::Error)]

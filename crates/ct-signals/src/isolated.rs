@@ -1,4 +1,4 @@
-//! Readings that are no measurements: a spike of one row, or a code for a missing sample, such as -999.
+//! Readings that are not measurements: a spike of one row, or a code for a missing sample, such as -999.
 //!
 //! A spike is far from the readings before and after it, compared with the typical distance in the column. A code is one value far outside the
 //! range of all others, in several rows. Neither is reported if an input moves shortly before each of them, as a process may follow it; usual

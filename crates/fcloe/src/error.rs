@@ -1,7 +1,7 @@
 //! Errors of models, controllers, records and fits: each message names the object, the numbers that disagree and the correction, in one
 //! line.
 
-/// Everything this crate can refuse.
+/// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

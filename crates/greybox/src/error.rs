@@ -130,7 +130,7 @@ impl Error {
                 (names.prior)(name)
             ),
             Self::NoReference { record } => format!(
-                "{record}: the record holds no reference, which a controller follows: {}",
+                "{record}: the record has no reference, which the controller needs: {}",
                 names.reference
             ),
             Self::CommandNotHeld { record } => format!(

@@ -102,7 +102,7 @@ impl Session<'_> {
                     String::new()
                 };
                 let blocks = if *every > 1 {
-                    format!(", as means of {every} rows")
+                    format!(", monitored as means of {every} rows")
                 } else {
                     String::new()
                 };

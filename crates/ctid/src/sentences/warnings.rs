@@ -95,7 +95,7 @@ pub fn of_warning(warning: &Warning) -> String {
             significant(*delay, 4)
         ),
         Warning::ConstantReference { reference } => format!(
-            "\"{}\" is constant: if a controller moved the input, these estimates, which take it for open loop, are biased",
+            "\"{}\" is constant: if a controller moved the input, these estimates are biased, because they assume open loop",
             quoted(reference)
         ),
         Warning::BeyondRecord {

@@ -60,7 +60,7 @@ impl Walk {
         largest: f64::INFINITY,
         fitted_again: false,
     };
-    /// A walk no larger than the noise; it also changes the parameters.
+    /// A walk that is at most as large as the noise over the longest record; the parameters are fitted again together with it.
     pub const SMALL: Self = Self {
         anywhere: true,
         largest: 1.0,

@@ -302,5 +302,5 @@ fn a_fit_says_whether_the_loop_was_simulated() {
     let found = work.compute(&AtomicBool::new(false)).unwrap();
     let body = work.body(1, &found);
     let said = body["loop"].as_str().unwrap();
-    assert!(said.contains("the record holds no reference"), "{said}");
+    assert!(said.contains("the record has no reference"), "{said}");
 }

@@ -50,7 +50,7 @@ def as_list(data: Records | None, what: str = "data") -> list[Data]:
     if isinstance(data, Sequence) and not isinstance(data, (str, bytes)):
         return list(data)
     raise DataError(
-        f"{what}: a {type(data).__name__} is no record: give a pandas frame whose index is the time, a mapping of arrays, or a list of them"
+        f"{what}: a {type(data).__name__} is not a record: give a pandas frame whose index is the time, a mapping of arrays, or a list of them"
     )
 
 
@@ -73,7 +73,7 @@ def _numbers(name: str, column: str, values: Any) -> Array:
         for row, value in enumerate(array.tolist()):
             if not isinstance(value, (int, float)):
                 raise DataError(
-                    f'{name}, row {row + 2}, column "{column}": {value!r} is no number: '
+                    f'{name}, row {row + 2}, column "{column}": {value!r} is not a number: '
                     f'make it one, pd.to_numeric(df["{column}"], errors="coerce") makes such readings missing'
                 )
         raise DataError(

@@ -45,7 +45,7 @@ def _columns(
     if isinstance(given, Mapping):
         for name in given:
             if name not in names:
-                raise ModelError(f'"{name}" is none of the {role} of {model.name}: it has {", ".join(names) or "none"}')
+                raise ModelError(f'"{name}" is not one of the {role} of {model.name}: it has {", ".join(names) or "none"}')
         return [str(given.get(name, column)) for name, column in own]
     columns = [str(column) for column in given]
     if len(columns) != len(names):

@@ -102,7 +102,7 @@ def _values(role: str, given: Mapping[str, float], names: list[str], all_needed:
         raise DataError(f"{role} are {given!r}: give values by name, {{{', '.join(f'{name!r}: ...' for name in names)}}}")
     for name in given:
         if name not in names:
-            raise DataError(f'"{name}" is none of the {role} of the model: it has {", ".join(names) or "none"}')
+            raise DataError(f'"{name}" is not one of the {role} of the model: it has {", ".join(names) or "none"}')
     lacking = [name for name in names if name not in given]
     if lacking and all_needed:
         raise DataError(f"{role}: there is no value of {', '.join(lacking)}: every input is needed")

@@ -36,7 +36,7 @@ def test_cells_that_are_no_numbers(model, block):
     frame.iloc[7, 2] = "Bad"
     refused(model, frame, "row 9", '"y [degC]"', "'Bad'", "to_numeric")
     frame = block.astype({"y [degC]": str})
-    refused(model, frame, "row 2", "no number")
+    refused(model, frame, "row 2", "not a number")
     frame = block.astype({"y [degC]": complex})
     refused(model, frame, '"y [degC]"')
 
@@ -81,7 +81,7 @@ def test_columns(model, block):
     refused(model, frame, "kg")
     with pytest.raises(ctid.ModelError, match="has 2"):
         model.fit(block, inputs=["u"])
-    with pytest.raises(ctid.ModelError, match="none of the inputs"):
+    with pytest.raises(ctid.ModelError, match="not one of the inputs"):
         model.fit(block, inputs={"w": "u"})
 
 
@@ -98,7 +98,7 @@ def test_indexes(model, block):
     refused(model, block.set_index(pd.timedelta_range("0s", periods=len(block), freq="5s")), "total_seconds")
     refused(model, block.set_index(dates.to_period("s")), "to_timestamp")
     refused(model, block.set_index(pd.MultiIndex.from_arrays([dates, dates])), "levels")
-    refused(model, block.set_index(pd.Index([f"row {k}" for k in range(len(block))])), "no number")
+    refused(model, block.set_index(pd.Index([f"row {k}" for k in range(len(block))])), "not a number")
     gap = block.copy()
     gap.index = pd.Index([np.nan, *block.index[1:]], name="t [s]")
     refused(model, gap, "row 2", "missing")
@@ -192,7 +192,7 @@ def test_one_record_is_simulated(model, block, tour):
     for fit, record in [(model.fit(block, known={"C": 52.0}), block), (tank, tour)]:
         says(ctid.DataError, lambda: fit.simulate([record]), "test", "one record", "list")
         says(ctid.DataError, lambda: fit.simulate(None), "test", "one record")
-        says(ctid.DataError, lambda: fit.simulate(3), "test", "int is no record")
+        says(ctid.DataError, lambda: fit.simulate(3), "test", "int is not a record")
         says(ctid.ModelError, lambda: fit.simulate(record, interval="wide"), "interval", "'wide'")
         says(ctid.ModelError, lambda: fit.simulate(record, first=-1), "first is -1")
 
@@ -302,7 +302,7 @@ def test_an_index_that_counts_rows_is_told(model, block):
 
 def test_parameters(model, block):
     for options in ({"known": {"kk": 1.0}}, {"priors": {"kk": (1.0, 0.1)}}):
-        with pytest.raises(ctid.ModelError, match="kk is no parameter"):
+        with pytest.raises(ctid.ModelError, match="kk is not a parameter"):
             model.fit(block, **options)
     with pytest.raises(ctid.Error):
         model.fit(block, priors={"k": (0.1, -1.0)})
@@ -351,7 +351,7 @@ def test_estimators():
         ctid.StabilizedOe((4, 0), [1.0] * 5, 0.01, 1.0)
     with pytest.raises(ctid.ModelError):
         ctid.StabilizedOe((1, 0), [-1.0, 1.0], 0.01, 1.0)
-    with pytest.raises(ctid.ModelError, match="no method"):
+    with pytest.raises(ctid.ModelError, match="not a method"):
         ctid.identify({"t": np.arange(50.0), "u": np.ones(50), "y": np.ones(50)}, "magic")  # type: ignore[arg-type]
     with pytest.raises(ctid.DataError):
         ctid.identify({"t": np.arange(50.0), "u": np.ones(50), "y": np.ones(50)}, "srivc")

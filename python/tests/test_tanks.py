@@ -91,7 +91,7 @@ def test_what_a_tanks_monitor_refuses():
         tank.monitor(learn=3)
     with pytest.raises(ctid.ModelError):
         ctid.Model.tank("three-tank", known={"measured": "T3"}).monitor()
-    with pytest.raises(ctid.DataError, match="none of the inputs"):
+    with pytest.raises(ctid.DataError, match="not one of the inputs"):
         tank.monitor().update(0.0, {"v": 1.0}, {"y": 1.0})
 
 

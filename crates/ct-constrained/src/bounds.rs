@@ -26,7 +26,7 @@ pub enum Keep {
     },
 }
 
-/// The box `lower <= theta <= upper`, entry by entry, and how it is kept to. Infinite bounds are none, and written as none.
+/// The box `lower <= theta <= upper`, entry by entry, and how it is enforced. An infinite bound means no bound, and is saved as `None`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds<const P: usize> {
     lower: SVector<f64, P>,
@@ -58,10 +58,10 @@ impl<const P: usize> Bounds<P> {
         }
     }
 
-    /// The same box with the given way of enforcing it.
+    /// The same box with another way of enforcing it.
     ///
     /// # Errors
-    /// [`Error::Weight`] for a penalty's.
+    /// [`Error::Weight`] if the weight of a penalty is negative or not finite.
     pub fn kept_by(self, keep: Keep) -> Result<Self, Error> {
         match keep {
             Keep::Penalty { weight } if !(weight >= 0.0 && weight.is_finite()) => {

@@ -23,7 +23,7 @@
 //! `dV/dt <= -eta V - eps' (2 W - Gamma) eps`.
 //!
 //! [`ConstrainedRls::with_free_gamma`] takes data and rows with `gamma_i < 2 w_i` apart from `w_i`. `V` still falls, by (3.8) term by
-//! term; but nothing is minimised, neither (3.5) nor, as the paper has it, for `Gamma = I`. Each row is then exact alone,
+//! term; but nothing is minimised, neither (3.5) nor, as the paper states, for `Gamma = I`. Each row is then exact alone,
 //! ```text
 //! equality row i:  Q^-1 += gamma_i b f_i f_i',   f_i'(theta - theta^) shrinks by (1 + gamma_i b f_i'Q f_i)^(-w_i/gamma_i)
 //! ```

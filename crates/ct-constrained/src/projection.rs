@@ -1,26 +1,26 @@
 //! Projection of the estimates onto rows or a box: hard bounds, where a penalty is soft.
 //!
-//! Model: the nearest estimate that obeys all rows, in the metric of what is known:
+//! Model: the nearest estimate that satisfies all rows, in the metric of the information matrix `P^-1`:
 //! ```text
 //! minimise (theta - theta^)' P^-1 (theta - theta^)   subject to  low_i <= f_i' theta <= high_i
 //! ```
-//! In this metric, and not by clamping the entries, the Lyapunov function cannot grow where the true parameters obey the rows;
-//! and a parameter at its bound moves those that are correlated with it. `P` stays as it is.
+//! In this metric, unlike by clamping the entries, the Lyapunov function cannot grow if the true parameters satisfy the rows; and a
+//! parameter at its bound changes those that are correlated with it. `P` does not change.
 //!
-//! Assumption: some `theta` obeys all rows. Equations (the dual method of Goldfarb and Idnani) with `P = L L'`, so that
+//! Assumption: some `theta` satisfies all rows. Equations (the dual method of Goldfarb and Idnani) with `P = L L'`, so that
 //! `theta = theta^ + L x` and the nearest point has the shortest `x`; `g_i = L' f_i/sum |f_ij| sqrt(P_jj)`, with the sign of the bound
 //! that is violated. `G = Q R` are the active rows, `g` is the row that is violated most, `e` its violation in that unit:
 //! ```text
 //! r = R^-1 Q' g,   z = g - Q Q' g,   t = min(e/z'z, min lambda_j/r_j over r_j > 0)
 //! lambda -= t r,   lambda_g += t,    e -= t z'z
 //! ```
-//! The first limit makes the row active, the second lets row `j` go (never an equality). With a row that has become active,
-//! `x += Q y`, and `R' y` is what the active rows are off their bounds by: rounding, but for the last one. Of the other rows the one
-//! that is violated most comes next.
+//! The first limit makes the row active, the second removes row `j` from the active set (never an equality). When a row has become
+//! active, `x += Q y`, where `R' y` is the distance of the active rows from their bounds: rounding errors, except for the last one. Of the
+//! other rows, the one that is violated most is the next.
 //!
-//! Rounding: a row is obeyed within 1e-12 of the size of its terms at the start and at the end, and 4e-15 of `|x|` in the unit above.
+//! Rounding: a row is satisfied within 1e-12 of the size of its terms at the start and at the end, and 4e-15 of `|x|` in the unit above.
 //! A row that is a combination of the active ones, `g = G r`, within 1e-13 of `1 + sum |r_j|`, and is violated by no more than that
-//! of its and their terms, is obeyed.
+//! of its and their terms, counts as satisfied.
 //!
 //! Convergence: in finitely many steps, one where one row is violated. Cost per step: `2 p^2` and `5 q p` for `q` active rows, at
 //! most `p`.
@@ -36,7 +36,7 @@ use nalgebra::SVector;
 use self::search::Search;
 use crate::{Error, Relation, Row};
 
-/// A row is obeyed within this share of the size of its terms.
+/// A row is satisfied within this share of the size of its terms.
 const OBEYED: f64 = 1e-12;
 
 /// A row is linearly dependent on the active rows if its part outside them is below this share.
@@ -72,8 +72,8 @@ pub fn project<const P: usize, const R: usize, I: Integrator>(
     nearest(rls, &intervals)
 }
 
-/// Moves the estimates to the nearest point of the box `lower <= theta <= upper`, entry by entry; infinite bounds are none.
-/// Returns whether anything moved.
+/// Moves the estimates to the nearest point of the box `lower <= theta <= upper`, entry by entry; an infinite bound means
+/// no bound. Returns whether any entry changed.
 ///
 /// Where `P` is so nearly singular that rounding hides which point is nearest, each entry goes to its nearer bound.
 ///

@@ -1,6 +1,6 @@
 //! Errors of systems, settings and samples: each message names the object, the numbers that disagree and the correction, in one line.
 
-/// Everything this crate can refuse.
+/// Errors of this crate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

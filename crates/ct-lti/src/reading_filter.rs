@@ -1,11 +1,11 @@
-//! The state variable filter of an output of which readings may be missing, for regressions that have no model to put in their place.
+//! The state variable filter of an output with missing readings, for regressions without a model that could replace them.
 //!
-//! Method: between its readings the output is taken to run on lines, as [`Hold::First`](crate::Hold::First) has it between samples in any
-//! case: where readings are missing the line is longer, and the filter's step with it, exactly. Rows without a reading are none.
+//! Method: the output is interpolated linearly between its readings, as by [`Hold::First`](crate::Hold::First). Rows without a reading are
+//! skipped: there the interpolation interval, and with it the exact step of the filter, is longer.
 //!
-//! A line over a time that is long beside the filter's is not what the plant did: after a gap of more than `1/lambda`, `lambda =
-//! (e_0/e_n)^(1/n)`, rows are left out until the filter has forgotten it, down to 1 % by the response of `1/(p + lambda)^n`: for n = 1 to 4
-//! after 4.6, 6.6, 8.4 and 10 times `1/lambda`.
+//! Linear interpolation over a time that is long compared with the filter's time constant does not describe the plant. After a gap of more
+//! than `1/lambda`, `lambda = (e_0/e_n)^(1/n)`, rows are therefore left out until the influence of the gap has decayed to 1 % by the
+//! response of `1/(p + lambda)^n`: for n = 1 to 4 after 4.6, 6.6, 8.4 and 10 times `1/lambda`.
 //!
 //! Cost: that of [`StateVariableFilter`]; where no reading is missing its values are the same, bit for bit.
 //!
@@ -14,20 +14,20 @@
 
 use crate::{Error, StateVariableFilter};
 
-/// A gap is forgotten when its influence on the filter's states has decayed to this share.
+/// Rows are used again when the influence of a gap on the filter's states has decayed to this share.
 const FORGOTTEN: f64 = 0.01;
 
-/// Filters readings, NaN among them.
+/// Filters readings, some of which may be NaN (missing).
 #[derive(Debug, Clone)]
 pub struct ReadingFilter {
     filter: StateVariableFilter,
-    /// The longest line, and the filter's memory \[time\].
+    /// The longest interpolation interval after which no rows are left out, and the filter's memory \[time\].
     longest: f64,
     memory: f64,
     /// Time since the last reading, and whether a reading was missing.
     since: f64,
     missed: bool,
-    /// Time for which rows are left out yet.
+    /// Remaining time for which rows are left out.
     left: f64,
 }
 
@@ -48,8 +48,8 @@ impl ReadingFilter {
         }
     }
 
-    /// Takes a reading, NaN where it is missing, `step` after the last row \[time\], and gives the filtered output and its derivatives
-    /// there; nothing where the reading is missing or the filter has not forgotten a long gap.
+    /// Takes a reading, NaN where it is missing, `step` after the last row \[time\], and returns the filtered output and its derivatives
+    /// there; `None` if the reading is missing, or the influence of a long gap has not decayed.
     ///
     /// # Errors
     /// As of [`StateVariableFilter::update`].

@@ -94,7 +94,7 @@ impl TransferFunction {
         self.denominator.is_hurwitz()
     }
 
-    /// `G(0)`; none with a pole at 0.
+    /// `G(0)`; `None` if there is a pole at 0.
     pub fn dc_gain(&self) -> Option<f64> {
         let a = self.denominator.coefficient(0);
         (a != 0.0).then(|| self.numerator.coefficient(0) / a)

@@ -53,7 +53,7 @@ pub enum Function {
     /// `stay_between(a, b)`: the result keeps its value of the row before while this is between `a` and `b`, and follows the nearer one
     /// otherwise. A play of `x` stays between `x - b` and `x + b`.
     StayBetween,
-    /// `quantise(x, d)`: the multiple of `d` that is nearest to `x`; `x` itself where `d` is zero.
+    /// `quantise(x, d)`: the multiple of `d` that is nearest to `x`; `x` itself if `d` is zero.
     Quantise,
 }
 

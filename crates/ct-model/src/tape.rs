@@ -38,7 +38,7 @@ pub(crate) struct Tape {
     pub derivatives: Vec<Register>,
     /// Register of each output.
     pub outputs: Vec<Register>,
-    /// The initial value of each state as the text has it.
+    /// The initial value of each state as written in the text.
     pub starts: Vec<Register>,
     /// Delayed signals and their dead times.
     pub delays: Vec<(Register, Register)>,

@@ -14,7 +14,7 @@ use crate::spec::ModelSpec;
 const UNITS: [f64; 6] = [1e-6, 1e-3, 1.0, 60.0, 3600.0, 86_400.0];
 /// Literal factors that convert units; so do their inverses.
 const CONVERSIONS: [f64; 6] = [60.0, 1e3, 3600.0, 86_400.0, 1e6, 6e4];
-/// Relative difference of two sizes that are equal but for rounding.
+/// Relative difference of two sizes that are equal except for rounding.
 const EQUAL: f64 = 1e-6;
 
 /// Unit of an expression.
@@ -109,7 +109,7 @@ struct Sizes<'a> {
 }
 
 impl Sizes<'_> {
-    /// Size of a unit as the text has it. Other shares and angles are numbers.
+    /// Size of a unit as written in the text. Dimensionless units other than `%`, and angles, are plain numbers.
     fn of_unit(&self, unit: &str) -> Size {
         let unit = match unit.trim() {
             "" => return Size::Open,

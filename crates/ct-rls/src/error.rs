@@ -34,7 +34,7 @@ pub enum Error {
     },
     /// A forgetting factor per step outside (0, 1], or its step not above 0.
     #[error(
-        "lambda is {lambda} over a step of {dt} s, but a forgetting factor lies above 0 and at most at 1, and a step is above 0; take 0.98, say"
+        "lambda is {lambda} over a step of {dt} s, but a forgetting factor has to be above 0 and at most 1, and a step above 0; take for example 0.98"
     )]
     Lambda {
         /// Forgetting factor per step, no unit.

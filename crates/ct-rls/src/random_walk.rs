@@ -1,4 +1,4 @@
-//! Parameters that walk at random, each at its own rate: the Kalman filter's form, beside exponential forgetting or instead of it.
+//! Random walk of the parameters, each with its own intensity: the form of the Kalman filter, with or without exponential forgetting.
 //!
 //! Model: `y = theta' phi`, `eps = y - theta^' phi`; `dtheta = dw` with `E dw dw' = Q dt`, `Q = diag(q_1, .., q_p)`, `q_i >= 0`:
 //! ```text

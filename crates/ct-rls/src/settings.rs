@@ -109,7 +109,7 @@ pub struct Guards {
     /// there, forgetting is nearly off in all directions. With [`Directional`](crate::Directional) it is not: no eigenvalue of `P`
     /// is raised above the cap, by not forgetting with a regressor too weak for it, `gamma |phi|^2 trace_limit < eta`.
     ///
-    /// As a record `f64::INFINITY` is none, which JSON has no number for.
+    /// `f64::INFINITY` is serialised as `None`, because JSON has no number for it.
     #[cfg_attr(feature = "serde", serde(with = "infinite_as_none"))]
     pub trace_limit: f64,
     /// No forgetting in a step whose regressor has a Euclidean norm of at most this: unit of `phi`. At 0, the default, this applies only to

@@ -1,4 +1,4 @@
-//! Statements `f' theta = chi` that are taken in beside the data: rows of [U] 3.9 and 4.18.
+//! Statements `f' theta = chi` that are used in addition to the data: rows of [U] 3.9 and 4.18.
 //!
 //! Model: a row with the weight `w` and the Riccati gain `gamma`, alone, for the time `h`:
 //! ```text

@@ -133,7 +133,7 @@ impl ArModel {
         Self::from_coefficients(&coefficients, sigma)
     }
 
-    /// The process with its memory limited to so many samples: poles that decay more slowly than `exp(-1/samples)` a sample are
+    /// The process with its memory limited to `samples`: poles that decay more slowly than `exp(-1/samples)` a sample are
     /// moved inwards until none does. The innovations' standard deviation is kept.
     ///
     /// A model with a pole near one describes any slow model error as noise. All poles are scaled by one factor, `a_i gamma^i`, which hardly
@@ -238,8 +238,8 @@ impl ArModel {
     /// Whitens one record, in which NaN stands for a sample that is missing. White innovations of variance `sigma^2` come
     /// back, not of variance 1, and NaN for the missing ones.
     ///
-    /// Each sample is predicted from all earlier samples that are there, and its error scaled to `sigma`: `w = L^-1 v` over
-    /// the samples that are there, for their covariance `sigma^2 L L'`.
+    /// Each sample is predicted from all earlier available samples, and its error scaled to `sigma`: `w = L^-1 v` over
+    /// the available samples, for their covariance `sigma^2 L L'`.
     pub fn whiten(&self, values: &[f64]) -> Vec<f64> {
         let mut whitener = self.whitener(1);
         let mut whitened = values.to_vec();
@@ -270,11 +270,11 @@ impl ArModel {
             .sum()
     }
 
-    /// `log|R|` of a record in which samples are missing, over the samples that are there: one entry for each instant, false
+    /// `log|R|` of a record in which samples are missing, over the available samples: one entry for each instant, false
     /// where the sample is missing.
     ///
     /// The sum of the logarithms of their prediction variances over `sigma^2`, `>= 0`; [`ArModel::log_det`] of `n`, bit for
-    /// bit, where all `n` of them are there. The likelihood is that of [`ArModel::log_det`], with `n` the samples that are there
+    /// bit, if all `n` of them are available. The likelihood is that of [`ArModel::log_det`], with `n` the available samples
     /// and `w` the values of [`ArModel::whiten`] that are not NaN.
     ///
     /// Of a series: `model.log_det_of(series.iter().map(|v| !v.is_nan()))`.

@@ -1,6 +1,6 @@
 //! Maximum likelihood fit of an autoregression to series in which samples are missing.
 //!
-//! **Criterion**: with the `n` samples that are there whitened, `w`, and the covariance `sigma^2 R` of them all,
+//! **Criterion**: with the `n` available samples whitened, `w`, and the covariance `sigma^2 R` of them all,
 //! ```text
 //! D = n log(sum w^2) + log|R| = n log(sum x^2),   x = w |R|^(1/2n)
 //! ```

@@ -14,7 +14,7 @@ pub struct Calendar {
 }
 
 impl Calendar {
-    /// The date and time so many seconds after the start.
+    /// The date and time this number of seconds after the start.
     #[must_use]
     pub fn at(&self, seconds: f64) -> String {
         self.zone.format(self.start.after(seconds))

@@ -8,7 +8,7 @@ pub use read::{CellMend, ReadError};
 mod messages;
 mod read;
 
-/// Everything this crate can refuse.
+/// Errors of this crate.
 ///
 /// `row` is the line number in the file as a text editor shows it, including the header.
 #[derive(Debug, thiserror::Error)]
@@ -47,7 +47,7 @@ pub enum Error {
     },
     /// No part of a record between its gaps has enough readings.
     #[error(
-        "{record}: no stretch of {readings} readings lies between gaps through which the input can be held (at most {}); leave the record out, or fill its gaps",
+        "{record}: no part between gaps has {readings} readings (the input can be held through gaps of at most {}); leave the record out, or fill its gaps",
         duration(*limit)
     )]
     NoStretch {
@@ -132,7 +132,7 @@ pub enum Error {
     },
     /// Values whose powers vanish.
     #[error(
-        "{file}, column \"{column}\": no value is beyond {value:e}, which is too small to compute with; give the column in a smaller unit: above {limit:e}"
+        "{file}, column \"{column}\": the largest absolute value is {value:e}, which is too small to compute with; give the column in a smaller unit, so that it is above {limit:e}"
     )]
     TooSmall {
         /// The path as it was given.
@@ -181,7 +181,7 @@ pub enum Error {
     TooFewRows {
         /// The file or the record's name.
         record: String,
-        /// Rows that are there.
+        /// Available rows.
         rows: usize,
         /// Rows that are needed.
         needed: usize,
@@ -247,7 +247,7 @@ pub enum Error {
     TooFewSamples {
         /// What was asked.
         task: &'static str,
-        /// Samples that are there.
+        /// Available samples.
         found: usize,
         /// Samples that are needed.
         needed: usize,
@@ -267,7 +267,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Whether it is a header's unit that is refused: it is none of the time, or another than the model's.
+    /// Whether the unit of a header is refused: it is not a unit of time, or differs from that of the model.
     #[must_use]
     pub fn of_units(&self) -> bool {
         match self {

@@ -1,4 +1,4 @@
-//! Records in which rows or samples of an input are missing: held for a while, cut where that is too long.
+//! Records with missing rows or samples of an input: short gaps are bridged by holding the input, and records are cut at longer ones.
 //!
 //! A missing sample of an *output* is left out of the likelihood; nothing else is lost. What an *input* did while nothing was
 //! recorded is not known. For a short while it is taken to have stayed as it was (or, of a [`Hold::First`] input, to have run in a
@@ -348,7 +348,8 @@ impl Record {
     }
 }
 
-/// Fills missing samples: the value before, or a line where the channel runs in lines; the first ones with the first that is there.
+/// Fills missing samples: with the last value, or by linear interpolation if the channel is linear between samples; those at the beginning
+/// with the first available value.
 fn hold(channel: &mut Channel) {
     if channel.hold == Hold::First {
         channel.values = channel.interpolated();

@@ -1,4 +1,4 @@
-//! Readings that are no measurements: a spike of one row, or a code for a missing sample, such as -999.
+//! Readings that are not measurements: a spike of one row, or a code for a missing sample, such as -999.
 //!
 //! A spike is far from the readings before and after it, compared with the typical distance in the column. A code is one value far outside the
 //! range of all others, in several rows. Neither is reported if an input moves shortly before each of them, as a process may follow it; usual
@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::{Channel, Record};
 
-/// A reading is a spike if its distance from its neighbours is so many times the typical one, ...
+/// A reading is a spike if its distance from its neighbours is this many times the typical one, ...
 const TYPICAL: f64 = 40.0;
 /// ... this share of the range of most readings, ...
 const OF_RANGE: f64 = 0.25;
@@ -18,15 +18,15 @@ const NEIGHBOURS: f64 = 0.2;
 const QUANTILE: f64 = 0.02;
 /// Largest share of spikes: with more of them they are a property of the signal.
 const MOST: f64 = 0.02;
-/// A code is so many times the range of the other readings away from them (a usual one once), ...
+/// The distance of a code from the other readings is this many times their range (once for the usual codes), ...
 const CODE: f64 = 3.0;
-/// ... and stands in no larger share of the rows.
+/// ... and at most this share of the rows has it.
 const MOST_OF_CODE: f64 = 0.5;
 /// The fewest readings of a column.
 const FEWEST: usize = 20;
 /// An input moves if it changes by this share of its range, ...
 const MOVES: f64 = 0.1;
-/// ... within so many readings before a spike or code.
+/// ... within this number of readings before a spike or code.
 const BEFORE: usize = 5;
 
 /// Isolated readings of a column.
@@ -190,7 +190,7 @@ fn spikes(channel: &Channel) -> Vec<usize> {
     let typical = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
     let least = (TYPICAL * typical).max(OF_RANGE * range);
     let is_spike = |(_, distance, apart): &&(usize, f64, f64)| {
-        // Of a signal that is constant but for a few readings nothing is known of what is typical.
+        // Of a signal that is constant except for a few readings nothing is known of what is typical.
         least > 0.0 && *distance > least && *apart < NEIGHBOURS * distance
     };
     let rows: Vec<usize> = distances

@@ -14,7 +14,7 @@
 //! again from its seed.
 //!
 //! # Example
-//! A tank is simulated that drains more slowly than the model believes; the residual tells.
+//! A tank is simulated that drains more slowly than the model believes; the residual shows it.
 //! ```
 //! use ct_signals::residual_tests::{ljung_box, prewhitened_input_test};
 //! use ct_signals::{Channel, Record, excitation, noise};

@@ -12,8 +12,8 @@ pub const MIN_ROWS: usize = 20;
 /// Rows needed for each fitted parameter.
 pub const ROWS_PER_PARAMETER: usize = 5;
 
-/// Hold: the course of the input between two samples. It is part of the data's type, because a held input that is treated as a continuous
-/// one causes a spurious input term many times larger than a real leak.
+/// Hold: the behaviour of the input between two samples. It is part of the data's type, because a held input that is treated as a
+/// continuous one causes a spurious input term many times larger than a real leak.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Hold {

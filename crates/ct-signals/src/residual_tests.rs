@@ -3,7 +3,7 @@
 //! Both tests give a probability `p`: how often a residual that is pure noise would look at least
 //! this far from it. Below 0.01, say, the residual is not noise.
 //!
-//! **Missing samples**: NaN. Means, sums and counts are then over the samples and the pairs of samples that are there. In a
+//! **Missing samples**: NaN. Means, sums and counts are then over the available samples and pairs of samples. In a
 //! white Gaussian series of `n` samples with `n_k` pairs at lag k,
 //! `E[(sum x[t] x[t+k])^2] = n_k (sum x^2)^2/(n (n+2))` whatever the pattern (to the mean's removal): `n_k` takes the place of
 //! `n - k` in the sums below. Lags with fewer than 5 pairs do not count, nor as degrees of freedom.
@@ -42,8 +42,8 @@ pub fn autocorrelation(x: &[f64], max_lag: usize) -> Vec<f64> {
 /// -1..1. 0 at lags that the record is too short for, and at all when one of the two does not vary.
 /// Of two series of different lengths the end of the longer is left out.
 ///
-/// Where samples are missing (NaN) it is, at each lag, the correlation over the pairs that are there, times `(N - lag)/N` for the series'
-/// length `N`, as that of a whole series has it. Its standard deviation is then about `(N - lag)/N` over the root of the number of
+/// Where samples are missing (NaN) it is, at each lag, the correlation over the available pairs, times `(N - lag)/N` for the series'
+/// length `N`, as for a complete series. Its standard deviation is then about `(N - lag)/N` over the root of the number of
 /// [`pairs`], for white series.
 pub fn cross_correlation(u: &[f64], e: &[f64], max_lag: usize) -> Vec<f64> {
     let n = u.len().min(e.len());
@@ -93,7 +93,7 @@ pub fn pairs(u: &[f64], e: &[f64], max_lag: usize) -> Vec<usize> {
 /// Reference: G. M. Ljung, G. E. P. Box, *On a measure of lack of fit in time series models*,
 /// Biometrika 65 (1978) 297-303.
 ///
-/// Missing samples are NaN: `n` counts the samples that are there, and `rho_k` is the sum over the pairs that are there over that of all
+/// Missing samples are NaN: `n` counts the available samples, and `rho_k` is the sum over the available pairs over that of all
 /// squares. Where `x` is a whitened series, its innovations after a gap count like any others.
 ///
 /// # Errors
@@ -224,7 +224,7 @@ fn portmanteau(n: usize, correlation: &[f64], freedom: usize) -> Result<f64, Err
     exceedance(q, freedom)
 }
 
-/// The test of a series whose mean is removed, from the pairs that are there at lags `1..=lags`.
+/// The test of a series whose mean is removed, from the available pairs at lags `1..=lags`.
 fn ljung_box_of_pairs(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Error> {
     let n = present(x) as f64;
     let squares: f64 = x.iter().filter(|x| !x.is_nan()).map(|x| x * x).sum();
@@ -249,7 +249,7 @@ fn ljung_box_of_pairs(x: &[f64], lags: usize, fitted: usize) -> Result<f64, Erro
     exceedance(counted.iter().sum(), counted.len() - fitted)
 }
 
-/// The probability that a chi-square variable of so many degrees of freedom is above `q`.
+/// The probability that a chi-square variable with `freedom` degrees of freedom is above `q`.
 fn exceedance(q: f64, freedom: usize) -> Result<f64, Error> {
     ChiSquared::new(freedom as f64)
         .map(|chi_square| chi_square.sf(q))

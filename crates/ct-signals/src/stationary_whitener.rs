@@ -9,7 +9,7 @@
 //! missing row                  x^+ = A x^                     S+ = A S A'
 //! ```
 //! Rows come out divided by the root of `r_e`: white, of the variance of the process's innovations. The sum of the logarithms of `r_e` is
-//! `log|R|` of the rows that are there.
+//! `log|R|` of the available rows.
 //!
 //! Cost: the products of A's entries that are not 0 with S, twice, a row.
 //!

@@ -218,7 +218,7 @@ impl Rows {
         inputs.map(|value| *value.as_ref().unwrap_or(&f64::NAN))
     }
 
-    /// Seconds in one unit of the time, as its header has it.
+    /// Seconds in one unit of the time that the header states.
     #[must_use]
     pub fn seconds(&self) -> f64 {
         self.seconds

@@ -6,7 +6,7 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 const MANY: f64 = 1e4;
 
 /// Half the width, in standard errors, of the interval that contains the true value with probability `level` (0 to 1, both excluded), for a
-/// variance of so many degrees of freedom (fewer than 1 count as 1); NaN for another level.
+/// variance with `freedom` degrees of freedom (fewer than 1 count as 1); NaN for another level.
 ///
 /// Beyond 10 000 degrees these are the first two terms of Cornish and Fisher, the third being below 1e-12 there.
 pub fn student_half_width(level: f64, freedom: f64) -> f64 {

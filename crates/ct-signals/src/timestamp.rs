@@ -85,7 +85,7 @@ impl Timestamp {
         }
     }
 
-    /// The instant so many seconds later, to the microsecond: a time of a record after the record's first.
+    /// The instant this number of seconds later, to the microsecond: a time of a record after the record's first.
     #[must_use]
     pub fn after(self, seconds: f64) -> Self {
         let whole = seconds.floor();

@@ -1,5 +1,5 @@
-//! Names and units in a header: `y [cm]`, `y (cm)` and `y_cm` are the name `y` and the unit `cm`. What a unit means, and how values
-//! are converted, says [`Unit`].
+//! Names and units in a header: `y [cm]`, `y (cm)` and `y_cm` are the name `y` and the unit `cm`. [`Unit`] describes what
+//! a unit means and how values are converted.
 
 mod dimension;
 mod quantity;

@@ -11,7 +11,7 @@
 
 use crate::ArModel;
 
-/// Gaps of up to so many rows for each coefficient are passed row by row, which is cheaper.
+/// Gaps of up to this number of rows per coefficient are passed row by row, which is cheaper.
 const ONE_BY_ONE: usize = 16;
 /// Powers of the state's matrix below this are treated as zero.
 const FORGOTTEN: f64 = 1e-40;
@@ -142,7 +142,7 @@ impl Whitener {
         self.step_behind_lost();
     }
 
-    /// As so many calls of [`Whitener::skip`], to rounding, at a cost that grows with the logarithm of `rows` where they are
+    /// Same as `rows` calls of [`Whitener::skip`], to rounding, at a cost that grows with the logarithm of `rows` where they are
     /// many: `x[k+n] = A^n x[k]`, and the covariance with it, by repeated squaring of the state's matrix `A`. Where `A^n`
     /// vanishes, the whitener is as at the start of a record.
     pub fn skip_many(&mut self, rows: usize) {

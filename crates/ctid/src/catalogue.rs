@@ -15,7 +15,7 @@ pub fn list(look: Look) -> String {
     format!("{tanks}{}{}", generic::list(look), says_more(look))
 }
 
-/// The effects that may be added to a model, by place, in the words of its domain.
+/// The effects that may be added to a model, by place, in the terms of its physical domain.
 #[must_use]
 pub fn list_for(model: &ModelFile, look: Look) -> String {
     listed(model.domain(), |effect| offered(model, effect), look) + &says_more(look)
@@ -99,7 +99,7 @@ fn listed(domain: Domain, offered: impl Fn(&'static EffectInfo) -> bool, look: L
 /// Everything the catalogue knows of an effect: of tanks, at the ports of models of the user's own, or both.
 ///
 /// # Errors
-/// Where there is none of that name.
+/// If no effect has this name.
 pub fn describe(id: &str, look: Look) -> Result<String, Error> {
     let tanks = EffectInfo::find(id).map(|effect| of_tanks(effect, look));
     let at_ports = generic::matching(id).into_iter();
@@ -153,7 +153,7 @@ fn of_tanks(effect: &'static EffectInfo, look: Look) -> String {
             .collect::<Vec<_>>()
             .join(", "),
     );
-    let elsewhere = "not offered for linear plants whose output is no level";
+    let elsewhere = "not offered for linear plants whose output is not a level";
     text += &entry("no tank", effect.general.unwrap_or(elsewhere));
     text.push('\n');
     text += &parameters(effect, look);

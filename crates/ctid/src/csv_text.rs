@@ -1,6 +1,6 @@
 //! The text of CSV files: headers, cells, rows.
 
-/// A name with its unit, as a header has it.
+/// A name with its unit, in the form of a header.
 pub(crate) fn header(name: &str, unit: &str) -> String {
     match unit {
         "" => name.to_string(),

@@ -10,7 +10,7 @@
 //! | a model on new inputs | [`mod@simulate`] |
 //! | a user's own model, without the command line | [`own_model`] |
 //! | the tour | [`tour`] |
-//! | rows watched as they come | [`mod@monitor`] |
+//! | monitoring of rows as they arrive | [`mod@monitor`] |
 //! | linear models from a record, as text | [`mod@identify`] |
 //! | the page | [`mod@serve`] |
 //! | what a person reads | [`terminal`], [`catalogue`], [`report`] |

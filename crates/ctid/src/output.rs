@@ -298,7 +298,7 @@ fn is_ours(kind: Kind, path: &Path) -> bool {
         return false;
     };
     match kind {
-        // A record has no mark of the program, and a model file may have been edited by hand.
+        // A CSV record does not show which program wrote it, and a model file may have been edited by hand.
         Kind::Record | Kind::Model => false,
         Kind::Report => {
             let mut head = Vec::new();

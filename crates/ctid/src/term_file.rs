@@ -78,7 +78,7 @@ pub(crate) fn place_of(plant: Plant, known: &Known, word: &str) -> Result<(Place
                 names.join(", ")
             };
             format!(
-                "\"{}\" is no place of plant {}; write actuator, {vessels} or {}",
+                "\"{}\" is not a place of plant {}; write actuator, {vessels} or {}",
                 quoted(word),
                 plant.id(),
                 match &outputs[..] {
@@ -101,7 +101,7 @@ pub(crate) fn variable_of(word: &str) -> Result<Variable, String> {
         .find(|variable| variable.name() == word)
         .ok_or_else(|| {
             format!(
-                "\"{}\" is no variable; write level, rate, input or time",
+                "\"{}\" is not a variable; write level, rate, input or time",
                 quoted(word)
             )
         })
@@ -226,7 +226,7 @@ pub fn parse(file: &str, text: &str) -> Result<TermFile, Error> {
                     at_line(
                         line,
                         format!(
-                            "column \"{name}\" holds \"{}\", which is no finite number; correct it",
+                            "column \"{name}\" holds \"{}\", which is not a finite number; correct it",
                             quoted(text)
                         ),
                     )
@@ -302,9 +302,9 @@ mod tests {
         let rows = |rows: &str| refused(&format!("{head}{rows}"));
         assert_eq!(
             rows("vessel,level,1,2\nvessel,level,2,x\n"),
-            "u.csv:3: column \"value\" holds \"x\", which is no finite number; correct it"
+            "u.csv:3: column \"value\" holds \"x\", which is not a finite number; correct it"
         );
-        assert!(rows("vessel,level,1,NaN\n").contains("\"NaN\", which is no finite number"));
+        assert!(rows("vessel,level,1,NaN\n").contains("\"NaN\", which is not a finite number"));
         assert!(rows("vessel,level,1\n").starts_with("u.csv:2: column \"value\" is empty"));
         assert!(
             rows("vessel,level,2,1\nvessel,level,2,1\n")

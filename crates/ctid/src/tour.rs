@@ -135,8 +135,8 @@ fn what_is_missing(diagnosis: &Diagnosis, look: Look) -> String {
 }
 
 fn add(diagnosis: &Diagnosis, look: Look) -> Result<String, Error> {
-    let text = "With a model file of your own you would now type the first line; it leaves the file as it \
-                is, but for the second.";
+    let text = "For a model file of your own, you would now enter the command below. It changes only one line \
+                of the file, which is shown after it.";
     let mut said = step(4, "Add it", text, look);
     let mut model = MODEL.1.to_string();
     for (effect, step) in diagnosis.effects.iter().zip(diagnosis.steps.iter().skip(1)) {

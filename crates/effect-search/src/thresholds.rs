@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 /// and doubled; `cargo run --release -p ctid-tests --example library_study` measures the error rates for the whole set of values. "Chosen,
 /// for time": the value limits the computation time.
 ///
-/// Thresholds of a comparison that no search uses are constants beside their code, as the ones for the fit in a loop whose model lacks an
-/// effect ([`crate::Enclosed::depends_on_external_signals`]).
+/// Thresholds of a comparison that no search uses are constants in the file of their code, such as those for the fit in a loop whose model
+/// lacks an effect ([`crate::Enclosed::depends_on_external_signals`]).
 ///
 /// The criterion is BIC; a fall of the criterion is a difference of BIC, a fall of the deviance a difference of `-2 log likelihood`. Both
 /// are dimensionless.

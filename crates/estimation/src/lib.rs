@@ -4,7 +4,7 @@
 //! - [`coloured`]: the noise of each output as an autoregressive process, from the residual by marginal likelihood ([`noise_of`]), and the
 //!   prewhitened fit.
 //! - [`Squares`]: several outputs, each with a variance of its own, by the sum of their likelihoods.
-//! - [`Prior`]: what is known of an entry beside the records, as one more row.
+//! - [`Prior`]: prior knowledge of an entry, as one more row.
 //! - [`Fit`]: standard errors with their degrees of freedom, correlations, likelihood and information criterion; [`robust`]: standard
 //!   errors where the residual has another spectrum than the noise model of the fit.
 //!

@@ -292,7 +292,7 @@ pub(crate) mod tests {
         all.select_rows(there).select_columns(there)
     }
 
-    /// Rows of two series, of one output or of two, with two columns and the residual, NaN in some; of the rows that are there the
+    /// Rows of two series, of one output or of two, with two columns and the residual, NaN in some; of the available rows the
     /// columns, the residuals, and which these rows are.
     pub(crate) fn rows_with_missing(
         outputs: usize,

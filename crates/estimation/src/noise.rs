@@ -149,7 +149,7 @@ impl Noise {
             .collect()
     }
 
-    /// A filter for each output that whitens rows of so many values.
+    /// A filter for each output that whitens rows of `lanes` values.
     #[must_use]
     pub fn whiteners(&self, lanes: usize) -> Vec<Whitener> {
         let outputs = self.outputs.iter();

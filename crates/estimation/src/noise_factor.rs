@@ -2,7 +2,7 @@
 
 use ct_signals::ArModel;
 
-/// A noise model's factor `L`, of unit innovations, of the covariance `L L'` of the samples of one record that are there.
+/// A noise model's factor `L`, of unit innovations, of the covariance `L L'` of the available samples of one record.
 ///
 /// With the predictors `a^(m)`, `m = min(k, q)`, of the sample `k` and `s_m` their error over the innovations', `v[k] = sum_i a^(m)_i
 /// v[k-i] + s_m e[k]`: `L = A^-1 S`, `A` a unit lower band and `S` diagonal. Rows of `lanes` values run along the time.

@@ -71,7 +71,7 @@ pub trait Residuals: Sync {
         &[]
     }
 
-    /// The time is over: no further step is taken.
+    /// The time limit is reached: no further step is taken.
     fn out_of_time(&self) -> bool {
         false
     }

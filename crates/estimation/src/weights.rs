@@ -1,7 +1,7 @@
 //! Weights of outputs with unknown noise variances.
 //!
 //! **Model**: the whitened residuals of output `o`, `N_o` of them, have the unknown variance `s_o^2`. At its best for a sum of squares
-//! `C_o` it is `C_o/N_o`, and minus twice the logarithm of the likelihood is, but for constants,
+//! `C_o` it is `C_o/N_o`, and minus twice the logarithm of the likelihood is, except for constants,
 //! ```text
 //! sum_o N_o log(C_o/N_o) = N log(C/N),   C = N prod_o (C_o/N_o)^(N_o/N),   N = sum_o N_o
 //! ```
@@ -44,7 +44,7 @@ pub struct Squares {
 }
 
 impl Squares {
-    /// Zero sums, for outputs with these numbers of samples and these floors.
+    /// Sums that start at zero. `samples`: number of samples of each output; `floor`: lower bound of its noise standard deviation.
     #[must_use]
     pub(crate) fn new(samples: &[usize], floor: impl Fn(usize) -> f64) -> Self {
         Self {

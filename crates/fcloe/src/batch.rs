@@ -79,7 +79,7 @@ pub struct Fit {
     pub stop: Stop,
     /// Steps that were taken.
     pub iterations: usize,
-    /// Passes over the records: each step that was tried and whose loop was stable, and the start.
+    /// Number of simulations of the records: one for the start, and one for each tried step with a stable loop.
     pub evaluations: usize,
     /// Steps that were refused because P^ would not be Hurwitz.
     pub refused: usize,

@@ -7,9 +7,9 @@
 //! several lags `1/(1 + T p)`, explains, less what noise with the same spectrum would explain. A wrong gain, sign or unit of time is in the
 //! systematic part; noise is not, because it is independent of r.
 //!
-//! Assumptions: r does what its hold says; y runs in straight lines between samples, or is held, whichever fits better. Where readings of y
-//! are missing it runs in lines between those that are there: what the controller did with the readings that the record lacks adds to the
-//! mismatch, and is little beside 10 % of u unless gaps are long and many.
+//! Assumptions: r does what its hold says; y is linear between samples, or is held, whichever fits better. Where readings of y are
+//! missing, y is interpolated linearly between the available ones: the response of the controller to the missing readings adds to the
+//! mismatch, but is small compared with 10 % of u unless gaps are long and many.
 //!
 //! Limits: what is wrong only at frequencies below lambda is not seen; a controller that is sampled much more slowly than the record's
 //! dynamics is not the continuous one, and shows.
@@ -152,7 +152,7 @@ fn response(
     Ok(outputs.collect::<Result<_, _>>()?)
 }
 
-/// A constant, and the controller's output from each of its states.
+/// Regressors: a constant, and the controller's free response to the unit value of each of its states.
 fn free_responses(law: &StateSpace, n: usize, step: f64) -> Result<Vec<Vec<f64>>, Error> {
     let mut columns = vec![vec![1.0; n]];
     for i in 0..law.order() {

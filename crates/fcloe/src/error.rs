@@ -1,7 +1,7 @@
 //! Errors of models, controllers, records and fits: each message names the object, the numbers that disagree and the correction, in one
 //! line.
 
-/// Everything this crate can refuse.
+/// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -146,10 +146,10 @@ pub enum Error {
     },
     /// An output without readings, or without readings that determine its level.
     #[error(
-        "{record}: no reading of y is there{}; give a part of the record that has some",
+        "{record}: y has no readings{}; give a part of the record that has some",
         match all {
             true => String::new(),
-            false => format!(" in the first {rows} rows, which say its level"),
+            false => format!(" in the first {rows} rows, which determine its level"),
         }
     )]
     NoReading {
@@ -162,7 +162,7 @@ pub enum Error {
     },
     /// Gaps in y that are too long for the filters of a regression.
     #[error(
-        "{record}: {:.0} % of the readings of y are missing, and only {left} of the {rows} rows are far enough behind long gaps for filters on y; output error needs no such filters",
+        "{record}: {:.0} % of the readings of y are missing, and only {left} of the {rows} rows are far enough after long gaps for filters on y; output error needs no such filters",
         100.0 * missing
     )]
     Gaps {
@@ -177,7 +177,7 @@ pub enum Error {
     },
     /// Instruments with a filter that is not the plant's own denominator, and missing readings.
     #[error(
-        "readings of y are missing, and the filter of the instruments did not come to rest at A^: their errors are not known then"
+        "readings of y are missing, and the filter of the instruments did not converge to A^: the standard errors cannot be computed"
     )]
     ErrorsOfOtherFilter,
     /// Too few samples for the parameters.

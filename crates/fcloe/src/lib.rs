@@ -18,7 +18,7 @@
 //! | I need data to try it on | [`continuous_loop`], [`sampled_loop`], [`noise_at_snr`], [`Quantiser`] |
 //!
 //! Time is in any one unit throughout. Signals are deviations from an operating point at which the loop rested before
-//! the record; [`Offsets`] says which, or has it estimated.
+//! the record; [`Offsets`] gives it, or requests its estimation.
 //!
 //! Requirements: the exact controller (with the settings of a PI controller rounded to two digits, a gain of 6 is biased by 0.8 %), a
 //! reference that is exciting and independent of the noise, and a start whose loop is stable. u is not required, except for starts by

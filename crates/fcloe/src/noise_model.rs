@@ -18,7 +18,7 @@
 //! `R(0) s s' + s f' + f s'`: no more memory for a longer record.
 //!
 //! Missing readings: the residual is NaN there, and F cannot be inverted from sample to sample. The autoregression of either path is then
-//! the one whose process, after F or not, has the largest likelihood of the residuals that are there ([`ArModel::fit_behind`],
+//! the one whose process, after F or not, has the largest likelihood of the available residuals ([`ArModel::fit_behind`],
 //! [`ct_signals::StationaryWhitener`]), and the paths are compared by the marginal likelihood of these.
 //!
 //! Cost: `q nu^2` products a sample, for q columns and nu states of H.

@@ -3,7 +3,7 @@
 //! Equations: see the head of `noise_model.rs`. The innovations' variance counts the fitted parameters and the
 //! noise model's coefficients as degrees of freedom that are spent.
 //!
-//! Rows whose reading is missing are 0 in both sums: the covariance is that of the readings that are there, and so is the likelihood after
+//! Rows whose reading is missing are 0 in both sums: the covariance is that of the available readings, and so is the likelihood after
 //! the noise model.
 //!
 //! Assumptions: the minimum was reached; the noise is stationary and independent of r, and its AR coefficients
@@ -58,8 +58,8 @@ impl Uncertainty {
 }
 
 impl Problem {
-    /// The uncertainty of a fit of this problem. `path` says where the noise enters, if that is known; else the residual
-    /// tells.
+    /// The uncertainty of a fit of this problem. `path`: where the noise enters, if this is known; else it is determined from
+    /// the residual.
     ///
     /// # Errors
     /// [`Error::NotDetermined`] where the data leave a combination of parameters open.

@@ -130,11 +130,11 @@ impl Error {
                 (names.prior)(name)
             ),
             Self::NoReference { record } => format!(
-                "{record}: the record holds no reference, which a controller follows: {}",
+                "{record}: the record has no reference, which the controller needs: {}",
                 names.reference
             ),
             Self::CommandNotHeld { record } => format!(
-                "{record}: {} says that the command runs in straight lines, but a controller holds it: {}",
+                "{record}: {} says that the command is linear between samples, but a controller holds it constant: {}",
                 names.straight, names.held
             ),
             // These name nothing of the caller's.
@@ -207,7 +207,7 @@ mod tests {
             "<known>",
             "<prior k> = [1.0, -1.0]",
             "<reference>",
-            "<straight> says that the command runs in straight lines, but a controller holds it: <held>",
+            "<straight> says that the command is linear between samples, but a controller holds it constant: <held>",
         ];
         for (error, own) in messages().iter().zip(own) {
             assert!(error.worded(&names).contains(own), "{error}");

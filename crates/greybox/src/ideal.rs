@@ -21,9 +21,9 @@ use crate::ModelSetup;
 const SAMPLES: usize = 300;
 /// Number of samples for which an input is constant.
 const HELD: std::ops::RangeInclusive<usize> = 3..=40;
-/// Samples in a time constant, ...
+/// Number of samples per time constant, ...
 const PER_CONSTANT: f64 = 10.0;
-/// ... and the largest ratio of two sampling intervals, one after the other.
+/// ... and the largest ratio of two successive sampling intervals.
 const RATIO: f64 = 30.0;
 /// Largest number of sampling intervals.
 const INTERVALS: usize = 8;

@@ -1,9 +1,9 @@
 //! Start values of fits of a user's own model.
 //!
-//! What such a model is like is not known ahead, so starts are of four kinds: the values of the text; the best of many points around them,
-//! by a simulation of each without derivatives; what fits beside observers lead to ([`crate::model_observer`]); and what fits of growing
-//! first parts of the records lead to, as a criterion over a long record has many local minima that one over a short record has not (L.
-//! Ljung, System Identification, 2nd ed., 1999, section 10.5).
+//! The properties of such a model are not known in advance, so there are four kinds of starts: the values of the text; the best of many
+//! points around them, by a simulation of each without derivatives; the results of fits with an observer ([`crate::model_observer`]); and
+//! the results of fits to growing first parts of the records, because a criterion over a long record has many local minima that one over a
+//! short record does not have (L. Ljung, System Identification, 2nd ed., 1999, section 10.5).
 //!
 //! The points are a scrambled Sobol sequence (A. B. Owen, Journal of Complexity 14 (1998) 466-489), in the logarithm of what has a sign.
 

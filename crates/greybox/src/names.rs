@@ -16,7 +16,7 @@ pub struct Names {
     pub prior: fn(parameter: &str) -> String,
     /// How a record gets its reference, as a clause.
     pub reference: &'static str,
-    /// What lets a command run in straight lines between samples.
+    /// The setting by which a command is linear between samples.
     pub straight: &'static str,
     /// How a command is held, or the controller left out, as a clause.
     pub held: &'static str,

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 pub struct TimeLimit {
     begun: Instant,
     whole: Option<Duration>,
-    /// Microseconds after `begun`; `u64::MAX` is none.
+    /// Microseconds after `begun`; `u64::MAX` means no limit.
     until: AtomicU64,
     left_out: Mutex<Vec<String>>,
 }

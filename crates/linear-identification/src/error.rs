@@ -86,7 +86,7 @@ pub enum Error {
     NoSample,
     /// Too few rows are left for the filters of `ct-rls`.
     #[error(
-        "{:.0} % of the readings are missing, and only {left} of {rows} rows are far enough behind long gaps for the filters of ct-rls; srivc and fcloe leave single readings out",
+        "{:.0} % of the readings are missing, and only {left} of {rows} rows are far enough after long gaps for the filters of ct-rls; srivc and fcloe leave single readings out",
         100.0 * .missing
     )]
     RowsLeft {
@@ -99,7 +99,7 @@ pub enum Error {
     },
     /// The recursion ended at a model that is unstable.
     #[error(
-        "the estimates at the end are those of an unstable model; try {}stabilized-oe, whose model is kept stable",
+        "the final estimates give an unstable model; try {}stabilized-oe, whose model is kept stable",
         or_lower(*.order)
     )]
     Unstable {
@@ -108,7 +108,7 @@ pub enum Error {
     },
     /// Only `fcloe` estimates levels.
     #[error(
-        "levels estimated is of fcloe; {} takes them from the record: rest, mean or zero",
+        "levels estimated is for fcloe only; {} takes them from the record: rest, mean or zero",
         .method.id()
     )]
     LevelsEstimated {
@@ -143,7 +143,7 @@ pub enum Error {
     },
     /// Too few rows are left for the filters of a regression.
     #[error(
-        "{record}: {:.0} % of the readings of \"{}\" are missing, and only {left} of {rows} rows are far enough behind long gaps for the filters of {}; srivc and fcloe leave single readings out",
+        "{record}: {:.0} % of the readings of \"{}\" are missing, and only {left} of {rows} rows are far enough after long gaps for the filters of {}; srivc and fcloe leave single readings out",
         100.0 * .missing,
         quoted(.output),
         .method.id()
@@ -172,7 +172,7 @@ pub enum Error {
     },
     /// Rows are missing, and the first fit for the longest hold failed.
     #[error(
-        "{record}: rows or samples of the input are missing, and a first fit that says for how long the input may be held failed: {why}; choose a part of the record, or put it on a coarser grid"
+        "{record}: rows or samples of the input are missing, and the preliminary fit that determines how long the input may be held failed: {why}; choose a part of the record, or put it on a coarser grid"
     )]
     FirstFit {
         /// Name of the record.

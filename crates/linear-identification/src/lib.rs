@@ -33,9 +33,9 @@
 //! several bandwidths for their regressions; recursive-fcloe has the same memory, in time constants of its start.
 //!
 //! Readings of the output may be missing. The output errors (fcloe, recursive-fcloe, stabilized-oe) have no residual there, srivc and rivc
-//! no row, and the simulation runs on; iv puts what its model says in their place in its filters, stabilized-oe too; ls and ct-rls, which
-//! have no model beside them, take the output for a line between its readings and leave rows out after gaps longer than their filters. Gaps
-//! of the input: see [`mend`].
+//! no row, and the simulation runs on; iv and stabilized-oe replace the missing readings by the output of their model in their filters; ls
+//! and ct-rls, which have no such model, interpolate the output linearly between its readings and leave rows out after gaps longer than
+//! their filters. Gaps of the input: see [`mend`].
 //!
 //! How often 95 % intervals contain the true value then, of every method with all readings and without 30 % of them and a block of 10 rows:
 //! `RECORDS=400 cargo test -p ctid --test all identify_missing -- --nocapture`.

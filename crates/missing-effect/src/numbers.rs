@@ -34,7 +34,7 @@ pub fn value_and_error(value: f64, std_error: Option<f64>) -> (String, Option<St
     if largest < 6 && last > -7 {
         (decimals(value, -last), Some(decimals(error, -last)))
     } else {
-        // Numbers with so many digits, or so large, that only powers of ten are readable.
+        // Numbers that are readable only as powers of ten: they have too many digits, or are too large.
         (
             significant(value, (largest - last + 1).min(8)),
             Some(significant(error, 2)),

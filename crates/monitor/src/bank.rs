@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 /// Windows, in units of the slowest time constant or of [`FEWEST`] rows, whichever is longer.
 const WINDOWS: [f64; 4] = [0.25, 0.75, 2.0, 6.0];
-/// The unit of the windows is at least so many rows.
+/// The unit of the windows is at least this number of rows.
 const FEWEST: f64 = 16.0;
 /// Innovations are clipped at this many standard deviations.
 const CUT: f64 = 4.0;

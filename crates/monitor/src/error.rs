@@ -17,7 +17,7 @@ pub enum Error {
     },
     /// A plant with two pumps.
     #[error(
-        "plant {plant} has two pumps, and a row carries one command: the monitor watches plants with one"
+        "plant {plant} has two pumps, but a row has one command only: the monitor supports plants with one pump"
     )]
     TwoPumps {
         /// The plant.
@@ -50,7 +50,7 @@ pub enum Error {
     },
     /// A state from another version.
     #[error(
-        "the state is of version {found}, and this program reads version {known}: begin without it"
+        "the state has version {found}, but this program reads version {known}: start without this state"
     )]
     Version {
         /// The version of the state.
@@ -63,7 +63,7 @@ pub enum Error {
         "the state belongs to another model: {differences}; use another state file, or delete this one to start again"
     )]
     OtherModel {
-        /// The differences, in the words of the model file.
+        /// The differences, with the names of the model file.
         differences: String,
     },
     /// A state with inconsistent numbers.

@@ -1,4 +1,4 @@
-//! Properties that have to agree between a saved state and the model, in the words of the model file, and their differences.
+//! Properties that have to agree between a saved state and the model, with the names of the model file, and their differences.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -8,8 +8,8 @@
 //! A process that is sampled much faster than its dynamics is monitored in blocks: time, command and reading are their means over
 //! `every` rows, and the command runs in a straight line from one mean to the next.
 //!
-//! A row may lack the reading of an output. In a block such a row is taken on the straight line between the readings beside it; a block
-//! whose last row lacks the reading, or more than half of its rows, has none of that output.
+//! A row may lack the reading of an output. In a block such a row is interpolated linearly between the neighbouring readings; a
+//! block whose last row lacks the reading, or more than half of whose rows lack it, has no reading of that output.
 
 use serde::{Deserialize, Serialize};
 

@@ -56,7 +56,7 @@ pub(crate) const FINE: Stopping = Stopping {
     evaluations: 40,
     cost: 1e-8,
 };
-/// The residual is more than noise if its sum of squares exceeds that of the noise by this number of standard errors ...
+/// The residual is larger than noise if its sum of squares exceeds that of the noise by this number of standard errors ...
 const BEYOND: f64 = 4.0;
 /// ... and if the excess is more than this share of the excess without the effect: no learned model is exact, and its errors are visible in
 /// the presence of a large effect.
@@ -110,7 +110,7 @@ pub(crate) struct Left {
 }
 
 impl Left {
-    /// Whether the residual with the effect is more than noise.
+    /// Whether the residual of the model with the effect is larger than noise would be.
     pub(crate) fn is_more_than_noise(self) -> bool {
         let n = self.samples as f64;
         self.left > n + BEYOND * (2.0 * n).sqrt() && self.left - n > LEFT * (self.before - n)

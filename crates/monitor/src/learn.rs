@@ -222,7 +222,7 @@ pub(crate) fn covariance(fit: &Fit, n: usize, widened: f64) -> Result<Vec<f64>, 
     Ok(covariance)
 }
 
-/// The noise of an output from the residuals of a fit of so many `parameters`.
+/// The noise of an output from the residuals of a fit with this number of `parameters`.
 pub(crate) fn output_noise(
     noise: &ArModel,
     residuals: Vec<f64>,

@@ -12,11 +12,11 @@
 //! the noise at each output. From then on the learned model is simulated in parallel with the plant on the measured command, and does not
 //! adapt: a change that feedback hides in the reading is then visible through the command, and a slow change does not become normal. After
 //! an alarm the learned model is kept until it fits again. Memory is constant, and a row of up to eight inputs, outputs and states each
-//! allocates nothing, but for one in 2048 (a checkpoint) and the looks after an alarm.
+//! allocates nothing, except for one in 2048 (a checkpoint) and the looks after an alarm.
 //!
-//! **Several outputs.** Readings are given in the order of [`plants::Known::measured`], or of the outputs of the text. Each output has a
-//! noise of its own, independent of the others, and may lack readings for itself. One model runs beside all of them: scores, tracker and
-//! isolation take each innovation in units of its own standard deviation, and an alarm that speaks of a sensor says of which.
+//! **Several outputs.** Readings are given in the order of [`plants::Known::measured`], or of the outputs of the text. Each output has
+//! its own, independent noise, and its own missing readings. One model simulates all of them: scores, tracker and
+//! isolation take each innovation in units of its own standard deviation, and an alarm about a sensor names its output.
 //!
 //! **Users' own models** have any number of inputs, outputs and states. An alarm gives the time since when
 //! the model does not fit; with [`OwnModel::candidates`] it also names the candidate that explains it.

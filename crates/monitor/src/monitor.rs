@@ -163,7 +163,7 @@ impl State {
         &self.units
     }
 
-    /// Seconds in one unit of the time of a user's own model, as the state has it.
+    /// Seconds in one unit of the time of a user's own model, as saved in the state.
     #[must_use]
     pub fn time_unit(&self) -> Option<f64> {
         self.model.get(TIME_UNIT)?.parse().ok()
@@ -224,7 +224,7 @@ impl Monitor {
         }
         if !state.intake.sound(model.0.inputs(), model.0.outputs()) {
             return Err(Error::Damaged {
-                what: "its counts of rows do not go together".into(),
+                what: "its counts of rows are inconsistent".into(),
             });
         }
         monitor.core = Core::restore(model, settings, state.units, state.checkpoint, &state.since)

@@ -16,9 +16,9 @@ pub(crate) trait Model: Send + Sync {
     fn read(&mut self, output: usize, row: &mut [f64]) -> f64;
     /// Moves on from one sample to the next.
     fn advance(&mut self, hold: Hold, from: &Sample, to: &Sample);
-    /// The states: the level of each vessel, of a plant.
+    /// The states; for a plant, the level of each vessel.
     fn states(&self) -> Each<f64>;
-    /// Position of the actuator of a plant.
+    /// Position of the actuator; for plants only.
     fn stands(&self) -> f64;
 }
 

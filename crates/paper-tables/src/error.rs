@@ -1,6 +1,6 @@
 //! Errors of the computation of the tables: each message names the argument, the numbers that disagree and the correction, in one line.
 
-/// Everything this crate can refuse.
+/// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -12,7 +12,7 @@ pub struct Printed {
 }
 
 impl Printed {
-    /// A figure with 0 to 6 decimals; more would not compile in the constants that this is for.
+    /// A figure with 0 to 6 decimals; in a constant, more decimals are a compile error.
     pub(crate) const fn new(value: f64, decimals: usize) -> Self {
         const HALF_DIGIT: [f64; 7] = [0.5, 0.05, 0.005, 5e-4, 5e-5, 5e-6, 5e-7];
         Self {

@@ -90,7 +90,7 @@ impl Error {
                 (names.plants_of)(effect)
             ),
             Self::NotHydraulic { effect, unit } => format!(
-                "{effect} is an effect of tanks, and the output is in {unit}, which is no level: take a general effect{}, or, where the output is a level, give its column a unit of length, of volume or %",
+                "{effect} is an effect of tanks, and the output is in {unit}, which is not a unit of level: take a general effect{}, or, where the output is a level, give its column a unit of length, of volume or %",
                 names.effects
             ),
             Self::NoSecondPump { effect } => format!(

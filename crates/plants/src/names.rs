@@ -6,11 +6,11 @@
 /// [`Error::worded`](crate::Error::worded).
 #[derive(Debug, Clone, Copy)]
 pub struct Names {
-    /// What lists the plants of an effect, as a clause.
+    /// A clause that says where the plants on which an effect acts are listed.
     pub plants_of: fn(effect: &str) -> String,
-    /// What lists the effects that the model may have, in brackets after a blank; empty for nothing.
+    /// Where the effects that the model may have are listed: in brackets after a blank, or empty.
     pub effects: &'static str,
-    /// How the command of the second pump is given, as a clause.
+    /// A clause that says how to give the command of the second pump.
     pub second_command: &'static str,
 }
 

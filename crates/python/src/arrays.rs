@@ -25,7 +25,7 @@ pub fn numbers<'py, D: Dimension>(
     let numpy = value.py().import("numpy")?;
     let found = numpy.call_method1("asarray", (value,)).map_err(|why| {
         error::of_data(format!(
-            "{name} has rows of different lengths, or is no array ({why}): give an array of numbers with {axes} {s}"
+            "{name} has rows of different lengths, or is not an array ({why}): give an array of numbers with {axes} {s}"
         ))
     })?;
     let dtype = found.getattr("dtype")?;

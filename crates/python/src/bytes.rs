@@ -17,7 +17,8 @@ pub fn of(value: &impl Serialize) -> PyResult<Vec<u8>> {
 
 /// A value from its bytes.
 pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> PyResult<T> {
-    let other = |why: String| Error::new_err(format!("this is no object of ctid {VERSION}: {why}"));
+    let other =
+        |why: String| Error::new_err(format!("this is not an object of ctid {VERSION}: {why}"));
     // The version comes first, because the rest may have another layout.
     let mut reader = rmp_serde::Deserializer::from_read_ref(bytes);
     let all = Versioned::<T>::deserialize(&mut reader);

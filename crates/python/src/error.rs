@@ -12,12 +12,12 @@ pyo3::create_exception!(
     PyValueError,
     "An input that ctid rejects. The message is one line that names the place and the correction."
 );
-pyo3::create_exception!(ctid, DataError, Error, "Something about records.");
+pyo3::create_exception!(ctid, DataError, Error, "An error in records.");
 pyo3::create_exception!(
     ctid,
     ModelError,
     Error,
-    "Something about a model, its parameters or its effects."
+    "An error in a model, its parameters or its effects."
 );
 
 /// The exception of an error of the program.

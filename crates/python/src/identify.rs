@@ -60,7 +60,7 @@ pub fn identify<'py>(
     let method = Method::from_str(method, false).map_err(|_| {
         let all = Method::value_variants().iter().map(|m| m.id().to_string());
         error::of_model(format!(
-            "\"{method}\" is no method: there are {}",
+            "\"{method}\" is not a method: there are {}",
             choices(all.collect())
         ))
     })?;
@@ -68,7 +68,7 @@ pub fn identify<'py>(
         let all = LevelChoice::value_variants().iter();
         let all = all.filter_map(ValueEnum::to_possible_value);
         error::of_model(format!(
-            "\"{levels}\" is no choice of levels: there are {}",
+            "\"{levels}\" is not a choice of levels: there are {}",
             choices(all.map(|v| v.get_name().to_string()).collect())
         ))
     })?;
@@ -78,14 +78,14 @@ pub fn identify<'py>(
     let delay = delay.transpose().map_err(error::of_model)?;
     if !method.is_refined() && (delay.is_some() || integrator || inputs.len() > 1) {
         return Err(error::of_model(format!(
-            "{} knows one input, no delay and no integrator: srivc and rivc do",
+            "{} supports only one input, without delay and integrator: use srivc or rivc",
             method.id()
         )));
     }
     let controller = self::controller(controller)?;
     if controller.is_some() && !method.is_of_loop() {
         return Err(error::of_model(format!(
-            "{} knows no controller: ls, iv, fcloe and recursive-fcloe do",
+            "{} does not use a controller: leave it out, or use ls, iv, fcloe or recursive-fcloe",
             method.id()
         )));
     }

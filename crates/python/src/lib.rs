@@ -9,7 +9,7 @@
 //! | a user's own model, its fit, its diagnosis | `model.rs` with its records in `own.rs`, `fit.rs`, `diagnosis.rs` |
 //! | the matrices of a model about a point | `linear.rs` |
 //! | one of the plants, its model file, its fit, its next experiment, its text | `tank_model.rs`, `tank_file.rs`, `tank.rs`, `tank_design.rs`, `tank_text.rs` |
-//! | a model beside a running plant | `monitor.rs` |
+//! | a model that runs in parallel with the plant | `monitor.rs` |
 //! | linear models from records | `identify.rs` |
 //! | recursive estimators, and output error in a loop | `rls.rs`, `oe.rs` |
 //! | published tables | `tables.rs` |

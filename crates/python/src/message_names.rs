@@ -34,7 +34,7 @@ pub const PYTHON: MessageNames = MessageNames {
     plant_experiment,
 };
 
-/// Names of arguments of `identify`, which knows one output.
+/// Names of arguments of `identify`, which fits one output.
 pub const IDENTIFY: MessageNames = MessageNames {
     fit: greybox::Names {
         records: ct_signals::Names {

@@ -1,4 +1,4 @@
-//! A model beside a running plant.
+//! A monitor: a model that runs in parallel with the plant.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -17,7 +17,7 @@ use crate::{arrays, error};
 /// `theta0`: first guess, one number for each parameter. `P0`: how little is known, symmetric and positive definite. `forgetting`: rate in 1/s, the
 /// memory is its inverse; `c` and `gamma`: weights of the step and of the information, 1 of least squares.
 ///
-/// Raises `ctid.ModelError` where these do not go together.
+/// Raises `ctid.ModelError` where these are inconsistent.
 #[pyclass(module = "ctid._ctid")]
 pub struct ContinuousRls {
     rls: Box<dyn Online>,

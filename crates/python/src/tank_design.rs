@@ -59,7 +59,7 @@ pub fn tank_design(
             &tell,
         );
         found.map_err(|error| match error {
-            // What is wrong with the limits is no fault of a record.
+            // An error in the limits is not an error of a record.
             missing_effect::Error::Design(refused) => refused.into(),
             error => error.into(),
         })

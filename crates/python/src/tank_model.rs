@@ -90,7 +90,7 @@ impl Tank {
         Ok(tank_text::spec(&self.file, &values)?.to_string())
     }
 
-    /// A monitor that runs the model beside the running plant.
+    /// A monitor that runs the model in parallel with the plant.
     fn monitor(
         &self,
         units: (String, String),

@@ -12,7 +12,7 @@ use crate::error;
 pub const WITHOUT_TEXT: &str =
     "write the balance as a model of your own, or take the tank without this effect";
 
-/// The plant's text with what is known, these values of its parameters and initial levels, and the outputs that are read.
+/// The plant's text with the known constants, the given values of its parameters and initial levels, and its measured outputs.
 ///
 /// Effects at the ports of a text have other parameters than those of the catalogue: a plant with effects needs records
 /// ([`crate::tank::TankFit`]).

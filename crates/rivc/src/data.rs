@@ -68,7 +68,7 @@ impl Data {
         self.output.iter().filter(|y| !y.is_nan()).count()
     }
 
-    /// Checks lengths, numbers and times, for so many inputs.
+    /// Checks lengths, numbers and times, and that there are this many inputs.
     pub(crate) fn validate(&self, inputs: usize) -> Result<(), Error> {
         let record = || self.name.clone();
         let length = |what: String, expected: usize, found: usize| {

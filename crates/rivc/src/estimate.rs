@@ -13,8 +13,8 @@
 //!
 //! Readings of the output may be missing anywhere. Their rows are not used; in the filters of y they are replaced by the model's output
 //! (`pass.rs`); L and R are those of autoregressions fitted exactly to the available readings ([`ArModel::fit`], [`ct_signals::Whitener`]).
-//! The estimates converge to those of maximum likelihood from these readings. If an input is not known for a while, the parts of the record
-//! are [`Data`] that continue: they share offset and noise model, and each has its own initial states.
+//! The estimates converge to those of maximum likelihood from these readings. If an input is unknown during an interval, the parts of the
+//! record are [`Data`] that continue: they share offset and noise model, and each has its own initial states.
 //!
 //! Assumptions: the plant is stable, apart from an integrator; the noise is independent of the inputs, in a loop of the reference; in a
 //! loop the input between samples follows its hold, as with a sampled controller. With a continuous-time controller it does not, and the
@@ -45,7 +45,7 @@ use crate::settings::{Noise, Settings};
 use crate::start::Start;
 use crate::{Data, Delay, Error, Structure};
 
-/// Starts from which the iteration is followed until so many have converged.
+/// Number of starts that have to converge; then no further start is tried.
 const STARTS: usize = 3;
 /// Number of repetitions of the search for neighbouring delays with the coloured noise model.
 const MOVES: usize = 4;

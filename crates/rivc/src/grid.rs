@@ -1,20 +1,20 @@
-//! Course of a delayed input between the samples: the intervals on which it is linear.
+//! A delayed input between the samples: the intervals on which it is linear.
 //!
-//! With a delay d the input is `u(t - d)`: its jumps and kinks lie between the samples, so that a step of the record falls into stretches.
-//! Steps and stretches of one length share one number, for which the filters are sampled once. Before the first sample the input is taken
-//! to have was at its first value.
+//! With a delay d the input is `u(t - d)`: its jumps and kinks lie between the samples, so that a step of the record is split into
+//! intervals. Steps and intervals of the same length share one index, for which the filters are sampled once. Before the first sample the
+//! input is assumed to have its first value.
 
 use std::collections::HashMap;
 
 use ct_lti::Hold;
 
-/// Parts of a step below this share of it are none.
+/// Parts of a step that are shorter than this share of it are ignored.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// A stretch on which an input runs on a line.
+/// An interval on which an input is linear in time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stretch {
-    /// Number of its length.
+    /// Index of its length.
     pub(crate) length: usize,
     /// Input at its beginning and end.
     pub(crate) from: f64,
@@ -46,7 +46,7 @@ impl Path {
     }
 }
 
-/// Lengths of steps and stretches, each once.
+/// Lengths of steps and intervals, each once.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Lengths {
     values: Vec<f64>,

@@ -22,7 +22,7 @@ const SHARE_OF_DELAY: f64 = 0.02;
 /// the solution of the equations is not exactly the minimum of the output error, in particular with feedback.
 const GROWTH: [f64; 2] = [0.02, 1.0];
 /// The models of the noise are estimated again while an estimate moves by more than this share of its standard error, or a standard
-/// deviation of the noise by more than that share, so many times at most.
+/// deviation of the noise by more than the second share, at most [`NOISE_UPDATES`] times.
 const SHARE_FOR_NOISE: f64 = 0.1;
 const SHARE_OF_SIGMA: f64 = 1e-3;
 const NOISE_UPDATES: usize = 12;

@@ -11,7 +11,7 @@
 //! | There is a delay, or an integrator | [`Structure::with_delay`], [`Structure::with_integrator`] |
 //! | The records are from a loop | [`Data::reference`]: the instruments come from it, and the controller need not be known |
 //! | Simulate the plant on another record | [`Plant::fitted`] |
-//! | Readings of the output are missing | they are NaN in [`Data::output`]; where inputs are not known for a while, [`Data::continues`] |
+//! | Readings of the output are missing | they are NaN in [`Data::output`]; if inputs are unknown during an interval, [`Data::continues`] |
 //! | How well do I know it? | [`Parameter::std_error`], [`Estimate::covariance`] |
 //!
 //! Time is in any one unit throughout.
@@ -60,7 +60,7 @@
 //! | the same where 30 % of the readings are missing at random, and a block of 10, n = 2, open loop and loop, white, AR(1) and AR(2) noise | in 93.0 to 97.0 %, all converged | `RECORDS=400 cargo test -p rivc --test all coverage::missing -- --nocapture` |
 //! | a record in three parts besides, between which the input is not known, one of 20 samples | in 92.2 to 95.0 % | `RECORDS=400 cargo test -p rivc --test all coverage::parts -- --nocapture` |
 //! | recovery without noise, n = 1 to 4, even and uneven times, both holds, delays, integrators, two inputs, three records | within 1e-6 | `cargo test -p rivc --test all recovery` |
-//! | bias and spread beside dsmc's SRIVC, 100 noises at 20 dB | the same to three digits | `cargo bench -p ctid-benches --bench fcloe` |
+//! | bias and spread compared with dsmc's SRIVC, 100 noises at 20 dB | the same to three digits | `cargo bench -p ctid-benches --bench fcloe` |
 
 mod bank;
 mod data;

@@ -19,7 +19,7 @@ const ORDERS: [usize; 5] = [2, 4, 8, 14, 20];
 const SAMPLES_PER_COEFFICIENT: usize = 10;
 /// Weight on each coefficient, over the number of samples, for signals of size 1.
 const RIDGE: f64 = 1e-10;
-/// A simulation further from its mean than so many times the size of the measured input is not stable.
+/// A simulation further from its mean than this many times the size of the measured input is unstable.
 const FAR: f64 = 30.0;
 
 #[derive(Debug, Clone)]

@@ -53,7 +53,7 @@ impl Model {
         core
     }
 
-    /// Whether A is Hurwitz, but for the integrator.
+    /// Whether A is Hurwitz, except for the integrator.
     pub(crate) fn is_stable(&self, structure: &Structure) -> bool {
         let mut a = self.alpha[structure.lowest()..].to_vec();
         a.push(1.0);

@@ -10,7 +10,7 @@ use crate::pass::{Instruments, Pass};
 use crate::prepared::{Paths, Prepared};
 use crate::{Error, Structure};
 
-/// A step that ends at an unstable plant, or at a larger output error, is halved so many times at most.
+/// A step that ends at an unstable plant, or at a larger output error, is halved at most this many times.
 pub(crate) const HALVINGS: usize = 12;
 /// A start is near enough where an iteration changes its mean square by no more than this share.
 const NEAR: f64 = 1e-4;

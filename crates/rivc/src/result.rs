@@ -64,7 +64,7 @@ pub struct Estimate {
     pub explained: Option<f64>,
     /// Autoregression of each record's residual, counted in its samples; one for the parts of a record.
     pub noise: Vec<ArModel>,
-    /// Root mean square of measured less simulated output over the readings that are there, on the measured inputs; output unit.
+    /// Root mean square of measured less simulated output over the available readings, on the measured inputs; output unit.
     pub residual_rms: f64,
     /// Number of samples with a residual; samples without a reading are not counted.
     pub samples: usize,

@@ -32,7 +32,7 @@ pub(crate) type Start = (f64, Model);
 
 impl Problem<'_> {
     /// The bandwidths of the first filters \[1/time\], ascending: from 10 over the longest record's duration to half the sampling rate,
-    /// three to a decade.
+    /// three per decade.
     pub(crate) fn bandwidths(&self) -> Vec<f64> {
         let duration = |time: &[f64]| time[time.len() - 1] - time[0];
         let lengths = self.records.iter().map(|r| duration(&r.time));

@@ -1,6 +1,6 @@
 //! Errors of settings and runs: each message contains the numbers that disagree and the correction.
 
-/// Everything this crate can refuse, and why a run has stopped.
+/// Errors of this crate, and the reasons why a run has stopped.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

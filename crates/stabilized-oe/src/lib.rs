@@ -1,7 +1,7 @@
 //! Recursive output error in continuous time, stabilised by an extended parameter vector. No `std`; no allocation per sample.
 //!
-//! A model runs beside the plant, on the same input; its parameters `theta^` and a filter `C^ = 1 + c_1 s + .. + c_n s^n` of its error are
-//! adapted together. The regressor comes from the model and not from the noisy output, so that noise does not bias `theta^`.
+//! A model runs in parallel with the plant, on the same input; its parameters `theta^` and a filter `C^ = 1 + c_1 s + .. + c_n s^n` of its
+//! error are adapted together. The regressor comes from the model and not from the noisy output, so that noise does not bias `theta^`.
 //!
 //! | question | answer |
 //! |---|---|
@@ -78,8 +78,8 @@
 //! | 18 | 44 | 0 |
 //! | 20, 30, 1e2, 1e3 .. 1e8 | 50 | 0 |
 //!
-//! A run that does not stop is not a good one for that: with this `eta` and these derivatives the paper's criterion is least at 15 times
-//! `P(0)`, 273 s, and above 1300 s from 30 times on.
+//! A run that does not stop may still be poor: with this `eta` and these derivatives the paper's criterion has its minimum, 273 s, at 15
+//! times `P(0)`, and exceeds 1300 s from 30 times on.
 #![no_std]
 
 #[cfg(feature = "alloc")]

@@ -10,7 +10,7 @@
 //! eps~(t) = eps~(0) d_1^{-c_p/gamma_1} d_2^{-c_p/gamma_2} e^{-l t}
 //! theta_i+ = theta_i + P_i phi_i c_p int e^{eta_i t} eps~(t)/d_i dt + c_lambda Lambda_i phi_i int eps~(t) dt
 //! ```
-//! exact but for the integrals: Gauss and Legendre's rule of 8 points in pieces of `ln(1 + (rates) t)`, scaled so that the error ends at
+//! exact except for the integrals: Gauss and Legendre's rule of 8 points in pieces of `ln(1 + (rates) t)`, scaled so that the error ends at
 //! its exact value. So no step overshoots, whatever its length.
 //!
 //! Convergence: **none is proven for `c_p > 0`.** The paper takes `V = delta' Lambda^-1 delta/2` ((4.12), (C.1)), for which

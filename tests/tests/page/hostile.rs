@@ -189,7 +189,7 @@ fn unfortunate_files_are_refused_with_the_mend() {
     // A record cannot be held out from itself.
     assert_eq!(send("one.csv", &tour()).status, 200);
     let twice = tab.post("/api/record?name=two.csv&held_out=true", &tour());
-    assert!(twice.error().contains("hold the same"), "{twice:?}");
+    assert!(twice.error().contains("have the same content"), "{twice:?}");
     // And invalid requests.
     for (path, body) in [
         ("/api/settings", "{"),

@@ -153,7 +153,7 @@ impl<'a, const P: usize, const N: usize> Search<'a, P, N> {
         self.entries = ends + self.spread * (WAY / OBEYED * self.way);
     }
 
-    /// 1 over the row's length in the metric, its terms added up; 1 where it has none.
+    /// 1 over the row's length in the metric, as the sum of its terms' absolute values; 1 if this length is zero.
     pub(super) fn unit(&self, row: usize) -> f64 {
         let scale = self.rows[row].f.abs().dot(&self.spread);
         if scale > 0.0 { 1.0 / scale } else { 1.0 }

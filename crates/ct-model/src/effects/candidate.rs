@@ -77,8 +77,8 @@ impl Candidate {
         roles.all(|role| matches!(role, Role::Size | Role::Shape))
     }
 
-    /// The candidate with a factor before every term, which is zero if the effect is absent and one if it is present; `None` if the
-    /// parameters of the candidate have such values themselves.
+    /// The candidate with a common factor on all its terms: zero if the effect is absent, one if it is present. `None` if the parameters of
+    /// the candidate themselves have values at which the effect is absent.
     ///
     /// No finite values of resistance and capacitance remove an RC pair from a model: only their limit does. The factor makes the score test
     /// possible; it is not fitted, and is used in the model of the score test only. It is the last parameter, and may be negative if another
@@ -135,7 +135,7 @@ impl Candidate {
         Some(candidate)
     }
 
-    /// What the effect is and how to confirm it, in the words of the port's domain; `None` for a candidate of the model file.
+    /// What the effect is and how to confirm it, in the terms of the port's physical domain; `None` for a candidate of the model file.
     #[must_use]
     pub fn described(&self, spec: &ModelSpec) -> Option<EffectText> {
         let effect = self.effect?;

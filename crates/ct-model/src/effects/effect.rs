@@ -113,7 +113,7 @@ pub struct Effect {
     pub symptoms: &'static [&'static str],
 }
 
-/// What an effect is and how to confirm it, in the words of the port's physical domain.
+/// What an effect is and how to confirm it, in the terms of the port's physical domain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EffectText {
     /// Physics of the effect in a sentence.
@@ -122,7 +122,7 @@ pub struct EffectText {
     pub confirm: &'static str,
 }
 
-/// Numbers of a record that the text of an effect may contain.
+/// Values from a record (ranges, means, durations) that the text of an effect may contain.
 pub(super) const RECORD_NUMBERS: [&str; 10] = [
     "low", "high", "middle", "width", "first", "begin", "zero", "duration", "interval", "balance",
 ];

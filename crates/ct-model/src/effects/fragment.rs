@@ -1,4 +1,4 @@
-//! An effect at a port, in the words of the model that it may be added to: its variables, and what it does to the equations.
+//! An effect at a port, in the names of the model that it may be added to: its variables, and what it does to the equations.
 
 use std::collections::BTreeMap;
 

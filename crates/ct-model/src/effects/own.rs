@@ -319,7 +319,7 @@ fn target(spec: &ModelSpec, name: &str) -> Result<Target, String> {
             let all = states.chain(flows.map(Variable::Flow));
             let names: Vec<&str> = all.map(|v| spec.about(v).name.as_str()).collect();
             Err(format!(
-                "`{name}` is no state, named flow or output of {}: a term is added to one of {}",
+                "`{name}` is not a state, named flow or output of {}: a term is added to one of {}",
                 spec.name,
                 names.join(", ")
             ))

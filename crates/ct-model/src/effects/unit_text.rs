@@ -13,7 +13,7 @@ pub(super) fn quotient(a: &str, b: &str) -> String {
     composed(a, b, -1)
 }
 
-/// The product of two units, as [`quotient`] has it.
+/// The product of two units, in the form of [`quotient`].
 pub(super) fn product(a: &str, b: &str) -> String {
     composed(a, b, 1)
 }

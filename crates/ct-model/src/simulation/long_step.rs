@@ -23,7 +23,7 @@ const FIRST_INTERVALS: f64 = 8.0;
 const MOST_INTERVALS: f64 = 1000.0;
 /// The most intervals before the next attempt.
 const MOST_WAITING: u32 = 64;
-/// By how much of a step a sample may lie beyond its end, by rounding.
+/// Share of a step by which a sample may be after its end because of rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// The present long step.

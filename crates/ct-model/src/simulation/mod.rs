@@ -58,7 +58,7 @@ pub enum Method {
 /// The simulation has failed: a state grows beyond all bounds, or an equation has no value.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "the simulation cannot go on beyond time {time}: a state grows without bound, or an equation has no value there"
+    "the simulation cannot continue after time {time}: a state grows without bound, or an equation has no value there"
 )]
 pub struct NoSolution {
     /// Time of the failure \[unit of the record's time\].

@@ -347,7 +347,7 @@ impl Compiler<'_> {
     }
 }
 
-/// The whole number that an exponent is.
+/// The value of an exponent, if it is an integer constant.
 fn whole(exponent: &Expression) -> Option<i32> {
     let value = match exponent {
         Expression::Number(value) => *value,

@@ -272,7 +272,7 @@ impl Parser<'_> {
                 && !KEYWORDS.contains(&name.as_str())
             {
                 return self.error(format!(
-                    "{} is no type of the subset: write `Real`, with the unit in brackets",
+                    "{} is not a type of the subset: write `Real`, with the unit in brackets",
                     shown(name)
                 ));
             }

@@ -77,13 +77,9 @@ fn unknown_units(text: &str, syntax: &Syntax) -> Vec<TextError> {
         Attribute::Text(unit) if name == "unit" => {
             let word = unknown_word(unit)?;
             let what = if word == *unit {
-                format!("unit {} is no unit that is known", shown(unit))
+                format!("unit {} is unknown", shown(unit))
             } else {
-                format!(
-                    "{} in the unit {} is no unit that is known",
-                    shown(word),
-                    shown(unit)
-                )
+                format!("{} in the unit {} is unknown", shown(word), shown(unit))
             };
             let mend = "write one, as `W/(m2.K)`, or leave it out";
             Some(TextError::at(text, *from, format!("{what}: {mend}")))

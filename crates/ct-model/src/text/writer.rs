@@ -240,7 +240,7 @@ fn declared(about: &About, more: &[(&str, String)]) -> String {
 }
 
 impl Display for ModelSpec {
-    /// The model as Modelica. It reads back as the same model, but for comments and the order of its flows.
+    /// The model as Modelica. It reads back as the same model, except for comments and the order of its flows.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         writeln!(f, "model {}{}", self.name, description(&self.description))?;
         for parameter in &self.parameters {

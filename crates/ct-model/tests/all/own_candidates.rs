@@ -174,7 +174,7 @@ fn what_is_wrong_is_said_with_its_place() {
     );
     refused(
         &own(&e, &[("k", "-e*T")]),
-        "radiation.terms.k: `k` is no state, named flow or output of Block: a term is added to one of T, y, loss",
+        "radiation.terms.k: `k` is not a state, named flow or output of Block: a term is added to one of T, y, loss",
     );
     refused(
         &own(&e, &[("T", "-2*T")]),

@@ -236,7 +236,7 @@ fn attributes() {
     refuses(
         "  Real q(unt=\"m\") = x;",
         10,
-        "`unt` is no attribute",
+        "`unt` is not an attribute",
         "unit",
     );
     refuses(
@@ -260,7 +260,7 @@ fn attributes() {
     refuses(
         "  Real q(min=x) = x;",
         14,
-        "`x` is no parameter",
+        "`x` is not a parameter",
         "only numbers and parameters",
     );
     refuses(
@@ -310,7 +310,7 @@ fn outside_the_subset() {
         "`.` has no meaning",
         "packages",
     );
-    refuses("  Resistor r;", 3, "`Resistor` is no type", "`Real`");
+    refuses("  Resistor r;", 3, "`Resistor` is not a type", "`Real`");
     refuses(
         "  extends Base;",
         3,

@@ -98,7 +98,7 @@ end Tank;";
     assert_eq!(
         found,
         [
-            (3, 22, "unit `bananas` is no unit "),
+            (3, 22, "unit `bananas` is unknown:"),
             (10, 3, "units in the equation of b"),
             (11, 3, "units in the equation of h"),
             (5, 28, "units in the start value o"),

@@ -1,4 +1,4 @@
-//! Burg's method: the reflection coefficients of several stretches at once, and the order that the record supports.
+//! Burg's method: the reflection coefficients of several segments at once, and the order that the record supports.
 
 use super::{ArModel, MARGIN, NEGLIGIBLE, check_not_infinite};
 use crate::{Error, ar_missing};
@@ -7,11 +7,11 @@ use crate::{Error, ar_missing};
 const SAMPLES_PER_COEFFICIENT: usize = 5;
 
 impl ArModel {
-    /// Fits a process to one or several independent stretches of a signal, of order 0 to
+    /// Fits a process to one or several independent segments of a signal, of order 0 to
     /// `max_order`; orders with fewer than 5 samples for each coefficient are left out.
     ///
     /// NaN stands for a sample that is missing. Where none is, the fit is Burg's; where some are, it maximises the exact
-    /// likelihood of those that are there, and the order is chosen by the same criterion with `N` their number. Of the
+    /// likelihood of the available ones, and the order is chosen by the same criterion with `N` their number. Of the
     /// processes that a regular decimation does not distinguish (every second sample only: of either sign), it is the
     /// slower one. Missing samples at a segment's ends take no part.
     ///
@@ -60,7 +60,7 @@ impl ArModel {
     }
 
     /// The autoregression after a system that is known, of which samples may be missing (NaN): at the maximum of the exact likelihood of
-    /// those that are there, its order by the criterion of [`ArModel::fit`].
+    /// the available ones, its order by the criterion of [`ArModel::fit`].
     ///
     /// `process` makes the process of both, from an autoregression whose innovations have variance 1 and the segment's number.
     ///
@@ -81,7 +81,7 @@ impl ArModel {
     }
 }
 
-/// The largest order for so many samples.
+/// The largest order that this number of samples allows.
 fn largest_order(asked: usize, samples: usize) -> Result<usize, Error> {
     if samples == 0 {
         return Err(Error::TooFewSamples {

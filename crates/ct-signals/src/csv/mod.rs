@@ -69,8 +69,8 @@ pub struct Reading {
 /// Reads a record; `columns` says which column is what.
 ///
 /// The time is converted to seconds. Its steps may vary. Samples may be missing, and are NaN then; rows may be missing
-/// ([`Record::without_gaps`]). Row numbers in messages are line numbers of the file. Whether the input moves says
-/// [`Record::require_moving_input`].
+/// ([`Record::without_gaps`]). Row numbers in messages are line numbers of the file.
+/// [`Record::require_moving_input`] checks whether the input changes.
 ///
 /// # Errors
 /// [`ReadError::CannotOpen`], [`ReadError::Folder`], [`ReadError::NotText`], [`ReadError::EmptyFile`],
@@ -87,7 +87,7 @@ pub fn read_csv(path: &Path, columns: &Columns, options: &ReadOptions) -> Result
 /// that are present may be constant.
 ///
 /// # Errors
-/// As [`read_csv`], but for what is wrong with outputs alone.
+/// As [`read_csv`], except for what is wrong with outputs alone.
 pub fn read_inputs_csv(
     path: &Path,
     columns: &Columns,
@@ -115,7 +115,7 @@ fn read(
 /// As [`read_csv`], from the content of a file; `file` names it in messages and is the record's name.
 ///
 /// # Errors
-/// As [`read_csv`], but for those of opening.
+/// As [`read_csv`], except for those of opening.
 pub fn parse_csv(
     file: &str,
     content: &[u8],
@@ -128,7 +128,7 @@ pub fn parse_csv(
 /// As [`read_inputs_csv`], from the content of a file; `file` names it in messages and is the record's name.
 ///
 /// # Errors
-/// As [`read_inputs_csv`], but for those of opening.
+/// As [`read_inputs_csv`], except for those of opening.
 pub fn parse_inputs_csv(
     file: &str,
     content: &[u8],

@@ -26,8 +26,8 @@ pub(super) struct Start {
 }
 
 impl Start {
-    /// Finds the header: the first row of words with as many fields as the first row of numbers below it. Where there is none it is the
-    /// first row, and what is wrong there is said of that row.
+    /// Finds the header: the first row of words with as many fields as the first row of numbers below it. If there is no such row, it is
+    /// the first row, and errors refer to that row.
     pub fn of(text: &str) -> Self {
         let usual = delimiter(text);
         let text = beginning(text);

@@ -50,7 +50,7 @@ pub struct ReadSummary {
     /// The header of the time.
     #[serde(skip)]
     pub time_header: String,
-    /// Whether the times are in seconds for want of a unit, and look like days: the numbers that spreadsheets have for dates.
+    /// Whether the times count as seconds because they have no unit, but look like days: the numbers that spreadsheets have for dates.
     pub looks_like_days: bool,
     /// Rows outside the required range of time.
     pub outside: usize,

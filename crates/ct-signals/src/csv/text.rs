@@ -99,7 +99,7 @@ pub(super) fn is_before_header(row: &StringRecord) -> bool {
     (first.is_empty() || first == DELIMITER_KEY) && cells.all(str::is_empty)
 }
 
-/// A header names so many columns at most.
+/// Checks that a header has at most [`MOST_COLUMNS`] columns.
 pub(crate) fn check_width(file: &str, row: u64, found: usize) -> Result<(), Error> {
     if found > MOST_COLUMNS {
         return Err(Error::Read(ReadError::ManyColumns {

@@ -17,7 +17,7 @@ use crate::{
 /// Format of a time column.
 #[derive(Debug, Clone)]
 pub(crate) enum Times {
-    /// Numbers, so many seconds for one.
+    /// Numbers, and the number of seconds in one unit of them.
     Numbers(f64),
     /// Dates and times, counted from the first row.
     Dates {

@@ -24,7 +24,7 @@ impl Error {
                 format!("{limit} \"{text}\": {mend}")
             }
             Self::EmptyPart { text } => {
-                format!("{to} \"{text}\": it is not behind {from}: give a later one")
+                format!("{to} \"{text}\": it is not after {from}: give a later one")
             }
             Self::Resampled {
                 record,
@@ -187,7 +187,7 @@ impl CellMend {
             }
             Self::TimeAsNumber => crate::csv::TIME_AS_NUMBER.to_string(),
             Self::Declared => format!(
-                "{columns} says that it stands for a missing sample; leave out {strict} to read on over it"
+                "{columns} says that it stands for a missing sample; leave out {strict} to accept missing samples"
             ),
             Self::Strict => format!(
                 "correct the cell, or leave out {strict} where it says that the sample is missing"

@@ -19,7 +19,7 @@ pub enum TimestampError {
     NoCells,
     /// The first cell has no form that is known.
     #[error(
-        "\"{text}\" is no date or time that is understood; say how it is written with time_format, such as \"%d.%m.%Y %H:%M:%S\", or give the time as a number"
+        "\"{text}\" is not a recognised date or time; give its format with time_format, such as \"%d.%m.%Y %H:%M:%S\", or give the time as a number"
     )]
     UnknownForm {
         /// The cell.
@@ -27,7 +27,7 @@ pub enum TimestampError {
     },
     /// Day and month cannot be distinguished.
     #[error(
-        "\"{text}\" has two meanings, and no date of the column says which number is the day; set time_format = \"{day_first}\" or \"{month_first}\""
+        "\"{text}\" is ambiguous: no date in the column shows which number is the day; set time_format = \"{day_first}\" or \"{month_first}\""
     )]
     DayOrMonth {
         /// The cell.
@@ -86,7 +86,7 @@ pub enum TimestampError {
         zone: String,
     },
     /// A bound given by the user is not understood.
-    #[error("\"{text}\" is no date that has one meaning; write 2026-01-31 or \"2026-01-31 14:25\"")]
+    #[error("\"{text}\" is not an unambiguous date; write 2026-01-31 or \"2026-01-31 14:25\"")]
     UnknownBound {
         /// What was given.
         text: String,

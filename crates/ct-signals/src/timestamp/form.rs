@@ -59,7 +59,7 @@ pub(super) enum Fault {
 }
 
 impl Form {
-    /// The form of a cell; `None` where it is no date or time that is understood.
+    /// The form of a cell; `None` if it is not a recognised date or time.
     pub(super) fn of(cell: &str) -> Option<Form> {
         let bytes = cell.as_bytes();
         let at = |index: usize| bytes.get(index).copied().unwrap_or(0);
@@ -103,7 +103,7 @@ impl Form {
         first_numbers(cell).is_some_and(|(first, second)| first == second)
     }
 
-    /// Whether a cell of this form has two meanings.
+    /// Whether a cell of this form is ambiguous.
     pub(super) fn is_ambiguous(&self, cell: &str) -> bool {
         matches!(self.date, DateForm::Undecided(_))
             && Self::day_first(cell).is_none()

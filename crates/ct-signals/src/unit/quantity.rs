@@ -60,7 +60,7 @@ impl Unit {
     ///
     /// Understood are symbols with SI prefixes (`mV`, `kPa`, `µs`) and many names in full (`litres`), powers (`m3`, `m^3`, `m³`, `s-1`),
     /// products with `*`, `.`, `·` or a blank, and quotients; `1` and `-` are pure numbers. Several factors below a stroke need brackets,
-    /// `J/(kg K)`: `J/kg K` is not understood, as it has two meanings. `C` and `F` are temperatures, gallons those of the US.
+    /// `J/(kg K)`: `J/kg K` is not accepted, because it is ambiguous. `C` and `F` are temperatures, gallons those of the US.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();

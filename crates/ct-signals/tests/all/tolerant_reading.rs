@@ -180,7 +180,7 @@ fn a_part_is_read_by_dates_and_by_numbers() {
         &numbers,
         &default,
         &part("30", "25"),
-        &["`to`", "not behind `from`"],
+        &["`to`", "not after `from`"],
     );
     refused(
         &numbers,

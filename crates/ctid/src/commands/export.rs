@@ -75,7 +75,7 @@ impl Export {
         bar.clear();
         let (exported, summaries) = exported?;
         let said = match &exported.fitted_to[..] {
-            [] => format!("{} as its text and [known] have it", exported.model),
+            [] => format!("{} with the values of its text and [known]", exported.model),
             records => format!("{} fitted to {}", exported.model, records.join(", ")),
         };
         let warnings = exported.warnings.iter();

@@ -55,7 +55,7 @@ pub struct Arguments {
     /// Limit on the time of the search; the result lists the steps that were left out
     #[arg(long, value_enum, default_value_t = EffortLevel::Normal, value_name = "LEVEL")]
     effort: EffortLevel,
-    /// Where the experiment goes as CSV, if one is worth applying; without it next.csv, or next-2.csv where that is there
+    /// CSV file for the experiment, if one is worth applying; by default next.csv, or next-2.csv if that exists
     #[arg(long, value_name = "F.csv")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -264,7 +264,7 @@ impl Arguments {
         let one = |option: &str| {
             alone.clone().ok_or_else(|| {
                 Error::Usage(format!(
-                    "{option}: {} has the inputs {}; name the one that it is of with --input NAME",
+                    "{option}: {} has the inputs {}; choose one with --input NAME",
                     model.base.name,
                     all.join(", ")
                 ))

@@ -25,7 +25,7 @@ impl Findings {
         let (spec, functions) = (&model.base, &model.effects.functions);
         if self.model != spec.name {
             return Err(refuse(format!(
-                "the result is of the model {}, and this file has {}: give a result of this model",
+                "the result is for model {}, but this file has {}: give a result of this model",
                 self.model, spec.name
             )));
         }
@@ -107,7 +107,7 @@ impl Findings {
     }
 }
 
-/// Whether a name may become that of a term: no effect has it, it has no port, and it is none of the catalogue, whose effects need one.
+/// Whether a name may become that of a term: no effect has it, it names no port, and it is not in the catalogue, whose effects need a port.
 fn is_free(all: &[Candidate], id: &str) -> bool {
     !id.contains('(')
         && !all_effects().any(|effect| effect.id == id)

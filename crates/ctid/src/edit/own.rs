@@ -57,7 +57,7 @@ impl Findings {
     /// Reads a result.
     ///
     /// # Errors
-    /// Where the file is none of a diagnosis or a comparison of a user's own model.
+    /// If the file is not the result of a diagnosis or a comparison of a user's own model.
     pub fn read(path: &Path) -> Result<Self, Error> {
         Self::of_text(&read_text(path)?).map_err(|what| Error::file(path, what))
     }
@@ -77,7 +77,7 @@ impl Findings {
         }
         serde_json::from_str(text).map_err(|error| {
             format!(
-                "this is no result of a model of your own: give what `ctid diagnose --json` wrote ({error})"
+                "this is not a result of a model of your own: give what `ctid diagnose --json` wrote ({error})"
             )
         })
     }

@@ -252,7 +252,7 @@ pub(super) fn check_levels<'a>(
     Err(Error::File {
         file: record.name.clone(),
         what: format!(
-            "column \"{}\" falls to {}{unit}, but {} lets out by the square root of the level, which is not below zero: \
+            "column \"{}\" falls to {}{unit}, but {} has an outflow that depends on the square root of the level, which is not below zero: \
              add the height of the sensor's zero above the outlet to the readings, choose a linear plant, or, where the \
              offset is to be fitted, run `ctid add sensor_offset`",
             output.name,

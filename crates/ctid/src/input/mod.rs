@@ -130,14 +130,14 @@ fn of_isolated(summary: &ReadSummary, far: &IsolatedReadings) -> String {
     };
     let correction = if far.is_code {
         format!(
-            "write missing = [\"{}\"] under [columns], with the number as the file has it",
+            "write missing = [\"{}\"] under [columns], with the number as written in the file",
             ct_signals::shown(far.value)
         )
     } else {
         "empty the cells".to_string()
     };
     format!(
-        "{}, column {}: {what} far from the others, {} at {at} between {} and {}: if it is no measurement, {correction}",
+        "{}, column {}: {what} far from the others, {} at {at} between {} and {}: if it is not a measurement, {correction}",
         summary.file,
         quoted(&far.column),
         shown(far.value),

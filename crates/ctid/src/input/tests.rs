@@ -104,7 +104,7 @@ fn a_level_below_the_outlet_is_refused_where_its_root_is_taken() {
             vec![record("b.csv", 50, "cm")],
             vec![lowered(30.0)]
         ),
-        "a.csv: column \"y\" falls to -28.0 cm, but single-tank lets out by the square root of the level, which is not \
+        "a.csv: column \"y\" falls to -28.0 cm, but single-tank has an outflow that depends on the square root of the level, which is not \
              below zero: add the height of the sensor's zero above the outlet to the readings, choose a linear plant, or, \
              where the offset is to be fitted, run `ctid add sensor_offset`"
     );

@@ -103,7 +103,7 @@ impl Source<'_> {
         for (key, word) in of_own {
             if let Some(word) = word {
                 let what = format!(
-                    "{key} is no setting of the controller of a plant: write it under [columns]"
+                    "{key} is not a setting of the controller of a plant: write it under [columns]"
                 );
                 return Err(self.at(word.span().start, what));
             }

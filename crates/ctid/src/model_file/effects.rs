@@ -220,7 +220,7 @@ pub(crate) fn vessel(
             let names = (0..places).filter_map(name);
             let names: Vec<String> = names.map(|name| format!("\"{name}\"")).collect();
             format!(
-                "where = \"{}\" is no {kind}; write {}",
+                "where = \"{}\" is not a {kind}; write {}",
                 quoted(word),
                 names.join(" or ")
             )

@@ -133,7 +133,7 @@ impl<'a> Session<'a> {
         for (before, now) in pairs {
             if !now.is_empty() && !before.is_empty() && now != before {
                 return Err(Error::Usage(format!(
-                    "{INPUT}, row {}: the header comes again with [{}] where it was [{}], and the model was learned in that; convert the rows, or start again",
+                    "{INPUT}, row {}: the header is repeated with [{}] instead of [{}], in which the model was learned; convert the rows, or start again",
                     self.line,
                     quoted(now),
                     quoted(before)
@@ -287,7 +287,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Why a line is not used, in the words of the program.
+/// Why a line is not used, in the terms of the program.
 fn said(bad: &BadLine) -> String {
     bad.worded(&MessageNames::PROGRAM.fit.records)
 }

@@ -102,12 +102,12 @@ impl Session<'_> {
                     String::new()
                 };
                 let blocks = if *every > 1 {
-                    format!(", watched in means of {every} rows")
+                    format!(", monitored as means of {every} rows")
                 } else {
                     String::new()
                 };
                 format!(
-                    "learned from {rows} rows: slowest time constant {} s, noise {} rms{blocks}; watching from here on{deaf}",
+                    "learned from {rows} rows: slowest time constant {} s, noise {} rms{blocks}; monitoring starts now{deaf}",
                     significant(*time_constant, 4),
                     noise
                         .iter()

@@ -71,7 +71,7 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
         Ok(metadata) => metadata,
     };
     if !metadata.is_file() {
-        return Err(not_ours("it is no file".to_string()));
+        return Err(not_ours("it is not a file".to_string()));
     }
     if metadata.len() > LARGEST {
         return Err(not_ours(format!(
@@ -88,12 +88,12 @@ pub(super) fn read(path: &Path, model: &Path) -> Result<Option<State>, Error> {
         not_ours(if head.is_ok_and(|head| head.written_by == WRITTEN_BY) {
             format!("another version of `ctid monitor` wrote it, or it is damaged ({why})")
         } else {
-            format!("it is no state that `ctid monitor` wrote ({why})")
+            format!("it is not a state file of `ctid monitor` ({why})")
         })
     })?;
     if read.written_by != WRITTEN_BY {
         return Err(not_ours(
-            "it is no state that `ctid monitor` wrote".to_string(),
+            "it is not a state file of `ctid monitor`".to_string(),
         ));
     }
     if read.checksum != checksum(&read.state).map_err(|error| not_ours(error.to_string()))? {
@@ -140,6 +140,6 @@ pub(super) fn write(path: &Path, state: &State) -> Result<(), Error> {
     }
     Err(Error::file(
         path,
-        "it is no state of `ctid monitor` any more, or cannot be read, so that the state was not saved; move it away",
+        "it is no longer a state file of `ctid monitor`, or cannot be read, so the state was not saved; move it away",
     ))
 }

@@ -45,7 +45,7 @@ pub(super) fn read(
             source.at(
                 at,
                 format!(
-                    "{} is no {what} of {}: it has {}{}",
+                    "{} is not an {what} of {}: it has {}{}",
                     quoted(name),
                     spec.name,
                     known.join(", "),
@@ -164,11 +164,11 @@ mod tests {
         for (text, said) in [
             (
                 format!("[controller.w]\noutput = \"y\"\n{pi}"),
-                "m.toml:4: w is no input of A: it has u, d",
+                "m.toml:4: w is not an input of A: it has u, d",
             ),
             (
                 format!("[controller.u]\noutput = \"x\"\n{pi}"),
-                "m.toml:5: x is no output of A: it has y, z",
+                "m.toml:5: x is not an output of A: it has y, z",
             ),
             (
                 format!("[controller.u]\n{pi}"),

@@ -234,7 +234,7 @@ fn listed(file: &OwnModelFile, design: &Design, look: Look) -> String {
     text::listed(&title, (&sides, &rows), design.experiments.len(), look)
 }
 
-/// Course of the inputs that change.
+/// Sequences of the inputs that change.
 fn applied(design: &Design, experiment: &Experiment) -> String {
     let inputs = experiment.inputs.iter();
     let inputs: Vec<String> = inputs.map(|own| sequence_words(design, own)).collect();
@@ -343,7 +343,9 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         all.push(format!("Hold {}.", held.join(", ")));
     }
     if let Some(times) = design.times_as_long.filter(|_| !design.twins()) {
-        all.push(format!("Repeated {times} times it would decide."));
+        all.push(format!(
+            "Applied {times} times, it would decide between them."
+        ));
     }
     let known = design.control_loop.iter();
     all.extend(known.map(|known| file.loop_sentence(known, &MessageNames::PROGRAM)));

@@ -204,7 +204,7 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
     all
 }
 
-/// Outputs with correlated noise, which may be more than noise.
+/// Outputs with a correlated residual, which may not be noise alone.
 fn correlated(diagnosis: &Diagnosis) -> Option<String> {
     let correlated = diagnosis.noise.iter().filter_map(|noise| {
         let predictable = noise.predictable();
@@ -260,7 +260,7 @@ fn said_of(left: &NotNoise) -> String {
             from,
             to,
         } => format!(
-            "the residual of {output} in {record} from {} to {} is larger than noise with its correlation would be: a disturbance for a while",
+            "the residual of {output} in {record} from {} to {} is larger than noise with its correlation would be: a temporary disturbance",
             ct_signals::duration(*from),
             ct_signals::duration(*to)
         ),

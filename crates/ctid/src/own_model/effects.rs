@@ -18,7 +18,7 @@ pub(crate) const RECORD: &str = "record";
 /// The key of the parameters that are not fitted.
 const FIXED: &str = "fixed";
 
-/// Numbers of a record that the effects contain, by the effects' identifiers.
+/// Values from a record (ranges, means, durations) that the effects' equations contain: by the effect's identifier, then by name.
 pub type RecordNumbers = BTreeMap<String, BTreeMap<String, f64>>;
 
 /// The effects of a model file.
@@ -178,7 +178,7 @@ pub(crate) fn find<'c>(
         ),
     };
     Err(format!(
-        "\"{}\" is no effect that can act in {}: `ctid effects --model` lists them{where_it_acts}{near}",
+        "\"{}\" is not an effect that can act in {}: `ctid effects --model` lists them{where_it_acts}{near}",
         quoted(written),
         spec.name
     ))
@@ -202,7 +202,7 @@ fn settings(
         let near = names::suggestion(name, known);
         Err(source.at(
             at,
-            format!("{} is no {what} of {id}: {may}{near}", quoted(name)),
+            format!("{} is not a {what} of {id}: {may}{near}", quoted(name)),
         ))
     };
     let mut kept = Kept::default();

@@ -28,11 +28,11 @@ use crate::model_file::{self, ModelFile};
 pub struct OwnModelFile {
     /// The file's name.
     pub name: String,
-    /// The model as its text has it.
+    /// The model as written in its text.
     pub base: ModelSpec,
     /// The model; after [`OwnModelFile::mended`], the model with its effects.
     pub model: Model,
-    /// Numbers of a record that the effects in the model contain.
+    /// Values from a record (ranges, means, durations) that the equations of the effects in the model contain.
     pub effects: OwnEffects,
     /// What of a record the effects in the model are written in.
     pub record_numbers: RecordNumbers,
@@ -136,7 +136,7 @@ impl AnyModelFile {
             (Self::Plant(_), []) => Err(Error::file(
                 path,
                 format!(
-                    "a model file of a plant holds first guesses, no values: give the records that it is fitted to, {option}"
+                    "a model file of a plant contains initial values, not fitted ones: give the records to fit it to, {option}"
                 ),
             )),
             _ => Ok(()),
@@ -234,7 +234,7 @@ impl OwnModelFile {
     /// Records in the form of the model, of which the first `fitted` ones are fitted; `time_unit`: seconds in one unit of the model's time.
     ///
     /// # Errors
-    /// Where a column's unit is none of its signal.
+    /// If the unit of a column has another dimension than its signal.
     pub fn gathered(
         &self,
         mut all: Vec<Reading>,
@@ -316,7 +316,7 @@ impl OwnModelFile {
         spec.about_inputs().chain(spec.about_outputs())
     }
 
-    /// Unit of an input or output; empty if there is none of this name.
+    /// Unit of an input or output; empty if none has this name.
     pub(crate) fn unit_of(&self, signal: &str) -> &str {
         let own = self.signals().find(|about| about.name == signal);
         own.map_or("", |about| about.unit.as_str())

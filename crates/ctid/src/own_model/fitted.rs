@@ -130,7 +130,7 @@ impl FittedModel {
     /// Restores a saved fit of this model to these records.
     ///
     /// # Errors
-    /// Where it is none of this model and these records.
+    /// If it is not a fit of this model to these records.
     pub fn of_fit(
         file: &OwnModelFile,
         records: Records,

@@ -61,7 +61,7 @@ impl<T: Serialize> Found for Paged<'_, T> {
 pub struct Document {
     /// Curves and tables.
     pub diagnosis: Diagnosis,
-    /// The findings in sentences, in the words of the model; empty of a comparison.
+    /// The findings in sentences, with the names of the model; empty for a comparison.
     pub sentences: Vec<String>,
     /// The unexplained error, as a function at a port.
     pub(crate) term: Option<MissingTerm>,

@@ -249,7 +249,7 @@ fn runs_away(setup: &ModelSetup, record: &Record, path: &Path, x: &[f64], model:
     Error::file(
         path,
         format!(
-            "the simulation of {model} does not go on behind {at}: a state grows without bound, or an equation has no value there; correct the inputs there, the parameters' values, or the model's text"
+            "the simulation of {model} cannot continue after {at}: a state grows without bound, or an equation has no value there; correct the inputs there, the parameters' values, or the model's text"
         ),
     )
 }

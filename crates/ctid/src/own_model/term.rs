@@ -61,7 +61,7 @@ pub(crate) fn function<'c>(
         .ok_or_else(|| {
             let near = names::suggestion(&id, shapes().map(|candidate| candidate.id.as_str()));
             format!(
-                "\"{}\" is no smooth function at a port of {}: take the one that `ctid diagnose` names{near}",
+                "\"{}\" is not a smooth function at a port of {}: take the one that `ctid diagnose` names{near}",
                 quoted(written),
                 spec.name
             )

@@ -57,7 +57,7 @@ fn headline(study: &Study) -> String {
         "<header>\n<p class=\"kicker\">ctid report · A. Baysse, F. J. Carrillo, A. Habbadi: output error in closed loop</p>\n\
          <h1>Tables I and II: {} of {} figures of the runs inside the bands</h1>\n\
          <div class=\"verdict\"><p>A tank level in a loop, identified by least squares, by instruments, and by output error of the loop itself. \
-         {} runs of each table, each with another noise.</p></div>\n\
+         {} runs of each table, each with another noise realisation.</p></div>\n\
          <ol class=\"trail apart\">\n\
          {}{}{}</ol>\n{outside}\
          <ul>\n{}</ul>\n\

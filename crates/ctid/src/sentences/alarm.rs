@@ -41,7 +41,10 @@ pub fn of_alarm(alarm: &Alarm, domain: Option<Domain>, axis: &TimeAxis) -> Strin
     }
     let most = alarm.output.as_ref().map_or(String::new(), |output| {
         let the = if domain.is_some() { "the " } else { "" };
-        format!("; it shows most at {the}{}", output_words(output, domain))
+        format!(
+            "; the misfit is largest at {the}{}",
+            output_words(output, domain)
+        )
     });
     let score = format!(
         "(score {:.1}, threshold {:.1})",
@@ -191,16 +194,16 @@ mod tests {
         };
         assert_eq!(
             of_alarm(&alarm, None, &axis),
-            "The model does not fit since about t = 4000 s (score 5.7, threshold 5.4); it shows most at output lower."
+            "The model does not fit since about t = 4000 s (score 5.7, threshold 5.4); the misfit is largest at output lower."
         );
         alarm.since = None;
         assert_eq!(
             of_alarm(&alarm, None, &axis),
-            "The model does not fit since t = 4050 s or before (score 5.7, threshold 5.4); it shows most at output lower."
+            "The model does not fit since t = 4050 s or before (score 5.7, threshold 5.4); the misfit is largest at output lower."
         );
         assert_eq!(
             of_alarm(&alarm, Some(Domain::Hydraulic), &axis),
-            "The model has not fitted since about t = 4050 s or before, and no effect of the catalogue explains it (score 5.7, threshold 5.4); it shows most at the sensor of the lower tank."
+            "The model has not fitted since about t = 4050 s or before, and no effect of the catalogue explains it (score 5.7, threshold 5.4); the misfit is largest at the sensor of the lower tank."
         );
     }
 

@@ -216,7 +216,9 @@ pub fn of_design(design: &Design) -> Vec<String> {
             }
         ));
         if let Some(times) = design.times_as_long {
-            said.push(format!("Repeated {times} times it would decide."));
+            said.push(format!(
+                "Applied {times} times, it would decide between them."
+            ));
         }
     }
     if design.overfull > 0 {
@@ -230,7 +232,7 @@ pub fn of_design(design: &Design) -> Vec<String> {
     }
     if design.limited > 0 {
         said.push(format!(
-            "{} left out: the controller would come to a limit, where the loop is open.",
+            "{} left out: the controller would reach a limit, which opens the loop.",
             match design.limited {
                 1 => "One experiment was".to_string(),
                 n => format!("{n} experiments were"),

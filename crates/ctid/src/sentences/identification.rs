@@ -43,7 +43,7 @@ pub fn of_violation(violation: &Violation, method: Method) -> String {
             let why = match method {
                 Method::CtRls | Method::Ls => "noise may bias it",
                 Method::StabilizedOe | Method::RecursiveFcloe => {
-                    "the plant may have changed, or it has not converged"
+                    "the plant may have changed, or the estimates have not converged"
                 }
                 Method::Iv | Method::Fcloe | Method::Srivc | Method::Rivc => {
                     "the plant may not be linear, or of this order"

@@ -6,7 +6,7 @@ use missing_effect::{Diagnosis, NotNoise, PerOutput, Step};
 use super::rms;
 use crate::numbers::significant;
 
-/// Structure in the residual of a step, as the end of a sentence.
+/// Why the residual of a model (a step of the diagnosis) is not noise, as the end of a sentence.
 pub(super) fn left_over(left: &NotNoise, step: &Step, diagnosis: &Diagnosis) -> String {
     let effect = if diagnosis.searched() {
         "an effect outside the catalogue"

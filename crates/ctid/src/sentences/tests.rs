@@ -244,7 +244,7 @@ fn a_loop_that_is_not_simulated_says_why() {
                 record: record.clone(),
             },
             None,
-            ["rig: the record holds no reference", "[columns]"],
+            ["rig: the record has no reference", "[columns]"],
         ),
         (
             NotSimulated::ConstantReference {

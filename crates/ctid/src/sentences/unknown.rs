@@ -93,7 +93,7 @@ pub(super) fn of_unknown(unknown: &Unknown, clock: &Clock, domain: Domain) -> St
                 );
             }
         }
-        None => said += "; no simple shape comes near",
+        None => said += "; no simple shape fits",
     }
     said + "."
 }

@@ -66,7 +66,7 @@ pub fn of_warning(warning: &Warning) -> String {
             let several = match inputs {
                 1 => "",
                 _ => {
-                    " (one A serves all inputs, so that time constants that differ need a higher order)"
+                    " (all inputs share one A, so different time constants need a higher order)"
                 }
             };
             format!(
@@ -95,7 +95,7 @@ pub fn of_warning(warning: &Warning) -> String {
             significant(*delay, 4)
         ),
         Warning::ConstantReference { reference } => format!(
-            "\"{}\" is constant: if a controller moved the input, these estimates, which take it for open loop, are biased",
+            "\"{}\" is constant: if a controller moved the input, these estimates are biased, because they assume open loop",
             quoted(reference)
         ),
         Warning::BeyondRecord {

@@ -366,7 +366,9 @@ fn with_effects(session: &Session, effects: &[(String, Option<String>)]) -> Resu
 fn beside(session: &Session, group: usize, between: &[String; 2]) -> Result<String, Refusal> {
     let name = session.model_name();
     let Some(of) = &session.diagnosis else {
-        return Err(Refusal::input("nothing was diagnosed yet; diagnose first"));
+        return Err(Refusal::input(
+            "there is no diagnosis yet; run a diagnosis first",
+        ));
     };
     let mut text = of.text.clone();
     for (k, step) in of.found.steps.iter().skip(1).enumerate() {

@@ -196,7 +196,7 @@ impl Work {
         }
     }
 
-    /// Puts what came out where the page finds it.
+    /// Stores the result for the page.
     pub(super) fn settle(self, session: &mut Session, found: &Comparison) {
         let id = session.number();
         let shown = report::compared(&self.model, &self.records, found);

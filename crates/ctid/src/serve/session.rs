@@ -160,7 +160,7 @@ impl Session {
         let Some(path) = &self.file else { return };
         let read = match model_file::read_text(path) {
             Ok(text) if text.len() > LARGEST_MODEL => Err(format!(
-                "{}: this is no model file: it is larger than 1 MB",
+                "{}: this is not a model file: it is larger than 1 MB",
                 path.display()
             )),
             read => read.map_err(|error| error.to_string()),
@@ -301,7 +301,7 @@ impl Session {
         };
         if let Some(same) = others().find(|other| other.content == upload.content) {
             let what = format!(
-                "{} and {} hold the same; a record that is held out has to be another one than those that are fitted",
+                "{} and {} have the same content; a held-out record has to differ from the fitted records",
                 upload.name, same.name
             );
             return Err(Refusal::input(what));

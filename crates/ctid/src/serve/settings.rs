@@ -71,7 +71,7 @@ impl Form {
     /// Writes the settings of the form into the text.
     ///
     /// # Errors
-    /// [`Error::Changed`] where the text says something else than the form was filled from; where the result is no model file.
+    /// [`Error::Changed`] where the text says something else than the form was filled from; if the result is not a model file.
     pub(super) fn written_into(&self, file: &str, text: &str) -> Result<Edited, Error> {
         let differing = differing(&self.from, &Settings::of(text));
         if !differing.is_empty() {
@@ -113,7 +113,7 @@ impl Settings {
     /// The text with these settings; other entries do not change.
     ///
     /// # Errors
-    /// Where the result is no model file.
+    /// If the result is not a model file.
     fn written_into(&self, file: &str, text: &str) -> Result<Edited, Error> {
         // If the settings cannot be read, the form is empty, and writing it would delete entries.
         if toml::from_str::<Self>(text).is_err() {

@@ -86,10 +86,10 @@ fn check_whole(path: &Path, record: &Record) -> Result<(), Error> {
     }
     let rows = record.missing_rows();
     if rows > 0 {
-        let behind = clock.at(record.before_missing_row().unwrap_or(f64::NAN));
+        let before = clock.at(record.before_missing_row().unwrap_or(f64::NAN));
         let what = match rows {
-            1 => format!("1 row is missing behind {behind}"),
-            rows => format!("{rows} rows are missing, the first behind {behind}"),
+            1 => format!("1 row is missing after {before}"),
+            rows => format!("{rows} rows are missing, the first after {before}"),
         };
         return Err(Error::file(path, format!("{what}; {MEND}")));
     }

@@ -58,7 +58,7 @@ fn errors_on_command(
 /// The text of a plant with effects, which are fitted to the plant's records. `columns`, `hold`: of the model file.
 ///
 /// # Errors
-/// Why there is none: an effect is none of the text's, a fit fails, or the text does not fit as well as the plant.
+/// Why there is no text: it cannot have one of the effects, a fit fails, or it does not fit as well as the plant.
 pub fn text_of_plant(
     problem: &Problem,
     (columns, hold): (&Columns, Hold),

@@ -30,7 +30,7 @@ impl AtPorts {
     /// The effects of a plant at the ports of its text; looked for before anything is fitted.
     ///
     /// # Errors
-    /// Where an effect is none of the text's, or the model file holds what the text has no parameter for.
+    /// If the text cannot have an effect, or has no parameter for a setting of the model file.
     pub(super) fn of(problem: &Problem) -> Result<Self, String> {
         let plant = problem.plant;
         if let Some(term) = problem.terms.first() {

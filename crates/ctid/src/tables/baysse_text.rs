@@ -12,7 +12,7 @@ pub(crate) fn text(study: &Study, look: Look) -> String {
         "A. Baysse, F. J. Carrillo, A. Habbadi, identification in closed loop: tables I and II";
     let mut text = format!("{}\n", look.heading(title));
     let lead = format!(
-        "The printed figures beside {} runs, each with another noise. The band is where the figure of the runs has to be; * marks one outside. \
+        "The printed figures compared with {} runs, each with another noise realisation. The band is where the figure of the runs has to be; * marks one outside. \
          + a printed figure outside the same band, which then is that of a reproduction and not of the paper. The standard deviation is that of the figure from one such set of runs to the next.",
         study.runs
     );
@@ -117,7 +117,7 @@ pub(crate) fn printed_inside_bands(study: &Study) -> String {
         format!("Of the {of} printed figures that have a band {inside} lie inside it");
     if !outside.is_empty() {
         sentence += &format!(
-            "; outside are {}: the paper's noises were others, and its bands are not known",
+            "; outside are {}: the paper used other noise realisations, and its bands are unknown",
             outside.join(", ")
         );
     }
@@ -228,13 +228,13 @@ pub(crate) fn notes(study: &Study) -> Vec<String> {
             mean(&counts.normalised_diagonal),
         ),
         format!(
-            "Table II took {} iterations in theta and {} in delta, from a start that is far off.",
+            "Table II took {} iterations in theta and {} in delta, from a start far from the minimum.",
             mean(&study.second.plain.iterations),
             mean(&study.second.normalised.iterations),
         ),
         format!(
-            "The emulated tank has K = {gain:.3} and tau = {tau:.2} s at its operating point: where it knows the sensor's filter, the output error finds them \
-             to {share} %, {beyond}; instruments on raw levels find the secant, which a dead zone of the pump moves."
+            "The emulated tank has K = {gain:.3} and tau = {tau:.2} s at its operating point: with the sensor's filter in its model, the output \
+             error estimates them to {share} %, {beyond}; instruments on raw levels estimate the secant gain, which depends on the pump's dead zone."
         ),
         format!(
             "With Ki = 0.074 as printed, in the rig and in the model, it finds K = {printed_k} and tau = {printed_tau} s: not what the paper prints."

@@ -34,7 +34,7 @@ pub(crate) fn beside_the_verdict(study: &Study) -> String {
     let sentence = |contrast: &Contrast| {
         let [first, second] = contrast.between;
         format!(
-            "Tables {first} and {second} have one noise, so that their differences say more than the cells: {} of {} are inside. The \
+            "Tables {first} and {second} have the same noise, so their differences vary less than the cells: {} of {} are inside. The \
              assumed experiment is not the paper's in every respect.",
             contrast.inside,
             contrast.cells.len()

@@ -14,7 +14,7 @@ pub(crate) fn text(study: &Study, look: Look) -> String {
         look.heading("A. J. Udink ten Cate, WP-85-54, IIASA, 1985: tables 1 to 4")
     );
     let lead = format!(
-        "The printed figures against {} runs, each with another noise: median and 5 to 95 % range, by Euler's rule and by the \
+        "The printed figures against {} runs, each with another noise realisation: median and 5 to 95 % range, by Euler's rule and by the \
          exact step; * marks a printed figure outside.",
         study.runs
     );

@@ -203,7 +203,7 @@ fn tables_of_effects() {
     );
     refuses(
         &two("[effect.overflow]\nwhere = \"middle\""),
-        "tank.toml:4: where = \"middle\" is no vessel",
+        "tank.toml:4: where = \"middle\" is not a vessel",
         "\"upper\" or \"lower\"",
     );
     refuses(

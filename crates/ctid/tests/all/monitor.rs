@@ -184,7 +184,7 @@ fn a_header_that_comes_again_in_another_order_is_followed() {
         text(HEADER, &rows[..700]) + &text("t [s],r [mm],u [V],y [mm]\n", &rows[700..]);
     let outcome = fed(&place, "", other_unit);
     assert_eq!(outcome.code, Some(2), "{}", outcome.err);
-    let said = "row 702: the header comes again with [mm] where it was [cm]";
+    let said = "row 702: the header is repeated with [mm] instead of [cm]";
     assert_says(&outcome, said);
 }
 

@@ -98,7 +98,7 @@ fn options_that_do_not_go_together_are_refused() {
     for (options, wanted) in [
         (
             "--between delay(u) lag(u) --range 0 50",
-            "--range: Pair has the inputs u, w; name the one that it is of with --input NAME",
+            "--range: Pair has the inputs u, w; choose one with --input NAME",
         ),
         (
             "--between delay(u) lag(u) --input x",

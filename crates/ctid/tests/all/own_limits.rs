@@ -156,7 +156,7 @@ fn a_unit_that_is_none_is_said_with_its_place() {
     );
     let said = place.succeeds("check cell.mo");
     assert!(
-        said.contains("cell.mo:3:21: `bananas` in the unit `bananas/K` is no unit that is known"),
+        said.contains("cell.mo:3:21: `bananas` in the unit `bananas/K` is unknown"),
         "{said}"
     );
     for unit in [

@@ -152,7 +152,7 @@ fn a_loop_that_is_not_simulated_says_why() {
         assert!(said.starts_with(why), "{said}");
     };
     let without_reference = file(0.8).replace("reference = \"r [mm]\"\n", "");
-    compared(without_reference, "loop.csv: the record holds no reference");
+    compared(without_reference, "loop.csv: the record has no reference");
     compared(file(1.6), "the measured command disagrees");
     // Exports and simulations say it too; in a simulation without a fit, given inputs are used as they are.
     for command in [
@@ -168,10 +168,10 @@ fn a_loop_that_is_not_simulated_says_why() {
     place.write("m.toml", file(0.8).replace("controller.u", "controller.w"));
     place.refuses(
         "compare loop.csv --model m.toml",
-        &["m.toml:6: w is no input of Plant: it has u"],
+        &["m.toml:6: w is not an input of Plant: it has u"],
     );
     place.write("m.toml", file(0.8).replace("r [mm]", "set [mm]"));
     // A reference that the record lacks.
     let said = unfolded(&place.succeeds("compare loop.csv --model m.toml"));
-    assert!(said.contains("the record holds no reference"), "{said}");
+    assert!(said.contains("the record has no reference"), "{said}");
 }

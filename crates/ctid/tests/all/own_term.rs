@@ -159,7 +159,7 @@ fn a_shape_that_cannot_be_is_refused() {
     place.write("where.csv", format!("{head}upper,level,8,1\n"));
     place.refuses(
         "add mine --from where.csv --model tank.toml",
-        &["where.csv: \"upper\" is no place of plant single-tank"],
+        &["where.csv: \"upper\" is not a place of plant single-tank"],
     );
     place.write("pump.csv", "place,variable,at,value\nactuator,level,8,1\n");
     place.refuses(
@@ -221,6 +221,6 @@ fn a_shape_that_cannot_be_is_refused() {
     );
     place.refuses(
         "compare a.csv --model tank.toml",
-        &["tank.toml:", "\"flow\" is no variable"],
+        &["tank.toml:", "\"flow\" is not a variable"],
     );
 }

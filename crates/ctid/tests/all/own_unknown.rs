@@ -110,7 +110,7 @@ fn the_term_has_a_name_of_ones_choice(place: &Place, effect: &str, mended: &serd
             &parts,
         );
     }
-    place.refuses("add my_heater --model m.toml", &["is no effect"]);
+    place.refuses("add my_heater --model m.toml", &["is not an effect"]);
     let said = place.succeeds("add my_heater --model m.toml --from found.json");
     assert!(
         said.contains(&format!("added my_heater, {effect}, with h0 = ")),

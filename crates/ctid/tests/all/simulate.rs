@@ -245,7 +245,7 @@ fn what_cannot_be_simulated_is_refused_in_one_line() {
     place.refuses(
         "simulate m.toml gap.csv --out y.csv",
         &[
-            "gap.csv: 6 rows are missing, the first behind 380 s",
+            "gap.csv: 6 rows are missing, the first after 380 s",
             "--from and --to",
         ],
     );
@@ -273,7 +273,7 @@ fn what_cannot_be_simulated_is_refused_in_one_line() {
     place.refuses(
         "simulate m.toml in.csv --out y.csv",
         &[
-            "in.csv: the simulation of HeatedBlock does not go on behind",
+            "in.csv: the simulation of HeatedBlock cannot continue after",
             "grows without bound",
         ],
     );

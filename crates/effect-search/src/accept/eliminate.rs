@@ -36,8 +36,8 @@ impl Context<'_> {
         chance * looks < self.thresholds.false_claim
     }
 
-    /// Backward elimination: removes effects that the noise explains as well, the least significant first. An effect beside a rounding has
-    /// to be significant with a smooth staircase too.
+    /// Backward elimination: removes effects that the noise explains as well, the least significant first. If the set contains a
+    /// quantisation, the other effects have to be significant also when it is replaced by a smooth staircase.
     pub fn confirm(&self, mut node: Node, base: &Node, noise: &Noise) -> Result<Node, Error> {
         let mut smooth = self.smooth_rounding(&node, noise);
         loop {
@@ -66,8 +66,8 @@ impl Context<'_> {
         }
     }
 
-    /// Backward elimination without refits, if the time is over: by the Wald statistic of each effect's sizes, which equals the fall of the
-    /// deviance to first order. Sizes without a standard error say nothing.
+    /// Backward elimination without refits, if the time limit is reached: by the Wald statistic of each effect's sizes, which equals the
+    /// fall of the deviance to first order. Sizes without a standard error say nothing.
     fn confirm_by_sizes(&self, mut node: Node, base: &Node, noise: &Noise) -> Result<Node, Error> {
         let context = Context {
             limit: self.limit.afterwards(),

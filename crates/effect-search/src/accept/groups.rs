@@ -8,7 +8,7 @@ use crate::accept::partial::explained;
 use crate::fit::node::{Context, FINE, Node};
 use crate::search::grow::best_first;
 
-/// Step that is left out if the time is over.
+/// Step that is left out if the time limit is reached.
 const OTHERS: &str = "other effects that may explain the same";
 
 impl Context<'_> {

@@ -7,7 +7,7 @@
 //!   effect that depends on time only, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and
 //!   alone, because several such effects fit any disturbance;
 //! - several effects are each worth it, as in a larger set (below);
-//! - it predicts the next sample as well as the model without it, each beside a noise model of its own;
+//! - it predicts the next sample as well as the model without it, each with its own noise model;
 //! - what is fitted to three quarters of the records predicts the fourth (cross-validation);
 //! - no size of its effects is at a bound.
 //!

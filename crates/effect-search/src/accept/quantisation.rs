@@ -22,7 +22,7 @@ use crate::search::score::QUANTISATION;
 /// quantity is constant, or the grid is not that of a converter.
 const SHARE: RangeInclusive<f64> = 1.0 / 3.0..=1.1;
 
-/// Step that is left out if the time is over.
+/// Step that is left out if the time limit is reached.
 const ROUNDING: &str = "the rounding of readings";
 /// Least noise before the rounding, as a share of the step: with less, the effect does not depend on it.
 const LEAST_DITHER: f64 = 0.1;

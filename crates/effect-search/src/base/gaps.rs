@@ -1,7 +1,7 @@
 //! Records with missing rows or samples of an input: the longest time for which an input may be held depends on the model, so a first fit
 //! determines it.
 //!
-//! Through a gap that is short beside the fastest time constant, and after which the inputs are as before, they are held; otherwise the
+//! Inputs are held through a gap that is short compared with the fastest time constant and after which they are as before; otherwise the
 //! record is cut, and the simulation starts again after the gap with states of its own ([`ct_signals::Gaps`]): the instant of a change in a
 //! gap is not known, and a wrong one would look like an effect. The parts keep their time stamps and so their clock: a drift runs
 //! through them. Results join them again to the records that were given ([`ct_signals::parts`]).
@@ -62,7 +62,7 @@ pub struct Whole {
     pub gaps: Option<MendedGaps>,
 }
 
-/// What is known of the parameters of a model; names that are none of its parameters are ignored.
+/// What is known of the parameters of a model; names of other parameters are ignored.
 #[derive(Debug, Clone, Copy)]
 pub struct PriorKnowledge<'a> {
     /// The model.

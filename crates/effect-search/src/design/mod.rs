@@ -41,7 +41,7 @@ const MOST_REFITS: usize = 16;
 /// Largest useful number of repetitions of an experiment.
 const MOST_TIMES: f64 = 20.0;
 
-/// Courses of the inputs that change, and a value of every input for each sample of an experiment.
+/// Sequences of the inputs that change, and a value of every input for each sample of an experiment.
 type Sequenced = (Vec<InputSequenceKind>, Vec<Vec<f64>>);
 /// An experiment, and a value of every input for each of its samples.
 type Tried = (Experiment, Vec<Vec<f64>>);

@@ -37,7 +37,7 @@ pub struct InputRange {
     pub slew: Option<f64>,
 }
 
-/// Course of an input in an experiment.
+/// Sequence of an input in an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InputSequenceKind {
     /// Name of the input in the model.
@@ -68,7 +68,7 @@ pub struct Reach {
 /// An experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiment {
-    /// Course of each input that changes; the other inputs are held at their median.
+    /// Sequence of each input that changes; the other inputs are held at their median.
     pub inputs: Vec<InputSequenceKind>,
     /// Power of the experiment.
     pub power: Power,
@@ -122,7 +122,7 @@ pub struct Design {
     pub experiments: Vec<Experiment>,
     /// Repetition of the experiment of the longest record.
     pub again: Option<Experiment>,
-    /// Number of repetitions after which the best experiment decides; `None` if one is enough, or none would decide.
+    /// Number of applications of the best experiment that would decide between the two effects; `None` if one is enough, or no number is.
     pub times_as_long: Option<usize>,
     /// The best experiment.
     pub experiment: Sequences,

@@ -66,7 +66,7 @@ pub struct Sequence {
     pub levels: Option<usize>,
     /// Number of the random draw.
     pub draw: Option<u64>,
-    /// Largest change per second, if it is smaller than the limits require.
+    /// Largest change per second, if it is smaller than the limits allow.
     pub slew: Option<f64>,
     /// Smallest value.
     pub low: f64,

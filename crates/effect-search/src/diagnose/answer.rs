@@ -19,14 +19,14 @@ pub(super) struct Answer {
     pub not_noise: Option<NotNoise>,
     /// The noise model with which effects are compared.
     pub noise: Noise,
-    /// Samples per independent sample, if that is not the noise model of the set's residual.
+    /// Number of samples per independent sample ([`Context::slowness`]) for a partial explanation, whose noise model is white; otherwise 1.
     pub slowness: f64,
     /// The set is a subset of an accepted set.
     pub reduced: bool,
 }
 
 impl Answer {
-    /// Whether the set has so many effects that together they may imitate another one.
+    /// Whether the set has enough effects to imitate another effect together.
     pub fn has_many(&self, context: &Context, base: &Node) -> bool {
         self.set.added.len() >= base.added.len() + context.thresholds.many_effects
     }
@@ -132,7 +132,8 @@ impl Context<'_> {
     }
 
     /// Whether an answer that explains enough contains a partial explanation, and further effects that passed the acceptance test. These are no
-    /// functions of time, which compensate for any slow disturbance, and the answer's noise model is none that may describe slow physics.
+    /// functions of time, which compensate for any slow disturbance, and the answer's noise model is not one that may describe slow
+    /// physics.
     fn contains_part(&self, answer: &Answer, part: &Node, base: &Node) -> bool {
         let is_part = part.added.iter().all(|i| answer.set.added.contains(i));
         let further = answer.set.added.iter().copied();

@@ -1,6 +1,6 @@
 //! Whether the energy of a residual is concentrated in a part of the record.
 //!
-//! An autoregressive noise model describes a disturbance that is present for a while as noise with a long correlation time, and the whitened
+//! An autoregressive noise model describes a temporary disturbance as noise with a long correlation time, and the whitened
 //! residual does not show it. Noise with this correlation time would disturb the rest of the record as well. The share of the squared residual
 //! in the best window of a quarter or an eighth of the record is compared with that of simulated residuals: the same innovations with random
 //! signs, coloured by the noise model (wild bootstrap). Under the null hypothesis the signs of successive innovations are independent; their

@@ -43,7 +43,7 @@ pub enum NotNoise {
         /// Until when \[s\].
         to: f64,
     },
-    /// It is larger in a part of the record than noise with its correlation would be: a disturbance for a while.
+    /// It is larger in a part of the record than noise with its correlation would be: a temporary disturbance.
     Disturbance {
         /// The output.
         output: String,
@@ -60,7 +60,7 @@ pub enum NotNoise {
         output: String,
         /// The record.
         record: String,
-        /// The first row after it \[s, the record's clock\].
+        /// Time of the first row after the level shift \[s, the record's clock\].
         at: f64,
         /// Change of the reading.
         size: f64,

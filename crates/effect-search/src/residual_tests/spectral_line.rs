@@ -2,7 +2,7 @@
 //!
 //! A line is compared with the mean of its `2 nu` neighbours, which a noise of a smooth spectrum exceeds `x` times with a
 //! probability of `(1 + x/nu)^-nu` (the F distribution of 2 and `2 nu` degrees of freedom). An autoregressive model of any order
-//! would take a line for a resonance, so this does without one, but for a first-order one that flattens the spectrum.
+//! would describe a line as a resonance; therefore only a first-order model is used, which flattens the spectrum.
 //!
 //! **Reference**: D. J. Thomson, Spectrum estimation and harmonic analysis, Proc. IEEE 70 (1982) 1055-1096.
 

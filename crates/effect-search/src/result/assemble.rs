@@ -194,7 +194,7 @@ fn ladder(context: &Context, base: &Node, last: &Node, noise: &Noise) -> Result<
     Ok(nodes)
 }
 
-/// `noise`: of the last model, with the level of each output.
+/// A step of the result. `noise`: the noise model of the last model, and the noise level of each output.
 fn step(
     context: &Context,
     base: &Node,

@@ -10,7 +10,7 @@ use crate::{Diagnosis, Error, Kept, Problem, all_candidates};
 /// A model with effects in it, in this order, and the parameters that `values` names at these values.
 ///
 /// # Errors
-/// Where the effects do not go together.
+/// If the effects cannot be combined.
 pub fn with_effects(
     spec: &ModelSpec,
     effects: &[&Candidate],

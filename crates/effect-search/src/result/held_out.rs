@@ -1,9 +1,9 @@
 //! Errors on held-out records: their initial states are fitted on the first samples, all other parameters are fixed, and the rest is
 //! scored.
 //!
-//! The first five samples, as the benchmark of the cascaded tanks has it, wherever they determine the states well enough. A speed that is
-//! not measured, say, follows from five noisy positions so badly that its error alone decides the score: then the samples are doubled until
-//! what is not known of the states moves the outputs by no more than their noise.
+//! The first five samples, as in the benchmark of the cascaded tanks, if they determine the states well enough. Five noisy positions, for
+//! example, estimate an unmeasured speed so badly that its error alone determines the score. In this case the number of samples is doubled
+//! until the uncertainty of the states changes the outputs by no more than their noise.
 
 use ct_signals::Record;
 use estimation::Fit;
@@ -46,7 +46,7 @@ pub fn held_out(setup: &ModelSetup, fit: &Fit, test: &[Record]) -> Result<Option
     let are_long = test
         .iter()
         .all(|record| record.len() >= MOST_OF_RECORD * LATER_ROWS);
-    // A model that has no finite simulation over so many rows has no such score.
+    // A model whose simulation over this number of rows is not finite has no such score.
     let later = are_long
         .then(|| from_rows(setup, fit, test, (LATER_ROWS, false)).ok())
         .flatten()

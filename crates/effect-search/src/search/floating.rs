@@ -34,7 +34,7 @@ impl Context<'_> {
                 let Some(more) = self.one_more(&set, &timeless, &white, &mut fitted) else {
                     break;
                 };
-                // The last effect is already the best one beside the others.
+                // The last effect is already the best one in combination with the others.
                 let others = more.added.len() - 1;
                 set = self.exchanged(
                     more,

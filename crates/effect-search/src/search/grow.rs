@@ -12,7 +12,7 @@ use crate::fit::node::{Context, FINE, Node, ROUGH};
 use crate::search::pairs::joint_scores;
 use crate::search::score::Trial;
 
-/// Step that is left out if the time is over.
+/// Step that is left out if the time limit is reached.
 const LARGER: &str = "larger sets of effects";
 
 /// Result of a search with one noise model.

@@ -2,7 +2,7 @@
 //!
 //! The cost of a limit, of a dead zone or of an actuator that sticks has several minima: each reading that changes sides adds one. While a
 //! set grows, an effect explains a part of the error together with others that are replaced later, and its fit may stay in a minimum that is
-//! not the lowest beside the final ones.
+//! not the lowest in combination with the final ones.
 //!
 //! Tried are the effects that the search added. Those of the model file are fitted from their own starts only, and terms of the user's own have
 //! no thresholds.
@@ -18,7 +18,7 @@ use crate::search::score::{QUANTISATION, step_within, thinned};
 const NEAR: [f64; 8] = [0.8, 0.88, 0.93, 0.97, 1.03, 1.08, 1.15, 1.25];
 /// First positions that are tried: they are from -1 to 1. Chosen, for time.
 const BEGINS: [f64; 7] = [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9];
-/// Step that is left out if the time is over.
+/// Step that is left out if the time limit is reached.
 const OTHER_VALUES: &str = "other values of thresholds";
 
 impl Context<'_> {

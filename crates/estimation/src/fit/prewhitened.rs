@@ -72,8 +72,8 @@ pub fn moved_by_weighting(
 }
 
 /// The prewhitened fit (iterated GLS): an autoregressive noise model of order zero to `order` for each output from its residual, a fit in
-/// their weighting, until the two agree. `memory`: the noise model's memory is at most so many samples, so that no root near one takes
-/// slow physics for noise ([`ct_signals::ArModel::with_memory_at_most`]).
+/// their weighting, until the two agree. `memory`: the noise model's memory is at most this number of samples, so that no root near one
+/// describes slow physics as noise ([`ct_signals::ArModel::with_memory_at_most`]).
 ///
 /// # Errors
 /// As [`fit_from`].

@@ -168,7 +168,7 @@ fn records_that_say_nothing() {
     let infinite = with(&|record| record.y[17] = f64::INFINITY);
     assert!(infinite.contains("y[17] is inf"), "{infinite}");
     let none = with(&|record| record.y.fill(f64::NAN));
-    assert!(none.contains("no reading of y"), "{none}");
+    assert!(none.contains("y has no readings"), "{none}");
     let few = with(&|record| record.y[3..].fill(f64::NAN));
     assert!(few.contains("3 samples in all, besides"), "{few}");
     let infinite = with(&|record| record.r.as_mut().unwrap()[3] = f64::INFINITY);

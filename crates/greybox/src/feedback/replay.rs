@@ -125,7 +125,8 @@ pub(crate) fn replay_of(
         let mut squares = 0.0;
         for k in 0..r.len() {
             let h = step(record, k);
-            // The controller used a reading that the record lacks: its command tells which, while it is within its limits.
+            // The controller used a reading that is missing in the record: the reading follows from the command, if this is within its
+            // limits.
             let reading = match present[k].is_nan() {
                 true => regulator.reading_for(r[k], u[k], h),
                 false => None,

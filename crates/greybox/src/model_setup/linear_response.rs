@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use super::ModelSetup;
 use crate::feedback::{LinearResponse, Response, spectral_radius};
 
-/// A model whose linear response grows by this number of factors e over the longest record has none.
+/// Limit of the growth rate times the duration of the longest record: a model that grows faster has no linear response.
 const GROWTH: f64 = 3.0;
 
 impl ModelSetup<'_> {

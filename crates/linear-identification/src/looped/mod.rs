@@ -87,7 +87,7 @@ pub struct Batch {
     pub white_std_errors: Vec<f64>,
 }
 
-/// Condition (14) between P^ of a start and P of an end.
+/// Convergence condition (14), with P^ of the initial model and P of the estimate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Convergence {
     /// The answer.

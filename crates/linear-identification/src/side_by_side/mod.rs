@@ -17,7 +17,7 @@
 //!   known; only if the method gives standard errors.
 //!
 //! The order that is shown of a method has the least BIC of those whose parameters all differ significantly from zero, and whose time
-//! constants are no shorter than a step; where there is none, of all.
+//! constants are no shorter than a step; if there is no such order, the least BIC of all.
 //!
 //! Reference: P. C. Young, Recursive estimation, forecasting and adaptive control, in C. T. Leondes (ed.), Control and Dynamic Systems 30,
 //! Academic Press 1989.

@@ -55,7 +55,7 @@ pub(crate) fn ladder<'a>(
         }
         ladder.push(node);
     }
-    // If the time is over, intermediate models may have a higher cost than the final set.
+    // If the time limit is reached, intermediate models may have a higher cost than the final set.
     if let Some(end) = ladder.last_mut()
         && end.added.len() == last.added.len()
         && end.added.iter().all(|placed| last.added.contains(placed))

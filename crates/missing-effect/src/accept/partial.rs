@@ -6,7 +6,7 @@
 //!   with an effect that follows time alone, which imitates any slow disturbance, [`WHOLE`](crate::accept::acceptance::WHOLE) of it, alone and
 //!   beyond what a random walk explains;
 //! - of several effects: they are significant if each model has a noise model of its own, of limited memory;
-//! - it predicts the next sample as well as the model without it does, each beside a noise model of its own;
+//! - it predicts the next sample as well as the model without it does, each with its own noise model;
 //! - what is fitted to one half of the record predicts the other (two-fold cross-validation);
 //! - sizes are inside their bounds, and states are physical;
 //! - a single level shift of the reading does not explain more.
@@ -276,7 +276,8 @@ fn test<'a>(
     if !node.plausible() {
         rejections.push(Rejection::NotPhysical);
     }
-    // A level shift at a free instant explains much if set points change in steps: it has to explain clearly more.
+    // If set points change in steps, a level shift at a fitted instant explains much: it leads to a rejection only if it explains clearly
+    // more than the set.
     let clearly = SHIFT_CLEARLY * node.setup.samples() as f64;
     if shift_bic + clearly < node.fit.bic() {
         rejections.push(Rejection::LevelShift);

@@ -5,12 +5,13 @@
 //! significant beside one that does not. The likelihood follows from the Kalman filter; `s^2` is at its best in closed form, `q` by a
 //! search over its logarithm.
 //!
-//! Both residuals are whitened first by the noise model of the set with the effects: beside coloured noise a random walk would
+//! Both residuals are whitened first by the noise model of the set with the effects: if the noise is coloured, a random walk would
 //! otherwise describe the noise, and the effects with it. A whitened walk is still a walk, smaller by the factor `A(1)`; sizes
 //! are stated in the standard deviation of the noise itself.
 //!
-//! **Parameters**: a walk that is attributed to the plant biases the parameters, so each model is fitted again beside the walk, in
-//! one step from its linearisation. Without that step a false effect is significant in one of thirty records with drifting noise.
+//! **Parameters**: a walk that is attributed to the plant biases the parameters, so each model is fitted again together with
+//! the walk, in one step from its linearisation. Without this step a false effect is significant in one of thirty records with drifting
+//! noise.
 //!
 //! **Cost**: `O(N p^2)` for a value of `q`.
 //!
@@ -59,7 +60,7 @@ impl Walk {
         largest: f64::INFINITY,
         fitted_again: false,
     };
-    /// A walk no larger than the noise; it also changes the parameters.
+    /// A walk that is at most as large as the noise over the longest record; the parameters are fitted again together with it.
     pub const SMALL: Self = Self {
         anywhere: true,
         largest: 1.0,

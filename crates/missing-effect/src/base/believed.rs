@@ -57,8 +57,8 @@ pub(crate) fn base<'a>(
     let mut starts = options.starts.max(10);
     let one_by_one = one_by_one(&setup, options.seed)?;
     let fit = loop {
-        // The start with effects added one by one comes first: if the time is over, no other start is used. It includes the user's guesses
-        // of parameters.
+        // The start with effects added one by one comes first: if the time limit is reached, no other start is used. It includes the user's
+        // guesses of parameters.
         let mut all: Vec<Vec<f64>> = one_by_one.iter().cloned().collect();
         all.extend(random_starts(&setup, starts, options.seed));
         if !problem.start.is_empty() {

@@ -34,7 +34,7 @@ pub(crate) struct Search<'s, 'a> {
     pub nodes: &'s [Node<'a>; 2],
     pub metric: &'s Metric,
     pub into: Loop<'s>,
-    /// The slowest of the plant \[s\].
+    /// Slowest time constant of the plant \[s\].
     pub time_constant: f64,
     pub progress: &'s (dyn Fn(Progress) + Sync),
 }
@@ -192,8 +192,8 @@ impl Search<'_, '_> {
         Some((first, sequence))
     }
 
-    /// Candidates with the other model refitted; unchanged if the time is over, because the error of an incomplete refit would count as
-    /// power.
+    /// Candidates with the other model refitted; unchanged if the time limit is reached, because the error of an incomplete refit would
+    /// count as power.
     pub fn confirmed(
         &self,
         (candidate, sequence): &Tried,

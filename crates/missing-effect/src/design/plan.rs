@@ -129,7 +129,7 @@ pub struct Design {
     pub again: Option<Candidate>,
     /// The best experiment of a wider range, if a wider range is possible.
     pub wider: Option<Wider>,
-    /// Number of repetitions after which the best experiment decides; `None` if one is enough, or none would decide.
+    /// Number of applications of the best experiment that would decide between the two effects; `None` if one is enough, or no number is.
     pub times_as_long: Option<usize>,
     /// Benefit of a second sensor, if the plant has another level.
     pub second_sensor: Option<SecondSensor>,

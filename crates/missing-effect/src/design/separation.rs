@@ -2,16 +2,16 @@
 //!
 //! [`effect_search::design`] has the noncentrality and its linear form.
 //!
-//! **The local form** of the literature is `c^2 |p_A|^2 (1 - rho^2) / sigma^2`, `p` the signature of an effect at its absent value beside
-//! what the base's parameters imitate, `rho` the cosine of the two. It follows from the above where the size `c` is small (then `y_A` less
-//! the base is `c j_A`, and B's own derivative is `j_B`) and where no record is there before (`R = 0`): projecting `c j_A` off the
-//! base's columns leaves `c p_A`, and off `p_B` as well `c^2 |p_A|^2 (1 - rho^2)`.
+//! **The local form** of the literature is `c^2 |p_A|^2 (1 - rho^2) / sigma^2`, `p` the signature of an effect at its absent value,
+//! orthogonal to the derivatives by the base's parameters, `rho` the cosine of the angle between the two signatures. It follows from the
+//! above where the size `c` is small (then `y_A` less the base is `c j_A`, and B's own derivative is `j_B`) and where no record is there
+//! before (`R = 0`): projecting `c j_A` off the base's columns leaves `c p_A`, and off `p_B` as well `c^2 |p_A|^2 (1 - rho^2)`.
 //!
 //! **In a loop** the command is the one that the controller gives to A without noise, and B answers to it. Simulating B's loop from the
 //! reference and filtering by `1 + P C`, as the fits do, comes to the same: `(1 + P_B C)(y_A - y_B) = y_A - P_B u_A` for
 //! `y_B = P_B C (r - y_B)` and `u_A = C (r - y_A)`.
 //!
-//! **The refit** does without the straight line: B is fitted to A's simulation of the existing records and of the experiment, both free of
+//! **The refit** does not linearise: B is fitted to A's simulation of the existing records and of the experiment, both free of
 //! noise; from its misfit the one to the existing records alone is taken off. A side measurement (a prior) is there in both, as A would
 //! have it read.
 

@@ -113,7 +113,7 @@ pub(crate) fn report(
     let residuals = setup.residuals(&fit.x)?;
     let held_out = hold_out(node, test, HEAD)?;
     let are_long = |record: &Record| record.len() >= MOST_OF_RECORD * LATER_ROWS;
-    // A model that has no finite simulation over so many rows has no such score.
+    // A model whose simulation over this number of rows is not finite has no such score.
     let later = test
         .iter()
         .all(are_long)

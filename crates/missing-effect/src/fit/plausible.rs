@@ -17,12 +17,12 @@ const LIMIT: &str = "sensor_saturation";
 const RISES: f64 = 0.5;
 const BEYOND: usize = 50;
 
-/// A reading drops if it falls back by this share of the step within this number of samples; ...
+/// A modelled reading has a drop if it falls by this share of the effect's step within this number of samples.
 const DROPS: &str = "sensor_hysteresis";
 const FALLEN: f64 = 0.7;
 const DURATION: usize = 6;
-/// ... drops of a model are not in the record if the reading changes by less than this share of them while the model without them does not,
-/// and the noise of such a change is smaller by this factor.
+/// The record does not show these drops if the measured reading, less the model without the effect, falls by less than this share of them
+/// in all, and the noise of that sum is smaller than the drops by this factor.
 const SEEN: f64 = 0.5;
 const CLEAR: f64 = 4.0;
 
@@ -100,7 +100,7 @@ impl Node<'_> {
         })
     }
 
-    /// The model's reading has a step at instants at which the record has none.
+    /// Whether the modelled reading has steps at instants at which the measured reading has no step.
     fn drops_unseen(&self) -> bool {
         let Some(placed) = self.added.iter().find(|placed| placed.effect.id == DROPS) else {
             return false;

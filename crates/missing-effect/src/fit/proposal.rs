@@ -245,7 +245,7 @@ pub(crate) fn place<'a>(
 ) -> Option<Node<'a>> {
     let from = Parent::new(parent);
     let proposal = propose(&from, placed, noise).or_else(|| {
-        // If the time is over, the larger set's values are the only start.
+        // If the time limit is reached, the larger set's values are the only start.
         let setup = from.with(placed)?;
         let mut added = parent.added.clone();
         added.push(placed);
@@ -258,7 +258,7 @@ pub(crate) fn place<'a>(
     });
     let mut proposal = proposal?;
     let start = transfer(known, &proposal.setup);
-    // First in the list, because only one start is used if the time is over.
+    // First in the list, because only one start is used if the time limit is reached.
     proposal.starts.insert(0, start.into());
     realise(proposal, noise, stopping)
 }

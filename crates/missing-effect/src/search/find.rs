@@ -67,7 +67,7 @@ pub(crate) fn find<'a>(
     let breadth = Breadth {
         beam: BEAM,
         refits: REFITS,
-        // The permitted number of effects does not limit the trials: only the largest model shows the noise.
+        // More effects may be tried than the result may have: only the residual of the largest model is close to the noise.
         most: most.max(RICHEST),
     };
     let pays = |before: &Node, after: &[Node]| {

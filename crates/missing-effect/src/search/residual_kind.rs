@@ -25,7 +25,7 @@ pub(crate) enum ResidualKind {
 }
 
 /// Kind of the residual of a set of effects: noise if no residual test rejects this and no further effect has a predicted reduction above its
-/// penalty; structure if the time is over.
+/// penalty; structure if the time limit is reached.
 ///
 /// The noise model is that of the set's own residual, so that autocorrelated noise does not prolong the search. Other sets with the same
 /// error are found later, by swap steps.

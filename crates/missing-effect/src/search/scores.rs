@@ -60,8 +60,8 @@ pub(crate) fn detectable_size_ratio(base: &Node, single: &[Node], noise: &Noise)
     ratios.get(ratios.len() / 2).copied()
 }
 
-/// Signature of an effect at its absent value beside the base's own parameters, in standard deviations of the innovations (`scales`, of each
-/// output); `None` if there is no derivative.
+/// Signature of an effect at its absent value, orthogonal to the derivatives by the base's own parameters, in standard deviations of the
+/// innovations (`scales`, of each output); `None` if there is no derivative.
 ///
 /// The scales are those of the fit: at the absent value the residuals hold the effect, and would make an output that it acts on count less.
 fn signature(base: &Node, node: &Node, noise: &Noise, scales: &[f64]) -> Option<Signature> {

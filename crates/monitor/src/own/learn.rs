@@ -15,7 +15,7 @@ use crate::{
     learn::{Learned, OutputNoise, READ, covariance, output_noise, record, stands_still},
 };
 
-/// Derivatives by so many states at once.
+/// Number of states for which one simulation computes derivatives.
 const LANES: usize = 4;
 /// An eigenvalue closer to one does not decay within the stored rows.
 const SETTLES: f64 = 1e-7;
@@ -187,7 +187,7 @@ fn time_constant(
     let largest = spectral_radius(&transition);
     if largest > 1.0 - SETTLES || largest.is_nan() {
         return Err(
-            "the fitted model does not settle under steady inputs, so that it cannot run beside the plant".into(),
+            "the fitted model does not settle under steady inputs, so that it cannot run in parallel with the plant".into(),
         );
     }
     // A response that decays within one interval has a time constant far below the interval.

@@ -1,7 +1,7 @@
 //! A user's own model on the rows as they come, with exact derivatives of its outputs by the watched parameters.
 //!
-//! Simulations that carry a few derivatives each run side by side until every watched parameter has one. **Cost** of a row: so many simulations of the
-//! model from row to row; nothing is allocated, but for the past of what is delayed.
+//! Simulations that carry a few derivatives each run side by side until every watched parameter has one. **Cost** of a row: that number of
+//! simulations from row to row; nothing is allocated, except for the past of what is delayed.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! A statistic of many runs beside the printed figure: its standard deviation by the jackknife, and the band of a reproduction.
+//! A statistic of many runs, compared with the printed figure: its standard deviation by the jackknife, and the band of a reproduction.
 
 use serde::Serialize;
 

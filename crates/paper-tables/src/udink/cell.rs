@@ -1,4 +1,4 @@
-//! A printed figure beside the same figure of many runs: median, 5 to 95 % range, and whether the printed one lies inside.
+//! A printed figure, compared with the same figure of many runs: median, 5 to 95 % range, and whether the printed one lies inside.
 
 use serde::Serialize;
 use statrs::statistics::{Data, OrderStatistics};
@@ -33,7 +33,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// A printed figure beside `runs`; values that are not finite are those of runs that failed, and are left out.
+    /// A printed figure compared with `runs`; values that are not finite belong to failed runs, and are left out.
     pub(crate) fn new(
         table: usize,
         cell: &'static str,
@@ -91,7 +91,7 @@ pub struct Comparison {
 pub struct Outside {
     /// Number of the table in the paper, 1 to 4.
     pub table: usize,
-    /// What it is of, as in [`CELLS`](super::printed::CELLS).
+    /// The quantity, as in [`CELLS`](super::printed::CELLS).
     pub cell: &'static str,
     /// Known reason.
     pub why: &'static str,

@@ -1,7 +1,7 @@
 //! Differences of the same cell in two of the paper's tables.
 //!
 //! Tables with the same noise differ by their settings alone, so that a difference of two cells varies much less from noise to noise than
-//! either of them: it tells far more than the cells do one by one.
+//! either of them: it is much more informative than the single cells.
 
 use serde::Serialize;
 
@@ -12,15 +12,15 @@ use super::{Cell, Tables};
 const PAIRS: [([usize; 2], &str); 3] = [
     (
         [2, 3],
-        "the paper prints the same c^ for both, average and relative variance: they have one noise",
+        "the paper prints the same c^ for both, average and relative variance: they have the same noise",
     ),
     (
         [1, 2],
-        "if they have one noise, which the paper does not say",
+        "if they have the same noise, which the paper does not say",
     ),
     (
         [3, 4],
-        "if they have one noise, which the paper does not say",
+        "if they have the same noise, which the paper does not say",
     ),
 ];
 

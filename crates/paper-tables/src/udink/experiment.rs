@@ -14,7 +14,7 @@ pub struct Settings {
     pub gain: f64,
     /// tau of the tank, s. Printed.
     pub time_constant: f64,
-    /// Mean square of the noise over that of the output without it. Printed; that it is of powers is not.
+    /// Mean square of the noise over that of the output without it. Printed, but the paper does not say that it is a ratio of powers.
     pub noise_ratio: f64,
     /// Bound of |c^|, s. Printed.
     pub filter_limit: f64,

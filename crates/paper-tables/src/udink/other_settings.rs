@@ -1,7 +1,7 @@
 //! Tables 1 to 4 with one setting changed: which changes the comparison with the paper would notice.
 //!
-//! The paper leaves much open, and agreement with its cells says only that the settings can be so. How much that is worth is seen from
-//! settings that are not so: those whose tables are called consistent all the same cannot be distinguished from the ones that are used.
+//! The paper leaves much open, and agreement with its cells shows only that the settings are possible. The power of this comparison is
+//! tested with wrong settings: those whose tables still count as consistent cannot be distinguished from the settings that are used.
 
 use rayon::prelude::*;
 use serde::Serialize;

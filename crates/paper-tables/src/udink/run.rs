@@ -194,7 +194,7 @@ fn follow<I: Integrator, const SPAN: usize>(
     ])
 }
 
-/// Mean, and standard deviation (n - 1) divided by the size of the mean.
+/// Mean, and standard deviation (n - 1) divided by the absolute value of the mean.
 fn mean_and_variation(values: [f64; AVERAGED]) -> (f64, f64) {
     let n = AVERAGED as f64;
     let mean = values.iter().sum::<f64>() / n;

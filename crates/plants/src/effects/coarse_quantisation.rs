@@ -57,7 +57,7 @@ fn parameters(site: &Site) -> Vec<ParameterInfo> {
     ]
 }
 
-/// Beyond so many standard deviations from a threshold, noise does not change the reading.
+/// Beyond this many standard deviations from a threshold, noise does not change the reading.
 const REACH: f64 = 7.0;
 /// Ratio of noise to step above which the mean reading equals the level, to 1e-8 of a step.
 const SMOOTH: f64 = 1.0;

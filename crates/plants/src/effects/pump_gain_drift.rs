@@ -18,7 +18,7 @@ pub(super) const INFO: EffectInfo = EffectInfo {
     source: "I. J. Karassik et al., Pump Handbook, 4th ed., ch. 2: slip and temperature.",
 };
 
-/// A warm-up with a time constant of so many record lengths is a straight line, to 1 % of the change.
+/// A warm-up with a time constant of this many record lengths is a straight line, to 1 % of the change.
 const STRAIGHT: f64 = 10.0;
 
 fn parameters(site: &Site) -> Vec<ParameterInfo> {

@@ -5,8 +5,8 @@ use crate::{Scalar, inflow::Inflow};
 
 use super::Vessels;
 
-/// Runge-Kutta steps are used up to so many time constants of a vessel with a loss, well within the stability limit. With a smaller limit,
-/// only some steps of a record would be cut, and the output would not be a smooth function of the parameters.
+/// Runge-Kutta steps are used up to this many time constants of a vessel with a loss, well within the stability limit. With a smaller
+/// limit, only some steps of a record would be cut, and the output would not be a smooth function of the parameters.
 const STABLE: f64 = 1.5;
 
 impl<T: Scalar, const N: usize> Vessels<T, N> {

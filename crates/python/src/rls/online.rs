@@ -23,7 +23,7 @@ pub trait Online: Send + Sync {
     fn bytes(&self, others: Others) -> PyResult<Vec<u8>>;
 }
 
-/// What is kept beside an estimator.
+/// Data that are pickled together with an estimator.
 #[derive(Serialize, Deserialize)]
 pub struct Others {
     pub size: usize,
@@ -38,7 +38,7 @@ struct Kept<T> {
     rls: T,
 }
 
-/// What is kept beside an estimator alone.
+/// Of a pickled estimator, the data other than the estimator itself.
 #[derive(Deserialize)]
 struct KeptOthers {
     others: Others,
@@ -146,7 +146,7 @@ impl Online for Many {
     }
 }
 
-/// The estimator of so many parameters.
+/// The estimator for `theta.len()` parameters.
 pub fn online(theta: &[f64], p: &[Vec<f64>], weights: Weights) -> PyResult<Box<dyn Online>> {
     fn fixed<const P: usize>(
         theta: &[f64],
@@ -173,7 +173,7 @@ pub fn online(theta: &[f64], p: &[Vec<f64>], weights: Weights) -> PyResult<Box<d
     made.map_err(error::of_model)
 }
 
-/// A pickled estimator, and what is kept beside it.
+/// A pickled estimator, and the data that were pickled with it.
 pub fn restored(content: &[u8]) -> PyResult<(Others, Box<dyn Online>)> {
     let KeptOthers { others } = bytes::read(content)?;
     let rls = match others.size {

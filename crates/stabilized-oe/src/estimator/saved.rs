@@ -1,6 +1,6 @@
 //! Saving and restoring the state of an estimator: the next updates give bit-identical results.
 //!
-//! Rows are settings, and not written: an estimator that has some is none of the types that are saved. Default bounds follow from the
+//! Constraint rows are settings and are not saved: the types that can be saved have none. Default bounds follow from the
 //! shortest step so far.
 
 use ct_constrained::Bounds;

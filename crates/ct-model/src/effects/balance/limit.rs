@@ -32,7 +32,7 @@ end limit;
     symptoms: &["overflows", "end stop", "stays at a value", "cuts out"],
 };
 
-/// The effect in the words of the state's domain.
+/// The effect in the terms of the state's physical domain.
 pub(in crate::effects) fn text_of(state: Quantity) -> EffectText {
     let (physics, confirm) = match state {
         Quantity::Level => (

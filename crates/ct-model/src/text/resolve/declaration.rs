@@ -57,7 +57,7 @@ impl Builder<'_> {
                 }
                 _ => {
                     let what = format!(
-                        "{} is no attribute of the subset: unit, displayUnit, quantity, min, max, nominal, start and fixed are",
+                        "{} is not an attribute of the subset: unit, displayUnit, quantity, min, max, nominal, start and fixed are",
                         shown(name)
                     );
                     return self.error(*from, what);

@@ -97,7 +97,7 @@ impl Builder<'_> {
                 Variable::Flow(i) if i < self.names.tied => true,
                 _ => {
                     let what = format!(
-                        "{} is no parameter: only numbers and parameters are allowed here",
+                        "{} is not a parameter: only numbers and parameters are allowed here",
                         shown(name)
                     );
                     return self.error(from, what);

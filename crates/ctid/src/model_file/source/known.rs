@@ -167,7 +167,7 @@ impl Source<'_> {
         for word in words {
             let Some(vessel) = names.iter().position(|name| name == word) else {
                 let what = format!(
-                    "measured = \"{}\" is no tank; write one of {}",
+                    "measured = \"{}\" is not a tank; write one of {}",
                     quoted(word),
                     written(&names)
                 );
@@ -223,7 +223,7 @@ impl Source<'_> {
             self.at(
                 at,
                 format!(
-                    "disturbance = \"{}\" is no tank; write {}",
+                    "disturbance = \"{}\" is not a tank; write {}",
                     quoted(name),
                     disturbed(plant).join(" or ")
                 ),

@@ -33,7 +33,7 @@ impl<'a> Session<'a> {
                         .collect::<Vec<_>>()
                         .join(","),
                 };
-                self.bad(|| format!("{found} numbers and no header; if this is no part of a row, give t,u,{y} or t,r,u,{y}"));
+                self.bad(|| format!("{found} numbers and no header; if this is not part of a row, give t,u,{y} or t,r,u,{y}"));
                 return Ok(false);
             }
             Err(ct_signals::Error::Read(ct_signals::ReadError::NoOrder { .. })) | Ok((_, true))

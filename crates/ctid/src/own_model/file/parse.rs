@@ -132,7 +132,7 @@ impl OwnModelFile {
     /// signals.
     ///
     /// # Errors
-    /// Where a name is none of a parameter, an effect cannot act in the model, or the numbers of columns are not those of its signals.
+    /// If a name is not that of a parameter, an effect cannot act in the model, or the numbers of columns are not those of its signals.
     pub fn new(name: &str, spec: ModelSpec, settings: OwnSettings) -> Result<Self, Error> {
         let OwnSettings {
             mut columns,
@@ -209,7 +209,7 @@ fn is_parameter(spec: &ModelSpec, effects: &OwnEffects, name: &str) -> Result<()
         return Ok(());
     }
     Err(format!(
-        "{} is no parameter of {}: it has {}{}",
+        "{} is not a parameter of {}: it has {}{}",
         quoted(name),
         spec.name,
         parameters.join(", "),

@@ -51,7 +51,7 @@ fn headline(study: &Study) -> String {
     format!(
         "<header>\n<p class=\"kicker\">ctid report · A. J. Udink ten Cate, WP-85-54, IIASA, 1985</p>\n\
          <h1>Tables 1 to 4: {}</h1>\n\
-         <div class=\"verdict\"><p>The paper prints one run of each table. Here are {} runs, each with another noise, \
+         <div class=\"verdict\"><p>The paper prints one run of each table. Here are {} runs, each with another noise realisation, \
          the same in every table. A cell is inside where the printed figure, give or take its rounding, lies in the \
          5 to 95 % range of the runs; of cells that agree, one in ten lies outside by chance.</p><p>{}</p></div>\n\
          <ol class=\"trail apart\">\n{trail}</ol>\n\

@@ -88,7 +88,7 @@ fn what_is_wrong_is_said_with_its_place_and_the_records_stay_read() {
     let wrong = state(&mut session);
     let error = wrong["own"]["file_error"].as_str().unwrap();
     assert!(
-        error.starts_with("model.toml:3: zz is no parameter of HeatedBlock"),
+        error.starts_with("model.toml:3: zz is not a parameter of HeatedBlock"),
         "{error}"
     );
 }
@@ -302,5 +302,5 @@ fn a_fit_says_whether_the_loop_was_simulated() {
     let found = work.compute(&AtomicBool::new(false)).unwrap();
     let body = work.body(1, &found);
     let said = body["loop"].as_str().unwrap();
-    assert!(said.contains("the record holds no reference"), "{said}");
+    assert!(said.contains("the record has no reference"), "{said}");
 }

@@ -7,7 +7,7 @@ export function start(fail) {
   $("diagnose").addEventListener("click", () => {
     const most = $("most").value.trim();
     if (most && !/^([1-9]\d?|1\d\d|2[0-4]\d|25[0-5])$/.test(most)) {
-      fail(`"${most}" is no number of effects; write a whole number from 1 to 255, or nothing`);
+      fail(`"${most}" is not a valid number of effects; write a whole number from 1 to 255, or nothing`);
       return;
     }
     asked = true;

@@ -54,7 +54,7 @@ function input(id, label, value, suffix) {
     make("input", { id, value: text, inputMode: "decimal", autocomplete: "off", size: 9 }), make("span", { className: "unit" }, units(suffix)))];
 }
 
-/** A number with a point or a comma; null where there is none, and an error that names the field where it is no number. */
+/** A number with a point or a comma; null if the field is empty; throws an error that names the field if the text is not a number. */
 function number(id, label) {
   const box = $(id);
   const text = box.value.trim();

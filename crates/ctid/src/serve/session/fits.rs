@@ -84,7 +84,7 @@ pub(crate) fn same(a: &ModelFile, b: &ModelFile) -> bool {
     bare(a) == bare(b)
 }
 
-/// The model without effects, terms, and settings of their parameters.
+/// The model without its effects and terms, and without the settings of their parameters.
 pub(super) fn without_effects(model: &ModelFile) -> ModelFile {
     let mut bare = model.clone();
     let effects = model.effects.iter().map(|placed| placed.effect.id);

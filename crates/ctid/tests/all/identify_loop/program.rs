@@ -146,7 +146,7 @@ fn what_cannot_be_is_refused() {
     );
     bad(
         &format!("{loops} iv --levels estimated"),
-        &["--levels estimated is of fcloe"],
+        &["--levels estimated is for fcloe only"],
     );
     bad(
         &format!("{loops} ct-rls --levels mean"),

@@ -42,7 +42,7 @@ fn what_three_tanks_lack_is_said() {
         ),
         (
             THREE.replace("T3", "T4"),
-            "tank.toml:3: measured = \"T4\" is no tank",
+            "tank.toml:3: measured = \"T4\" is not a tank",
             "\"T2\"",
         ),
         (
@@ -97,12 +97,12 @@ fn what_three_tanks_lack_is_said() {
         ),
         (
             format!("{THREE}[effect.pump_lag]\nwhere = \"pump_3\""),
-            "tank.toml:5: where = \"pump_3\" is no pump",
+            "tank.toml:5: where = \"pump_3\" is not a pump",
             "\"pump_1\" or \"pump_2\"",
         ),
         (
             format!("{THREE}[effect.overflow]\nwhere = \"upper\""),
-            "tank.toml:5: where = \"upper\" is no vessel",
+            "tank.toml:5: where = \"upper\" is not a vessel",
             "\"T1\" or \"T3\" or \"T2\"",
         ),
         (
@@ -176,7 +176,7 @@ fn what_several_levels_lack_is_said() {
         (
             BOTH.replace("[columns]", "effects = [\"sensor_drift\"]\n[columns]")
                 + "[effect.sensor_drift]\nwhere = \"middle\"\n",
-            "tank.toml:8: where = \"middle\" is no tank whose level is measured",
+            "tank.toml:8: where = \"middle\" is not a tank whose level is measured",
             "\"upper\" or \"lower\"",
         ),
         (

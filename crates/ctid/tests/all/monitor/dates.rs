@@ -93,7 +93,7 @@ fn dates_that_no_row_can_make_plain_end_it() {
     assert_eq!(outcome.code, Some(2), "{}", outcome.err);
     assert_says(
         &outcome,
-        "standard input, row 2, column \"time\": \"03/04/2026 10:00\" has two meanings",
+        "standard input, row 2, column \"time\": \"03/04/2026 10:00\" is ambiguous",
     );
     // A row that is cut in the middle does not determine the format.
     let lines = "5:00,4.5,14.8\n2026-03-29 10:00:02,4,12\n2026-03-29 10:00:04,4,12\n";

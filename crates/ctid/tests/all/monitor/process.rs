@@ -53,7 +53,7 @@ fn a_state_goes_on_where_it_was() {
     refused(
         "--state notes.txt",
         "0,1,2,3\n",
-        "it is no state that `ctid monitor` wrote",
+        "it is not a state file of `ctid monitor`",
     );
     refused("--state no/s.json", "0,1,2,3\n", "choose another folder");
     place.write("m.toml", MODEL.replace("154", "155"));

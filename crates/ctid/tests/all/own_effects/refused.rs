@@ -10,7 +10,7 @@ fn what_cannot_be_added_is_refused_in_a_line() {
     place.refuses(
         "add lagg(y) --model m.toml",
         &[
-            "\"lagg(y)\" is no effect that can act in Block",
+            "\"lagg(y)\" is not an effect that can act in Block",
             "did you mean lag(y)?",
         ],
     );
@@ -28,7 +28,7 @@ fn what_cannot_be_added_is_refused_in_a_line() {
     );
     place.refuses(
         "add lag(y) --model m.toml --from a.csv",
-        &["a.csv: this is no result of a model of your own"],
+        &["a.csv: this is not a result of a model of your own"],
     );
     place.succeeds("compare a.csv --model m.toml --json bare.json");
     place.refuses(
@@ -44,7 +44,7 @@ fn what_cannot_be_added_is_refused_in_a_line() {
     place.write("other.toml", MODEL.replace("block.mo", "other.mo"));
     place.refuses(
         "add lag(y) --model other.toml --from bare.json",
-        &["the result is of the model Block, and this file has Other"],
+        &["the result is for model Block, but this file has Other"],
     );
     let refused = |lines: &str, says: &[&str]| {
         let text = MODEL.replace("effects = []          # nothing yet", lines);
@@ -54,7 +54,7 @@ fn what_cannot_be_added_is_refused_in_a_line() {
     refused(
         "effects = [\"lag(y)\",\n \"lagg(u)\"]",
         &[
-            "bad.toml:3: \"lagg(u)\" is no effect",
+            "bad.toml:3: \"lagg(u)\" is not an effect",
             "did you mean lag(u)?",
         ],
     );
@@ -64,12 +64,12 @@ fn what_cannot_be_added_is_refused_in_a_line() {
     );
     refused(
         "effect.\"lag(y)\".tua = 3.0",
-        &["bad.toml:2: tua is no parameter of lag(y): there are tau; did you mean tau?"],
+        &["bad.toml:2: tua is not a parameter of lag(y): there are tau; did you mean tau?"],
     );
     refused(
         "effect.\"lag(y)\".record = { durations = 3.0 }",
         &[
-            "bad.toml:2: durations is no number of the record of lag(y)",
+            "bad.toml:2: durations is not a number of the record of lag(y)",
             "did you mean duration?",
         ],
     );
@@ -105,7 +105,7 @@ fn a_candidate_that_cannot_be_is_refused_with_its_line_and_the_mend() {
     refused(
         &one("draught", "c = { start = 0.1 }", "Tq = \"-c*T\""),
         &[
-            "bad.toml:9: candidates.draught.terms.Tq: `Tq` is no state, named flow or output of Block",
+            "bad.toml:9: candidates.draught.terms.Tq: `Tq` is not a state, named flow or output of Block",
             "T, y",
         ],
     );

@@ -27,7 +27,7 @@ pub struct Signal<'a> {
 /// One record with the signals of a model; all series are as long as `time`.
 #[derive(Debug, Clone)]
 pub struct Series<'a> {
-    /// Position of the record that it is of, or of which it is a part.
+    /// Position of the record of which this is the whole or a part.
     pub record: usize,
     /// Sampling instants, rising \[s\].
     pub time: &'a [f64],

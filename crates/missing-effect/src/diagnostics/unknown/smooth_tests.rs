@@ -49,7 +49,7 @@ fn run(term: Term, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
         time,
         ..Record::default()
     };
-    // Any output suffices for a structure; the simulation does not depend on it.
+    // A structure needs some output; the simulation does not depend on its values.
     record.outputs[0].values = (0..N).map(|k| 10.0 + (k % 7) as f64).collect();
     let records = [record.clone()];
     let setup = setup(&records);

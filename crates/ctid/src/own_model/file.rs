@@ -136,7 +136,7 @@ impl AnyModelFile {
             (Self::Plant(_), []) => Err(Error::file(
                 path,
                 format!(
-                    "a model file of a plant contains initial values, not fitted ones: give the records to fit it to, {option}"
+                    "a model file of a plant contains start values, not fitted ones: give the records to fit it to, {option}"
                 ),
             )),
             _ => Ok(()),

@@ -79,7 +79,7 @@ fn what_cannot_be_exported_is_refused_in_one_line() {
     place.refuses(
         "export tank.toml --modelica t.mo",
         &[
-            "tank.toml: a model file of a plant contains initial values",
+            "tank.toml: a model file of a plant contains start values",
             "DATA.csv",
         ],
     );

@@ -28,8 +28,21 @@ fn is_predictable(signal: &[f64], thresholds: &Thresholds) -> bool {
 
 impl Context<'_> {
     /// The first property of a set's residual that noise does not have, `None` if the residual is noise; `own` is the set's fit with the noise
-    /// model of its own residual.
+    /// model of its own residual. In a simulated loop the residual on the measured inputs must not be noise either: noise that controllers feed
+    /// back is filtered by the dynamics of the model.
     pub fn not_noise(&self, node: &Node, own: &Fit) -> Result<Option<NotNoise>, Error> {
+        let found = self.property_unlike_noise(node, own)?;
+        if let (Some(_), Some(measured)) = (&found, self.on_measured_inputs()) {
+            let own = measured.in_own_noise(node)?;
+            if measured.property_unlike_noise(node, &own)?.is_none() {
+                return Ok(None);
+            }
+        }
+        Ok(found)
+    }
+
+    /// The first property of a residual that noise does not have, on the inputs of this search.
+    fn property_unlike_noise(&self, node: &Node, own: &Fit) -> Result<Option<NotNoise>, Error> {
         let setup = self.setup(&node.model)?;
         let Some(residuals) = estimation::residuals(&setup, &own.x) else {
             return Ok(None);

@@ -94,6 +94,14 @@ impl Context<'_> {
         Ok(Model::new(apply(&self.problem.spec, &effects)?))
     }
 
+    /// The same search with the measured inputs; `None` if no loop is simulated.
+    pub fn on_measured_inputs(&self) -> Option<Self> {
+        self.simulated_loop.as_ref()?;
+        let mut measured = self.clone();
+        measured.simulated_loop = None;
+        Some(measured)
+    }
+
     /// A model against the fitted records.
     pub fn setup<'b>(&'b self, model: &'b Model) -> Result<ModelSetup<'b>, Error> {
         let problem = self.problem;

@@ -109,7 +109,8 @@ impl Table {
             });
         }
         let own = layout.inputs.len() + layout.outputs.len();
-        for (column, values) in layout.channels().zip(&self.values).take(own) {
+        let columns = layout.channels().zip(&self.values).take(own);
+        for (i, (column, values)) in columns.enumerate() {
             if let Some(k) = values.iter().position(|value| value.abs() > LARGEST) {
                 return Err(Error::TooLarge {
                     file: file.into(),
@@ -120,8 +121,9 @@ impl Table {
                 });
             }
             let largest = values.iter().fold(0.0, |high: f64, v| high.max(v.abs()));
-            // A signal for simulation may be zero for a long time.
-            if purpose == Purpose::Fit && largest < 1.0 / LARGEST {
+            // A signal for simulation may be zero for a long time, and so may one of several inputs.
+            let may_be_zero = purpose != Purpose::Fit || (i < layout.inputs.len() && own > 2);
+            if largest < 1.0 / LARGEST && !(may_be_zero && largest == 0.0) {
                 return Err(Error::TooSmall {
                     file: file.into(),
                     column: quoted(&column.header),

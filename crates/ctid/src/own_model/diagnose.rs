@@ -83,14 +83,28 @@ pub(crate) fn said(
 
 /// The finding in a few words.
 pub(crate) fn heading(diagnosis: &Diagnosis) -> String {
-    match diagnosis.verdict {
-        Verdict::Adequate => "Nothing is missing that these records would show".to_string(),
-        Verdict::Unexplained => "Nothing explains it".to_string(),
-        Verdict::Partial => format!("Mostly: {}", diagnosis.effects.join(", ")),
-        Verdict::Effect | Verdict::Undecided => {
-            format!("Missing: {}", diagnosis.effects.join(", "))
+    let kind = match diagnosis.verdict {
+        Verdict::Adequate => {
+            return "Nothing is missing that these records would show".to_string();
         }
-    }
+        Verdict::Unexplained if is_untried(diagnosis) => {
+            return "No candidate was fitted within the time limit".to_string();
+        }
+        Verdict::Unexplained => return "Nothing explains it".to_string(),
+        Verdict::Partial => "Mostly",
+        Verdict::Effect | Verdict::Undecided => "Missing",
+    };
+    let contradicted = if held_out::error_rises(&diagnosis.steps) {
+        "; but the error on the held-out records rises"
+    } else {
+        ""
+    };
+    format!("{kind}: {}{contradicted}", diagnosis.effects.join(", "))
+}
+
+/// Whether the time limit ended the search before a single effect was fitted.
+fn is_untried(diagnosis: &Diagnosis) -> bool {
+    diagnosis.singles.is_empty() && !diagnosis.left_out.is_empty()
 }
 
 /// Findings in sentences.
@@ -142,8 +156,13 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
     }
     match (&diagnosis.not_noise, diagnosis.verdict) {
         (Some(left), Verdict::Unexplained) => all.push(format!(
-            "The residual of the model is not noise: {}. No candidate explains it.",
-            said_of(left)
+            "The residual of the model is not noise: {}. {}.",
+            said_of(left),
+            if is_untried(diagnosis) {
+                "The time limit ended the search before a candidate was fitted"
+            } else {
+                "No candidate explains it"
+            }
         )),
         (Some(left), _) => all.push(format!(
             "The residual of the model with these effects is not noise: {}.",
@@ -271,7 +290,7 @@ fn said_of(left: &NotNoise) -> String {
             size,
             unit,
         } => format!(
-            "the reading of {output} in {record} changes by {} {} at {}, from one row to the next; this explains more than the candidates do",
+            "a jump of the reading of {output} in {record} by {} {} at {} fits better than the candidates",
             numbers::significant(*size, 3),
             shown_unit(unit),
             ct_signals::duration(*at)

@@ -18,18 +18,37 @@ pub(super) fn rises(file: &OwnModelFile, steps: &[Step]) -> Vec<String> {
         .collect()
 }
 
-fn rise(file: &OwnModelFile, before: &Step, after: &Step) -> Option<String> {
-    let added = after.added.as_ref()?;
+/// Whether the error on held-out records is larger with all effects than without them.
+pub(super) fn error_rises(steps: &[Step]) -> bool {
+    let (Some(first), Some(last)) = (steps.first(), steps.last()) else {
+        return false;
+    };
+    errors(first, last).is_some_and(|both| ratio(&both) > RISES)
+}
+
+/// The held-out error of each output before and after a change of the model.
+fn errors<'a>(before: &'a Step, after: &Step) -> Option<Vec<(&'a String, f64, f64)>> {
     let (old, new) = (
         before.rmse_test_per_output.as_ref()?,
         after.rmse_test_per_output.as_ref()?,
     );
-    let both: Vec<(&String, f64, f64)> = old
-        .iter()
-        .filter_map(|(name, old)| Some((name, *old, *new.get(name)?)))
-        .collect();
+    let both = old.iter();
+    Some(
+        both.filter_map(|(name, old)| Some((name, *old, *new.get(name)?)))
+            .collect(),
+    )
+}
+
+/// Geometric mean of the ratios of the errors.
+fn ratio(both: &[(&String, f64, f64)]) -> f64 {
     let logs: f64 = both.iter().map(|(_, old, new)| (new / old).ln()).sum();
-    let ratio = (logs / both.len() as f64).exp();
+    (logs / both.len() as f64).exp()
+}
+
+fn rise(file: &OwnModelFile, before: &Step, after: &Step) -> Option<String> {
+    let added = after.added.as_ref()?;
+    let both = errors(before, after)?;
+    let ratio = ratio(&both);
     if ratio.is_nan() || ratio <= RISES {
         return None;
     }

@@ -249,7 +249,7 @@ fn runs_away(setup: &ModelSetup, record: &Record, path: &Path, x: &[f64], model:
     Error::file(
         path,
         format!(
-            "the simulation of {model} cannot continue after {at}: a state grows without bound, or an equation has no value there; correct the inputs there, the parameters' values, or the model's text"
+            "the simulation of {model} cannot continue after {at}: a state grows without bound, or an equation has no value or an infinite slope there, as sign(d)*sqrt(abs(d)) at d = 0; correct the inputs there, the parameters' values, or the model's text: d/sqrt(abs(d) + c) with a small c has a finite slope"
         ),
     )
 }

@@ -54,7 +54,6 @@ impl Context<'_> {
                     || !self.beyond_chance((&node, &node.fit), (lacking, &lacking.fit))
                     || self.rests_on_few_readings(&node, lacking, noise)
                     || is_chance(lacking)
-                    || self.is_fed_back_noise(&node, lacking)
             });
             let Some(least) = doubtful.min_by(|a, b| a.fit.bic().total_cmp(&b.fit.bic())) else {
                 // Hard steps may fit single readings by chance.
@@ -67,20 +66,22 @@ impl Context<'_> {
         }
     }
 
-    /// Whether a set of a simulated loop is not better than one that lacks some of its effects if both are fitted on the measured inputs, each
-    /// with the noise model of its own residual. The residual of a simulated loop contains the noise that the controllers feed back, filtered by
-    /// the dynamics of the model: an effect can imitate it, above all near a resonance. On the measured inputs the residual of the true model is
-    /// the noise alone.
-    fn is_fed_back_noise(&self, node: &Node, lacking: &Node) -> bool {
+    /// Whether a set of a simulated loop is not better than one that lacks its effects if both are fitted on the measured inputs, with the noise
+    /// model of the set's residual there. The noise that controllers feed back is taken out of the loop's residual by a linearised plant.
+    /// Of a nonlinear plant a part remains, filtered by the dynamics of the model: an effect can imitate it, above all near a resonance.
+    pub fn is_fed_back_noise(&self, node: &Node, lacking: &Node) -> bool {
         let Some(measured) = self.on_measured_inputs() else {
             return false;
         };
-        let (Ok(with), Ok(without)) = (measured.in_own_noise(node), measured.in_own_noise(lacking))
-        else {
-            return false;
-        };
-        without.bic() - with.bic() <= self.thresholds.bic_margin
-            || !measured.beyond_chance((node, &with), (lacking, &without))
+        let refits = measured.in_own_noise(node);
+        let refits = refits.and_then(|own| {
+            let refitted = |set: &Node| measured.refitted(set, &own.noise, FINE);
+            Ok((refitted(node)?, refitted(lacking)?))
+        });
+        refits.is_ok_and(|(with, without)| {
+            with.gain_over(&without) <= self.thresholds.bic_margin
+                || !measured.beyond_chance((&with, &with.fit), (&without, &without.fit))
+        })
     }
 
     /// Backward elimination without refits, if the time limit is reached: by the Wald statistic of each effect's sizes, which equals the

@@ -28,8 +28,8 @@ fn is_predictable(signal: &[f64], thresholds: &Thresholds) -> bool {
 
 impl Context<'_> {
     /// The first property of a set's residual that noise does not have, `None` if the residual is noise; `own` is the set's fit with the noise
-    /// model of its own residual. In a simulated loop the residual on the measured inputs must not be noise either: noise that controllers feed
-    /// back is filtered by the dynamics of the model.
+    /// model of its own residual. In a simulated loop the residual on the measured inputs must not be noise either: a linearised plant takes
+    /// out the noise that controllers feed back, and of a nonlinear plant a part remains.
     pub fn not_noise(&self, node: &Node, own: &Fit) -> Result<Option<NotNoise>, Error> {
         let found = self.property_unlike_noise(node, own)?;
         if let (Some(_), Some(measured)) = (&found, self.on_measured_inputs()) {

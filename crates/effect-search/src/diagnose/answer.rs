@@ -30,6 +30,13 @@ impl Answer {
     pub fn has_many(&self, context: &Context, base: &Node) -> bool {
         self.set.added.len() >= base.added.len() + context.thresholds.many_effects
     }
+
+    /// Whether the set may describe a slow disturbance: several functions of time, which compensate for any, beside further effects or with
+    /// correlated noise, which may be the rest of the disturbance.
+    pub fn is_flexible(&self, context: &Context, base: &Node) -> bool {
+        context.in_time(&self.set.added[base.added.len()..]) > 1
+            && (self.has_many(context, base) || self.own.noise.order() > 0)
+    }
 }
 
 impl Context<'_> {
@@ -75,7 +82,8 @@ impl Context<'_> {
         // The simulation error must decrease too: in a prewhitened fit, a single reading can be a reason to add an effect.
         Ok(bare.bic() - own.bic() > self.thresholds.bic_margin
             && self.beyond_chance((set, &own), (base, &bare))
-            && error(set) < error(base))
+            && error(set) < error(base)
+            && !self.is_fed_back_noise(set, base))
     }
 
     /// The answer after a floating search without functions of time: a better set, a set that explains a large part of the error, or the same.
@@ -86,9 +94,7 @@ impl Context<'_> {
         max_effects: usize,
     ) -> Result<Answer, Error> {
         let base = searched.singles_by_error.1.clone();
-        // Several functions of time compensate for any slow disturbance.
-        let flexible =
-            answer.has_many(self, &base) && self.in_time(&answer.set.added[base.added.len()..]) > 1;
+        let flexible = answer.is_flexible(self, &base);
         self.limit.begin(Phase::Floating);
         let mut sets = searched.by_error.clone();
         sets.extend(searched.grown.fitted.iter().cloned());

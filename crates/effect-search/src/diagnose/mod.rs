@@ -50,7 +50,10 @@ pub fn diagnose(
 
     tell("confirming");
     let mut answer = context.accepted(&searched)?;
-    if answer.not_noise.is_some() || answer.has_many(&context, &base) {
+    if answer.not_noise.is_some()
+        || answer.has_many(&context, &base)
+        || answer.is_flexible(&context, &base)
+    {
         answer = context.reconsidered(answer, &mut searched, options.max_effects)?;
     }
     answer = context.or_level_shift(answer, &searched)?;

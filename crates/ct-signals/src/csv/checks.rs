@@ -122,8 +122,9 @@ impl Table {
             }
             let largest = values.iter().fold(0.0, |high: f64, v| high.max(v.abs()));
             // A signal for simulation may be zero for a long time, and so may one of several inputs.
-            let may_be_zero = purpose != Purpose::Fit || (i < layout.inputs.len() && own > 2);
-            if largest < 1.0 / LARGEST && !(may_be_zero && largest == 0.0) {
+            let inputs = layout.inputs.len();
+            let unused = largest == 0.0 && inputs > 1 && i < inputs;
+            if purpose == Purpose::Fit && largest < 1.0 / LARGEST && !unused {
                 return Err(Error::TooSmall {
                     file: file.into(),
                     column: quoted(&column.header),

@@ -1,8 +1,8 @@
 //! Times and signals that no record can hold: repeated and backward times, gaps, too few rows, constant and saturated signals.
 
-use ct_signals::{Error, ReadError, require_samples};
+use ct_signals::{Columns, Error, ReadError, require_samples};
 
-use super::{HEADER, read, rows, says, text, with_line};
+use super::{HEADER, read, read_bytes, rows, says, text, with_line};
 
 #[test]
 fn repeated_and_backward_time() {
@@ -178,4 +178,21 @@ fn a_coarsely_quantised_output_is_not_saturated() {
         "{highest} samples at the highest level"
     );
     read(&text(HEADER, &rows)).unwrap();
+}
+
+#[test]
+fn one_of_several_inputs_may_be_zero() {
+    let mut text = String::from("t [s],u [V],vent [%],y [cm]\n");
+    for [t, u, y] in rows() {
+        text += &format!("{t},{u},0,{y}\n");
+    }
+    let columns = |inputs: &[&str]| Columns {
+        inputs: inputs.iter().map(ToString::to_string).collect(),
+        outputs: vec!["y".into()],
+        ..Columns::default()
+    };
+    let record = read_bytes(text.as_bytes(), &columns(&["u", "vent"])).unwrap();
+    assert!(record.inputs[1].values.iter().all(|v| *v == 0.0));
+    // Alone it moves nothing.
+    assert!(read_bytes(text.as_bytes(), &columns(&["vent"])).is_err());
 }

@@ -1,5 +1,7 @@
 //! Single records of the library study (`--example library_study`), by their names and seeds.
 
+#![allow(clippy::unwrap_used)]
+
 use ctid_examples::model_records::driven_models;
 use ctid_tests::library::{Outcome, jobs, outcome};
 use effect_search::{Options, Verdict};

@@ -177,12 +177,12 @@ fn the_table_of_a_term_is_checked() {
         (
             "heater",
             "shape(T,v)",
-            ["no smooth function", "did you mean"],
+            ["not a smooth function", "did you mean"],
         ),
         (
             "heater",
             "lag(u)",
-            ["no smooth function", "`ctid diagnose`"],
+            ["not a smooth function", "`ctid diagnose`"],
         ),
         (
             "k",

@@ -110,7 +110,7 @@ fn the_second_paper_is_reproduced_cell_by_cell() {
     // Undetected changes are reported too.
     let sentences = text.split_whitespace().collect::<Vec<_>>().join(" ");
     for words in [
-        "the output error finds them to 0.7 %, more than chance",
+        "the output error estimates them to 0.7 %, more than chance",
         "Not reproduced, and without a band: IV raw",
         "2.11e-3 printed",
         "q = K1 u is right",

@@ -152,6 +152,9 @@ pub struct Thresholds {
     /// This many effects or more are reported as a part of the answer only: together they may imitate one effect that is not a candidate.
     /// Chosen.
     pub many_effects: usize,
+    /// An answer with more functions of time than this, beside further effects ([`Self::many_effects`]) or with correlated noise, may describe any
+    /// slow disturbance (0 or more): it is replaced by a partial explanation, or by none. Chosen.
+    pub functions_of_time: usize,
     /// Effects whose residual is not noise are reported as a part of the answer if they explain this share of the mean squared error above
     /// the noise level (0 to 1). Chosen.
     pub partial_share: f64,
@@ -262,6 +265,7 @@ impl Thresholds {
         stationary_lines: 2,
         stationary_part_samples: 50,
         many_effects: 3,
+        functions_of_time: 1,
         partial_share: 0.38,
         partial_share_of_time: 0.9,
         partial_tested: 6,

@@ -34,7 +34,8 @@ impl Answer {
     /// Whether the set may describe a slow disturbance: several functions of time, which compensate for any, beside further effects or with
     /// correlated noise, which may be the rest of the disturbance.
     pub fn is_flexible(&self, context: &Context, base: &Node) -> bool {
-        context.in_time(&self.set.added[base.added.len()..]) > 1
+        let in_time = context.in_time(&self.set.added[base.added.len()..]);
+        in_time > context.thresholds.functions_of_time
             && (self.has_many(context, base) || self.own.noise.order() > 0)
     }
 }

@@ -53,7 +53,7 @@ fn several_functions_of_time_are_no_answer() {
     let many = with(
         &problem,
         Thresholds {
-            many_effects: 99,
+            functions_of_time: 99,
             ..Thresholds::DEFAULT
         },
     );

@@ -89,14 +89,14 @@ mod tests {
         assert_eq!(next(&mut saver, 2.0), None);
         std::fs::write(&path, "{\"written_by\": \"another program\"}").unwrap();
         let said = next(&mut saver, 3.0).unwrap();
-        assert!(said.contains("no state of"), "{said}");
+        assert!(said.contains("state file of"), "{said}");
         assert!(std::fs::read_to_string(&path).unwrap().contains("another"));
         std::fs::remove_file(&path).unwrap();
         assert_eq!(next(&mut saver, 4.0).unwrap(), "the state is saved again");
         // A file that appeared before the first save.
         std::fs::write(&path, "mine").unwrap();
         let mut first = Saver::new(Some(path.clone()), 0);
-        assert!(next(&mut first, 5.0).unwrap().contains("no state of"));
+        assert!(next(&mut first, 5.0).unwrap().contains("state file of"));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
     }
 

@@ -237,7 +237,7 @@ fn a_loop_that_is_not_simulated_says_why() {
                 record: record.clone(),
             },
             None,
-            ["The loop is not simulated: rig", "straight line"],
+            ["The loop is not simulated: rig", "linear between samples"],
         ),
         (
             NotSimulated::NoReference {

@@ -267,6 +267,17 @@ pub enum Error {
 }
 
 impl Error {
+    /// Whether a header lacks a column that is needed.
+    #[must_use]
+    pub fn lacks_a_column(&self) -> bool {
+        match self {
+            Self::Read(ReadError::Column { fault, .. }) => {
+                matches!(**fault, ColumnFault::Missing { .. })
+            }
+            _ => false,
+        }
+    }
+
     /// Whether the unit of a header is refused: it is not a unit of time, or differs from that of the model.
     #[must_use]
     pub fn of_units(&self) -> bool {

@@ -60,6 +60,7 @@ mod calendar;
 mod column_fault;
 mod columns;
 mod csv;
+mod declared_range;
 mod error;
 pub mod excitation;
 mod gaps;
@@ -89,6 +90,7 @@ pub use csv::{
     Converted, MissingSamples, ReadOptions, ReadSummary, Reading, csv_header, parse_csv,
     parse_inputs_csv, read_csv, read_inputs_csv,
 };
+pub use declared_range::OutOfRange;
 pub use error::{CellMend, Error, PartLimit, ReadError, Shortage};
 pub use gaps::{Gaps, LongestHold};
 pub use isolated::{IsolatedReadings, isolated_readings};

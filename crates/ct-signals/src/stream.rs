@@ -1,6 +1,6 @@
 //! Rows as they come on a stream, a line at a time: what a CSV file may hold, but without looking ahead.
 //!
-//! The first line that is neither blank nor a comment decides: where it holds names, [`Columns`] says which column is what, as
+//! The first line of a table decides (blank lines, comments and `sep=;` are none): where it holds names, [`Columns`] says which column is what, as
 //! in a file; where it holds a time and numbers, they are time, reference, command and readings, or time, command and readings.
 //! Understood as in a file: commas, semicolons or tabs, a decimal comma where commas do not separate, a byte-order mark, CRLF,
 //! blank lines and comments, quotes, words where a sample is missing, times as numbers in a unit or as dates. The first row's time says how
@@ -9,11 +9,14 @@
 mod bad_line;
 mod row;
 
-use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
+use csv::{ReaderBuilder, StringRecord, Terminator, Trim, WriterBuilder};
 
 pub use self::bad_line::BadLine;
 use crate::columns::{Found, Layout, Purpose};
-use crate::csv::{Numbers, Times, check_width, delimiter, is_number, says_missing};
+use crate::csv::{
+    DELIMITER_KEY, Numbers, Times, are_units, check_width, delimiter, is_number, says_missing,
+    with_unit,
+};
 use crate::{
     Calendar, Columns, Conversion, Error, ReadError, Timestamp, TimestampReader, escaped, quoted,
     unit,
@@ -183,6 +186,41 @@ impl Rows {
         rows.values = vec![Ok(f64::NAN); rows.at.len()];
         rows.header = Some(line.to_string());
         Ok((rows, false))
+    }
+
+    /// Whether a line is no part of a table: blank, a comment, or the line in which spreadsheets name the delimiter, `sep=;`.
+    #[must_use]
+    pub fn is_before_header(line: &str) -> bool {
+        let line = text(line);
+        let key = line.strip_prefix(DELIMITER_KEY);
+        line.is_empty() || line.starts_with('#') || key.is_some_and(|delimiter| delimiter.len() < 2)
+    }
+
+    /// The header with the units that the row below it gives; `None` if there is no header, or the line has no units. `file` and `row`: as of
+    /// [`Rows::begin`].
+    ///
+    /// # Errors
+    /// If a column has another unit in the header.
+    pub fn header_with_units(
+        &self,
+        (file, row): (&str, u64),
+        line: &str,
+    ) -> Result<Option<String>, Error> {
+        let below = StringRecord::from(cells(text(line), self.delimiter));
+        let Some(header) = self.header.as_deref().filter(|_| are_units(&below)) else {
+            return Ok(None);
+        };
+        let names = cells(header, self.delimiter);
+        let named = names.iter().zip(&below);
+        let named = named.map(|(name, below)| with_unit(name, below, (file, row)));
+        let named = named.collect::<Result<Vec<String>, Error>>()?;
+        // Names with a delimiter in them need quotes.
+        let mut writer = WriterBuilder::new()
+            .delimiter(self.delimiter)
+            .from_writer(Vec::new());
+        let written = writer.write_record(&named).ok();
+        let line = written.and_then(|()| String::from_utf8(writer.into_inner().ok()?).ok());
+        Ok(line)
     }
 
     /// Whether a header has named the columns.

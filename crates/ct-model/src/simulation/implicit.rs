@@ -70,6 +70,7 @@ impl Jacobian {
                 *state = Dual::variable(state.re, lane);
             }
             tape.copy_answers(at, &mut self.registers);
+            self.registers.extended = at.extended;
             tape.evaluate_slopes(&mut self.registers);
             for (i, &register) in tape.derivatives.iter().enumerate() {
                 for lane in 0..LANES.min(n - begin) {

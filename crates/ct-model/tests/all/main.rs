@@ -16,6 +16,7 @@ mod round_trip;
 mod shared;
 mod simulated;
 mod sliding;
+mod stiff_roots;
 mod support;
 mod terms;
 mod threads;

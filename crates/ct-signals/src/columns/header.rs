@@ -44,12 +44,8 @@ pub(super) struct Header<'a> {
 impl Header<'_> {
     /// Whether no column has this name.
     pub(super) fn lacks(&self, role: &Role, wanted: &str) -> bool {
-        match self.named(role, wanted) {
-            Err(Error::Read(ReadError::Column { fault, .. })) => {
-                matches!(*fault, ColumnFault::Missing { .. })
-            }
-            _ => false,
-        }
+        self.named(role, wanted)
+            .is_err_and(|error| error.lacks_a_column())
     }
 
     pub(super) fn named(&self, role: &Role, wanted: &str) -> Result<Found, Error> {

@@ -26,7 +26,9 @@ use self::table::read_table;
 use self::text::decode;
 pub(crate) use self::{
     cells::{Cell, CellFault, Numbers, TIME_AS_NUMBER, says_missing},
-    text::{check_width, delimiter, delimiter_name, is_number},
+    rows::with_unit,
+    start::are_units,
+    text::{DELIMITER_KEY, check_width, delimiter, delimiter_name, is_number},
     time::Times,
 };
 use crate::columns::{Columns, Heading, Purpose};

@@ -50,30 +50,14 @@ impl<'a> Rows<'a> {
             let mut names: Vec<String> = record.iter().map(str::to_string).collect();
             if self.start.units {
                 while self.next(&mut record)? && record.iter().all(str::is_empty) {}
+                let row = line_number(self.text, self.end());
                 for (name, below) in names.iter_mut().zip(&record) {
-                    *name = self.with_unit(name, unit_of(below).unwrap_or_default())?;
+                    *name = with_unit(name, below, (self.file, row))?;
                 }
             }
             return Ok(HeaderRow { row, names });
         }
         Err(empty(self.file))
-    }
-
-    /// A name with the unit of the row below the header. What stands in brackets in the header and is no unit belongs to the name.
-    fn with_unit(&self, name: &str, below: &str) -> Result<String, Error> {
-        let bracketed = unit::split_bracket(name).map_or("", |(_, unit)| unit);
-        let own = Some(bracketed).filter(|unit| Unit::parse(unit).is_some());
-        match own {
-            _ if below.is_empty() => Ok(name.to_string()),
-            None => Ok(format!("{name} [{below}]")),
-            Some(own) if Unit::parse(own) == Unit::parse(below) => Ok(name.to_string()),
-            Some(_) => Err(Error::Read(ReadError::TwoUnits {
-                file: self.file.into(),
-                row: line_number(self.text, self.end()),
-                column: quoted(name),
-                below: quoted(below),
-            })),
-        }
     }
 
     /// The next row, if there is one.
@@ -90,5 +74,27 @@ impl<'a> Rows<'a> {
     pub fn end(&self) -> usize {
         let read = usize::try_from(self.reader.position().byte());
         read.map_or(usize::MAX, |read| read.saturating_add(self.start.begin))
+    }
+}
+
+/// A name with the unit of the row below the header. What stands in brackets in the header and is no unit belongs to the name.
+pub(crate) fn with_unit(
+    name: &str,
+    below: &str,
+    (file, row): (&str, u64),
+) -> Result<String, Error> {
+    let below = unit_of(below).unwrap_or_default();
+    let bracketed = unit::split_bracket(name).map_or("", |(_, unit)| unit);
+    let own = Some(bracketed).filter(|unit| Unit::parse(unit).is_some());
+    match own {
+        _ if below.is_empty() => Ok(name.to_string()),
+        None => Ok(format!("{name} [{below}]")),
+        Some(own) if Unit::parse(own) == Unit::parse(below) => Ok(name.to_string()),
+        Some(_) => Err(Error::Read(ReadError::TwoUnits {
+            file: file.into(),
+            row,
+            column: quoted(name),
+            below: quoted(below),
+        })),
     }
 }

@@ -148,7 +148,7 @@ impl Line {
 }
 
 /// Whether the cells are units, at least one of them of a quantity: `1,-,-` is a row in which samples are missing.
-fn are_units(record: &StringRecord) -> bool {
+pub(crate) fn are_units(record: &StringRecord) -> bool {
     let is_number = |cell: &str| cell.parse::<f64>().is_ok();
     record
         .iter()

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::{Calendar, IsolatedReadings, Names, duration};
+use crate::{Calendar, IsolatedReadings, Names, OutOfRange, duration};
 
 /// Samples of a column that are missing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -71,6 +71,8 @@ pub struct ReadSummary {
     pub converted: Vec<Converted>,
     /// Readings that are far from those before and after them.
     pub isolated: Vec<IsolatedReadings>,
+    /// Signals with values outside the range that a model declares; the reader itself knows of none.
+    pub out_of_range: Vec<OutOfRange>,
     /// Interval of the grid after resampling \[s\].
     pub resampled: Option<f64>,
 }
@@ -88,6 +90,19 @@ impl ReadSummary {
             && self.missing.is_empty()
             && self.converted.is_empty()
             && self.resampled.is_none()
+    }
+
+    /// Notes that a column was converted once more, from the unit in which it was read.
+    pub fn add_conversion(&mut self, column: &str, from: &str, to: &str) {
+        let mut converted = self.converted.iter_mut();
+        match converted.find(|converted| converted.column == column) {
+            Some(converted) => converted.to = to.to_string(),
+            None => self.converted.push(Converted {
+                column: column.to_string(),
+                from: from.to_string(),
+                to: to.to_string(),
+            }),
+        }
     }
 
     /// The line with the caller's names for the settings of reading.

@@ -258,6 +258,7 @@ impl Table {
             missing,
             converted: converted.collect(),
             isolated: isolated_readings(&record),
+            out_of_range: Vec::new(),
             resampled: options.resample,
         };
         if let Some(interval) = options.resample {

@@ -90,7 +90,7 @@ pub(super) fn line_number(text: &str, end: usize) -> u64 {
 }
 
 /// What spreadsheets write before the delimiter in a first line of its own: `sep=;`.
-const DELIMITER_KEY: &str = "sep=";
+pub(crate) const DELIMITER_KEY: &str = "sep=";
 
 /// Whether a row comes before the header: an empty one, or the one that names the delimiter.
 pub(super) fn is_before_header(row: &StringRecord) -> bool {

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use ct_signals::{
-    Hold, IsolatedReadings, ReadOptions, ReadSummary, Reading, Record, duration, escaped, quoted,
-    read_csv,
+    Hold, IsolatedReadings, OutOfRange, ReadOptions, ReadSummary, Reading, Record, duration,
+    escaped, quoted, read_csv,
 };
 use missing_effect::Problem;
 
@@ -95,7 +95,33 @@ pub(crate) fn notes(summaries: &[ReadSummary], look: Look) -> String {
 
 /// Sentences about what may be wrong in a record that was read, with the corrections.
 pub(crate) fn faults(summary: &ReadSummary) -> impl Iterator<Item = String> {
-    days(summary).into_iter().chain(isolated(summary))
+    let outside = summary.out_of_range.iter();
+    let outside = outside.map(|outside| of_range(summary, outside));
+    days(summary)
+        .into_iter()
+        .chain(isolated(summary))
+        .chain(outside)
+}
+
+/// A sentence about values outside the range that the model declares, with the correction.
+fn of_range(summary: &ReadSummary, outside: &OutOfRange) -> String {
+    let shown = |value: f64| with_unit(&numbers::significant(value, 4), &outside.unit);
+    let (beyond, bound, towards) = if outside.value > outside.bound {
+        ("above", "max", "up")
+    } else {
+        ("below", "min", "down")
+    };
+    let rows = match outside.rows {
+        1 => "1 row".to_string(),
+        rows => format!("{rows} rows"),
+    };
+    format!(
+        "{}: {signal} is {beyond} its {bound} of {} in {rows}, {towards} to {}: correct the unit in the column's header, or the {bound} of {signal} in the model",
+        summary.file,
+        shown(outside.bound),
+        shown(outside.value),
+        signal = outside.signal,
+    )
 }
 
 /// A sentence about times that look like days, with the correction.

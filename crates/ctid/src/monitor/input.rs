@@ -32,7 +32,7 @@ impl<'a> Session<'a> {
             }
         };
         let begins = self.rows.is_none();
-        if begins && !self.first(line)? {
+        if begins && !self.first(line)? || !begins && self.has_units(line)? {
             return Ok(());
         }
         let mut read = self.read(line);
@@ -81,6 +81,23 @@ impl<'a> Session<'a> {
             Err(bad) => {
                 self.bad(|| said(&bad));
                 Ok(())
+            }
+        }
+    }
+
+    /// Whether a line below the header gives units: the rows after it are read in these.
+    fn has_units(&mut self, line: &[u8]) -> Result<bool, Error> {
+        let text = match (self.taken, std::str::from_utf8(line)) {
+            (0, Ok(text)) if !self.timed => text,
+            _ => return Ok(false),
+        };
+        let rows = self.rows.take_if(|rows| rows.times().is_none());
+        let Some(rows) = rows else { return Ok(false) };
+        match rows.header_with_units((INPUT, self.line), text)? {
+            Some(header) => self.first(header.as_bytes()).map(|_| true),
+            None => {
+                self.rows = Some(rows);
+                Ok(false)
             }
         }
     }

@@ -159,6 +159,8 @@ struct Session<'a> {
     /// Whether the monitor continues from a saved state.
     restored: bool,
     rows: Option<Rows>,
+    /// The error of the last line of text, if that is the header: a needed column is missing.
+    not_header: Option<ct_signals::Error>,
     /// Number of lines before the first row.
     parts: usize,
     line: u64,
@@ -229,6 +231,7 @@ impl<'a> Session<'a> {
             conversions: Vec::new(),
             restored,
             rows: None,
+            not_header: None,
             parts: 0,
             line: 0,
             trouble: Trouble::default(),
@@ -262,6 +265,9 @@ impl<'a> Session<'a> {
     }
 
     fn end(&mut self, why: &str, saved: bool) -> Result<(), Error> {
+        if let Some(error) = self.not_header.take() {
+            return Err(error.into());
+        }
         if self.rows.is_none() && self.parts == 0 && why != "stopped" {
             return Err(Error::Usage(format!(
                 "{INPUT} is empty; rows such as 0,15,4.5,14.8 (t, r, u, y) are needed, with a header or without"

@@ -1,6 +1,6 @@
 //! The loop of a user's own model: its controllers with the times of the records, their references, and what is said of it.
 
-use ct_signals::{Channel, Columns, Heading, Record};
+use ct_signals::{Channel, Columns, Heading, ReadSummary, Record};
 use effect_search::ControlLoop;
 use greybox::LoopController;
 
@@ -38,7 +38,11 @@ impl OwnModelFile {
     ///
     /// # Errors
     /// Where a column is in a unit of another dimension.
-    pub(super) fn references_of(&self, record: &Record) -> Result<Vec<Channel>, Error> {
+    pub(super) fn references_of(
+        &self,
+        record: &Record,
+        summary: &mut ReadSummary,
+    ) -> Result<Vec<Channel>, Error> {
         let spec = self.model.spec();
         let mut references = Vec::new();
         for own in &self.controllers {
@@ -53,7 +57,7 @@ impl OwnModelFile {
             };
             let mut channel = channel.clone();
             let about = spec.about(spec.outputs[own.output].variable);
-            convert(&record.name, &mut channel, about)?;
+            convert(summary, &mut channel, about)?;
             channel.name = name;
             references.push(channel);
         }

@@ -2,7 +2,7 @@
 
 use ct_signals::{Heading, duration};
 use effect_search::design::{
-    Alternative, Design, Experiment, InputRange, InputSequenceKind, Kind, Limits, Prospect,
+    Alternative, Design, Experiment, InputRange, InputSequenceKind, Kind, Limits, Prospect, Reach,
     design as search,
 };
 use effect_search::{Options, Progress};
@@ -23,6 +23,8 @@ use crate::{Error, MessageNames, numbers};
 
 /// A significant effect lowers the criterion by this much.
 const NEEDED: f64 = 6.0;
+/// An output that leaves its range in the records by more than this share of it is reported.
+const FAR: f64 = 1.0;
 /// Records decide between two effects if the criteria of their models differ by more than this.
 const DECIDED: f64 = 10.0;
 
@@ -245,6 +247,11 @@ fn sequence_words(design: &Design, applied: &InputSequenceKind) -> String {
     let mut ranges = design.ranges.iter();
     let own = ranges.find(|range| range.input == applied.input);
     let unit = own.map_or("", |range| range.unit.as_str());
+    if applied.kind == Kind::Constant {
+        let value = numbers::significant(applied.low, 3);
+        let value = with_unit(&value, shown_unit(unit));
+        return format!("{} constant at {value}", applied.input);
+    }
     let levels = applied
         .levels
         .map_or(String::new(), |n| format!(" of {n} levels"));
@@ -272,6 +279,19 @@ fn decided(design: &Design) -> Option<String> {
             better.effect,
             numbers::significant(ahead, 3),
             other.effect
+        )
+    })
+}
+
+/// Warning about an output that goes far beyond its range in the records.
+fn outside(file: &OwnModelFile, reach: &Reach) -> Option<String> {
+    let unit = file.unit_of(&reach.output);
+    (reach.excursion() > FAR).then(|| {
+        format!(
+            "Either model is a guess that far outside the records: {} would reach {}, and was within {} so far. Give narrower ranges of the inputs if the plant may not go there.",
+            reach.output,
+            range(reach.low, reach.high, unit),
+            range(reach.visited_low, reach.visited_high, unit)
         )
     })
 }
@@ -341,6 +361,9 @@ pub(crate) fn sentences(file: &OwnModelFile, design: &Design, reader: Reader) ->
         .collect();
     if !design.twins() && !held.is_empty() {
         all.push(format!("Hold {}.", held.join(", ")));
+    }
+    if !design.twins() {
+        all.extend(best.reaches.iter().filter_map(|reach| outside(file, reach)));
     }
     if let Some(times) = design.times_as_long.filter(|_| !design.twins()) {
         all.push(format!(

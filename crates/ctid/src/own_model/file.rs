@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use ct_model::effects::OwnCandidate;
 use ct_model::{About, Model, ModelSpec};
 use ct_signals::{
-    Channel, ColumnFault, Columns, Conversion, Heading, Hold, Reading, Record, Unit, csv_header,
-    quoted, read_csv, read_file,
+    Channel, ColumnFault, Columns, Conversion, Heading, Hold, OutOfRange, ReadSummary, Reading,
+    Record, Unit, csv_header, quoted, read_csv, read_file,
 };
 use effect_search::{Diagnosis, Kept, MendedGaps, PriorKnowledge, Whole, mend};
 use greybox::PriorValue;
@@ -89,7 +89,7 @@ pub struct Records {
     /// Seconds in one unit of the model's time.
     pub time_unit: f64,
     /// Summary of each record that was read, fitted ones first.
-    pub summaries: Vec<ct_signals::ReadSummary>,
+    pub summaries: Vec<ReadSummary>,
 }
 
 /// A model file of a plant or of a user's own model.
@@ -242,7 +242,7 @@ impl OwnModelFile {
         time_unit: f64,
     ) -> Result<Records, Error> {
         for reading in &mut all {
-            self.convert(&mut reading.record)?;
+            self.convert(&mut reading.record, &mut reading.summary)?;
         }
         let (mut all, summaries): (Vec<Record>, Vec<_>) = all
             .into_iter()
@@ -296,17 +296,21 @@ impl OwnModelFile {
     }
 
     /// Converts the channels to the units of the model, if the model file gives other ones, and renames them: results have the names of the
-    /// model's signals.
+    /// model's signals. The summary tells of the conversions, and of inputs outside the range that the model declares.
     ///
     /// # Errors
     /// Where a column is in a unit of another dimension.
-    pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
-        record.references = self.references_of(record)?;
+    pub fn convert(&self, record: &mut Record, summary: &mut ReadSummary) -> Result<(), Error> {
+        record.references = self.references_of(record, summary)?;
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
         for (channel, about) in channels.zip(self.signals()) {
-            convert(&record.name, channel, about)?;
+            convert(summary, channel, about)?;
             channel.name.clone_from(&about.name);
         }
+        let inputs = record.inputs.iter().zip(self.model.spec().about_inputs());
+        let outside =
+            inputs.filter_map(|(channel, about)| OutOfRange::find(channel, about.min, about.max));
+        summary.out_of_range.extend(outside);
         Ok(())
     }
 
@@ -329,18 +333,24 @@ pub(super) fn headings(path: &Path) -> Result<Vec<Heading>, Error> {
     Ok(csv_header(&path.display().to_string(), &content)?)
 }
 
-/// Puts a channel of a record into the unit of the model's signal.
+/// Puts a channel of a record into the unit of the model's signal; the summary of the record tells of it.
 ///
 /// # Errors
 /// Where its unit is of another dimension.
-pub(super) fn convert(record: &str, channel: &mut Channel, about: &About) -> Result<(), Error> {
+pub(super) fn convert(
+    summary: &mut ReadSummary,
+    channel: &mut Channel,
+    about: &About,
+) -> Result<(), Error> {
     let blame = |what| Error::File {
-        file: record.to_string(),
+        file: summary.file.clone(),
         what,
     };
-    if let Some(conversion) = conversion(about, &channel.name, &channel.unit).map_err(blame)? {
+    let conversion = conversion(about, &channel.name, &channel.unit).map_err(blame)?;
+    if let Some(conversion) = conversion.filter(|conversion| !conversion.is_identity()) {
         let values = channel.values.iter_mut();
         values.for_each(|value| *value = conversion.apply(*value));
+        summary.add_conversion(&channel.name, &channel.unit, &about.unit);
     }
     channel.unit.clone_from(&about.unit);
     Ok(())

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use ct_model::{Linearity, TransferFunction};
-use ct_signals::{Columns, Hold, Record, quoted};
+use ct_signals::{Columns, Hold, ReadSummary, Record, quoted};
 use serde::Serialize;
 
 use super::controller::OwnController;
@@ -163,7 +163,7 @@ impl<'f> OneByOne<'f> {
     ///
     /// # Errors
     /// Where a unit is of another dimension.
-    pub fn convert(&self, record: &mut Record) -> Result<(), Error> {
+    pub fn convert(&self, record: &mut Record, summary: &mut ReadSummary) -> Result<(), Error> {
         let spec = self.file.model.spec();
         let output = spec.about(spec.outputs[self.output].variable);
         if self
@@ -176,7 +176,7 @@ impl<'f> OneByOne<'f> {
         let channels = record.inputs.iter_mut().chain(&mut record.outputs);
         let channels = channels.chain(record.references.first_mut());
         for (channel, about) in channels.zip(signals) {
-            super::file::convert(&record.name, channel, about)?;
+            super::file::convert(summary, channel, about)?;
         }
         Ok(())
     }

@@ -84,6 +84,11 @@ pub(crate) fn missing_term(words: &EffectWords, unknown: &Unknown) -> MissingTer
         [Site::Value(p), ..] => format!("the relative change of {p}"),
         [] => "the missing term".to_string(),
     };
+    let shown_term = if unknown.is_centred {
+        format!("{shown_term}, less its mean")
+    } else {
+        shown_term
+    };
     let places = unknown.places.iter().map(|place| {
         let placed = words.placed(&place.effect);
         ComparedPort::new(placed, place.bic_gain, place.share_left_out)

@@ -31,7 +31,7 @@ pub(crate) fn simulate(
     let mut read = read_inputs(&inputs.path, &file.columns, &read_options, |e| {
         file.named(e)
     })?;
-    file.convert(&mut read.record)?;
+    file.convert(&mut read.record, &mut read.summary)?;
     let mut summaries = Vec::new();
     let time_unit = match &mut records {
         None => file.time_unit(&inputs.path)?,
@@ -81,7 +81,7 @@ impl FittedModel {
             ..Columns::default()
         };
         let mut read = ReadInputs::of(&name, reading, &columns)?;
-        self.model().convert(&mut read.record)?;
+        self.model().convert(&mut read.record, &mut read.summary)?;
         let mut all = self.records().records.clone();
         all.push(read.record);
         crate::input::on_one_clock(&mut all);

@@ -21,10 +21,15 @@ pub(super) fn said(unknown: &Unknown, words: &EffectWords) -> String {
         }
     });
     format!(
-        "A function of every state, input and time was fitted at every port: the best is a function of {}. {} explains {:.0} % of the squared error above the noise{left_out}; `ctid add NAME --from RESULT.json` keeps it under a name of your choice until its physics is known.",
+        "A function of every state, input and time was fitted at every port: the best is a function of {}. {} explains {:.0} % of the squared error above the noise{left_out}{mean}; `ctid add NAME --from RESULT.json` keeps it under a name of your choice until its physics is known.",
         unknown.variable,
         words.placed(&unknown.effect),
-        100.0 * unknown.share
+        100.0 * unknown.share,
+        mean = if unknown.is_centred {
+            " (its values are shown less their mean, for which the parameters of the model compensate)"
+        } else {
+            ""
+        },
     )
 }
 

@@ -92,6 +92,7 @@ fn described(candidate: &Candidate, unit: &str) -> String {
         (Kind::MultiLevel, _) => {
             format!("a sequence of many levels drawn {range}, each held for {clock}")
         }
+        (Kind::Constant, _) => format!("a constant value {range}"),
     };
     sequence + &slowly
 }

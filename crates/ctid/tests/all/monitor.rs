@@ -142,6 +142,10 @@ fn the_ways_to_write_rows_are_those_of_the_csv_reader() {
                 + &lines.replace(",15,", "\t\"15\"\t").replace(',', "\t"),
         ),
         (
+            "a delimiter key, lines above the header and a row of units, as loggers and spreadsheets write them",
+            "sep=;\nDevice;DAQ 4\nRate;0,5\n\nt;r;u;y\ns;cm;V;cm\n".to_string() + &semicolons,
+        ),
+        (
             "the header again",
             text(HEADER, &rows[..700]) + &text(HEADER, &rows[700..]),
         ),

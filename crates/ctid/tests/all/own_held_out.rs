@@ -42,7 +42,9 @@ fn an_effect_that_raises_the_held_out_error_is_said() {
     place.write("same.csv", rows(4e-4, 6));
     place.write("none.csv", rows(0.0, 7));
     let said = |test: &str| {
-        let said = place.succeeds(&format!("diagnose drifts.csv --model m.toml --test {test}"));
+        let said = place.succeeds(&format!(
+            "diagnose drifts.csv --model m.toml --test {test} --json {test}.json"
+        ));
         said.split_whitespace().collect::<Vec<_>>().join(" ")
     };
     let rises = "the error on the held-out records rises (y from";
@@ -52,4 +54,12 @@ fn an_effect_that_raises_the_held_out_error_is_said() {
         assert_eq!(said.contains(rises), is_said, "{said}");
         assert_eq!(said.contains(heading), is_said, "{said}");
     }
+    // The held-out record decides nothing.
+    let [one, other] = ["none.csv.json", "same.csv.json"].map(|found| place.json(found));
+    assert_eq!(one["effects"], other["effects"]);
+    assert_eq!(one["ranked"], other["ranked"]);
+    assert_eq!(
+        one["steps"][1]["parameters"], other["steps"][1]["parameters"],
+        "not a bit of the estimates depends on it"
+    );
 }

@@ -130,3 +130,33 @@ fn a_parameter_without_bounds_may_be_far_from_its_start() {
     let found = far.result("diagnose a.csv --model m.toml");
     assert_eq!(found["verdict"], "adequate", "{found}");
 }
+
+#[test]
+fn conversions_of_units_are_told_and_so_are_inputs_outside_their_range() {
+    let text = BLOCK.replace(
+        "input Real p(unit=\"W\")",
+        "input Real p(unit=\"kW\", min=0, max=0.4)",
+    );
+    let text = text.replace("= p -", "= 1000*p -");
+    let watts = place(&text, "time_unit = \"s\"\n", plain(300));
+    for command in [
+        "compare a.csv --model m.toml",
+        "simulate m.toml a.csv --out y.csv",
+    ] {
+        let said = watts.succeeds(command);
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            said.contains("\"p\" converted from W to kW")
+                && said.contains("warning: a.csv: p is above its max of 0.4000 kW in 75 rows, up to 0.5000 kW: correct the unit"),
+            "{said}"
+        );
+    }
+    // The noise of a measured input at its bound is not a wrong unit.
+    let at_the_bound = place(
+        &text.replace("max=0.4", "max=0.499"),
+        "time_unit = \"s\"\n",
+        plain(300),
+    );
+    let said = at_the_bound.succeeds("compare a.csv --model m.toml");
+    assert!(!said.contains("warning"), "{said}");
+}

@@ -28,7 +28,7 @@ fn heated(seed: u64) -> String {
     let (c, k) = (50.0_f64, 0.5_f64);
     let decay = (-10.0 * k / c).exp();
     let mut above = 0.0;
-    for row in 0..700 {
+    for row in 0..420 {
         let u = ((row / 25) * 13 % 37) as f64;
         writeln!(
             text,

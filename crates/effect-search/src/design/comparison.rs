@@ -197,18 +197,13 @@ impl<'s, 'a> Comparison<'s, 'a> {
                 output: output.name.clone(),
                 low,
                 high,
+                visited_low: self.visited[o].0,
+                visited_high: self.visited[o].1,
             }
         });
         let reaches: Vec<Reach> = reaches.collect();
-        let beyond = reaches
-            .iter()
-            .zip(&self.visited)
-            .map(|(reach, (low, high))| {
-                let out = (low - reach.low).max(0.0) + (reach.high - high).max(0.0);
-                out / (high - low).max(f64::MIN_POSITIVE)
-            });
         Some(Experiment {
-            excursion: beyond.fold(0.0, f64::max),
+            excursion: reaches.iter().map(Reach::excursion).fold(0.0, f64::max),
             inputs: applied,
             power,
             refitted: false,

@@ -112,10 +112,12 @@ pub enum NoExperiment {
     OutOfTime,
 }
 
+/// An input that is applied, by its position in the model, and its limits.
+pub(super) type Applied = (usize, InputRange, Room);
+
 /// The checked limits.
 pub(super) struct Bounds {
-    /// For each applied input, by its position in the model.
-    pub applied: Vec<(usize, InputRange, Room)>,
+    pub applied: Vec<Applied>,
     /// Constant values of the other inputs.
     pub held: Vec<f64>,
     pub duration: f64,

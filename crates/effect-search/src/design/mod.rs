@@ -31,7 +31,7 @@ use crate::base::problem::{Limit, Options, Phase, Problem};
 use crate::diagnose::Progress;
 use crate::fit::believed::begin;
 use crate::fit::node::{Context, FINE, Node};
-use limits::Bounds;
+use limits::{Applied, Bounds};
 
 /// The slowest time constant for which the sequences are designed, as a share of the experiment's length, since the process may not be known.
 const SLOWEST: f64 = 0.1;
@@ -229,7 +229,8 @@ fn alternative(context: &Context, base: &Node, node: &Node) -> Alternative {
     }
 }
 
-/// Every sequence at every input that is applied, the others held; then sequences of all of them at once.
+/// Every sequence at every input that is applied, the others held at their median; then sequences of all of them at once; then those of every
+/// input with the other ones held at an end of their ranges: an effect may be absent where they usually are.
 fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Sequenced>, Error> {
     let held: Vec<Vec<f64>> = bounds
         .held
@@ -243,6 +244,14 @@ fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Seque
         high: sequence.high,
         clock: sequence.clock,
         levels: sequence.levels,
+    };
+    let constant = |(_, range, _): &Applied, value: f64| InputSequenceKind {
+        input: range.input.clone(),
+        kind: Kind::Constant,
+        low: value,
+        high: value,
+        clock: bounds.duration,
+        levels: None,
     };
     let mut of_each = Vec::new();
     for (n, (_, _, room)) in bounds.applied.iter().enumerate() {
@@ -273,6 +282,25 @@ fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Seque
                 each.push(applied(*input, own[k]));
             }
             all.push((each, inputs));
+        }
+        for end in [
+            |range: &InputRange| range.low,
+            |range: &InputRange| range.high,
+        ] {
+            for (own, sequences) in bounds.applied.iter().zip(&of_each) {
+                let others = || bounds.applied.iter().filter(|other| other.0 != own.0);
+                let mut held = held.clone();
+                for (input, range, _) in others() {
+                    held[*input].fill(end(range));
+                }
+                for sequence in sequences {
+                    let mut inputs = held.clone();
+                    inputs[own.0].clone_from(&sequence.values);
+                    let others = others().map(|other| constant(other, end(&other.1)));
+                    let each = std::iter::once(applied(own.0, sequence)).chain(others);
+                    all.push((each.collect(), inputs));
+                }
+            }
         }
     }
     Ok(all)

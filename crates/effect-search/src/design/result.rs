@@ -63,12 +63,25 @@ pub struct Reach {
     pub low: f64,
     /// Highest.
     pub high: f64,
+    /// Lowest in the records.
+    pub visited_low: f64,
+    /// Highest in the records.
+    pub visited_high: f64,
+}
+
+impl Reach {
+    /// Largest distance from the range of the records, as a share of that range.
+    #[must_use]
+    pub fn excursion(&self) -> f64 {
+        let out = (self.visited_low - self.low).max(0.0) + (self.high - self.visited_high).max(0.0);
+        out / (self.visited_high - self.visited_low).max(f64::MIN_POSITIVE)
+    }
 }
 
 /// An experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiment {
-    /// Sequence of each input that changes; the other inputs are held at their median.
+    /// Sequence of each input that changes, and of each that is held at another value than its median.
     pub inputs: Vec<InputSequenceKind>,
     /// Power of the experiment.
     pub power: Power,
@@ -76,8 +89,7 @@ pub struct Experiment {
     pub refitted: bool,
     /// Ranges of the outputs.
     pub reaches: Vec<Reach>,
-    /// Largest excursion of an output outside its range in the records, as a share of that range: outside the range neither model is
-    /// validated.
+    /// Largest [`Reach::excursion`]: outside the range neither model is validated.
     pub excursion: f64,
 }
 

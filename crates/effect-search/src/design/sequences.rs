@@ -39,6 +39,8 @@ pub enum Kind {
     Binary,
     /// Levels drawn evenly from the range, each held for a clock period.
     MultiLevel,
+    /// One value.
+    Constant,
 }
 
 impl Kind {
@@ -51,6 +53,7 @@ impl Kind {
             Self::Staircase => "staircase",
             Self::Binary => "binary",
             Self::MultiLevel => "multi-level",
+            Self::Constant => "constant",
         }
     }
 }

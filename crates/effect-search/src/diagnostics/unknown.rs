@@ -50,10 +50,13 @@ pub struct Unknown {
     pub rmse_per_output: BTreeMap<String, f64>,
     /// Arguments of the function, over the visited range \[unit of the variable\].
     pub at: Vec<f64>,
-    /// Value of the function: an added term or, at a parameter, its relative change from the mean \[unit\].
+    /// Value of the function: an added term or, at a parameter, its relative change \[unit\].
     pub value: Vec<f64>,
     /// Standard errors; `None` if not determined.
     pub std_error: Vec<Option<f64>>,
+    /// The values are differences from their mean, for which the parameters of the model compensate.
+    #[serde(default)]
+    pub is_centred: bool,
     /// Heights of the Gaussian basis functions, as `ctid add NAME --from` keeps them.
     pub parameters: Vec<Estimate>,
     /// Ports and variables, the best first.
@@ -141,7 +144,7 @@ impl Context<'_> {
             bic_gain: set.gain_over(&base),
             share_left_out: *share,
         });
-        let (at, value, std_error) = curve(&best, candidate, self.thresholds.shape_points);
+        let curve = curve(&best, candidate, self.thresholds.shape_points);
         let (variable, variable_unit) = self.variable_of(candidate);
         Ok(Some(Unknown {
             effect: candidate.id.clone(),
@@ -154,9 +157,10 @@ impl Context<'_> {
             share: explained(&base.fit, &best.fit, floors),
             share_left_out,
             rmse_per_output: names.zip(best.fit.rmse.iter().copied()).collect(),
-            at,
-            value,
-            std_error,
+            at: curve.at,
+            value: curve.value,
+            std_error: curve.std_error,
+            is_centred: curve.is_centred,
             parameters: sizes(&best, candidate),
             places: places.collect(),
         }))
@@ -186,12 +190,18 @@ impl Context<'_> {
     }
 }
 
-/// The function over the range that it is written in, with standard errors.
-fn curve(
-    set: &Node,
-    candidate: &Candidate,
-    points: usize,
-) -> (Vec<f64>, Vec<f64>, Vec<Option<f64>>) {
+/// A fitted function over the range that it is written in.
+struct Curve {
+    at: Vec<f64>,
+    value: Vec<f64>,
+    std_error: Vec<Option<f64>>,
+    /// Whether the values are differences from their mean.
+    is_centred: bool,
+}
+
+/// The function over its range, with standard errors. Its mean is removed where the model's parameters compensate for it: at a parameter,
+/// whose own value does, and where the mean is less certain than the function changes.
+fn curve(set: &Node, candidate: &Candidate, points: usize) -> Curve {
     let numbers = &candidate.record_numbers;
     let number = |name: &str, other: f64| numbers.get(name).copied().unwrap_or(other);
     let (from, width) = if candidate.follows_time() {
@@ -208,49 +218,55 @@ fn curve(
     let heights: Vec<f64> = positions.iter().map(|&i| set.fit.x[i]).collect();
     let errors = set.fit.std_errors();
     let correlations = set.fit.correlations();
+    // A weighted sum of the heights, and its standard error.
+    let value = |weights: &[f64]| {
+        weights
+            .iter()
+            .zip(&heights)
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
+    };
+    let std_error = |weights: &[f64]| {
+        let parts: Option<Vec<f64>> = weights
+            .iter()
+            .zip(&positions)
+            .map(|(weight, &at)| Some(weight * errors[at]?))
+            .collect();
+        let (parts, (entries, matrix)) = parts.zip(correlations.as_ref())?;
+        let row = |j: usize| entries.iter().position(|i| *i == positions[j]);
+        let mut variance = 0.0;
+        for (a, part) in parts.iter().enumerate() {
+            for (b, other) in parts.iter().enumerate() {
+                variance += part * other * matrix[row(a)?][row(b)?];
+            }
+        }
+        Some(variance.max(0.0).sqrt())
+    };
     let share = |k: usize| k as f64 / points.saturating_sub(1).max(1) as f64;
     let bell = |j: usize, k: usize| {
         let mut unit = vec![0.0; heights.len()];
         unit[j] = 1.0;
         bells(&unit, share(k))
     };
-    // The parameter itself compensates for a constant relative change.
-    let of_parameter = matches!(candidate.port, Port::Value(_) | Port::Dependence(..));
     let means: Vec<f64> = (0..heights.len())
-        .map(|j| {
-            let sum: f64 = (0..points).map(|k| bell(j, k)).sum();
-            if of_parameter {
-                sum / points as f64
-            } else {
-                0.0
-            }
-        })
+        .map(|j| (0..points).map(|k| bell(j, k)).sum::<f64>() / points as f64)
         .collect();
-    let mut curve = (Vec::new(), Vec::new(), Vec::new());
-    for k in 0..points {
-        let parts: Vec<f64> = (0..heights.len()).map(|j| bell(j, k) - means[j]).collect();
-        curve.0.push(from + share(k) * width);
-        curve
-            .1
-            .push(parts.iter().zip(&heights).map(|(a, b)| a * b).sum());
-        // Contribution of each Gaussian basis function, times its standard error.
-        let parts: Option<Vec<f64>> = parts
-            .iter()
-            .zip(&positions)
-            .map(|(part, &at)| Some(part * errors[at]?))
-            .collect();
-        let error = parts.zip(correlations.as_ref()).and_then(|(parts, all)| {
-            let (entries, matrix) = all;
-            let row = |j: usize| entries.iter().position(|i| *i == positions[j]);
-            let mut variance = 0.0;
-            for (a, part) in parts.iter().enumerate() {
-                for (b, other) in parts.iter().enumerate() {
-                    variance += part * other * matrix[row(a)?][row(b)?];
-                }
-            }
-            Some(variance.max(0.0).sqrt())
-        });
-        curve.2.push(error);
+    let rows: Vec<Vec<f64>> = (0..points)
+        .map(|k| (0..heights.len()).map(|j| bell(j, k)).collect())
+        .collect();
+    let centred: Vec<Vec<f64>> = rows
+        .iter()
+        .map(|row| row.iter().zip(&means).map(|(a, mean)| a - mean).collect())
+        .collect();
+    let squares = centred.iter().map(|row| value(row).powi(2));
+    let change = (squares.sum::<f64>() / points as f64).sqrt();
+    let of_parameter = matches!(candidate.port, Port::Value(_) | Port::Dependence(..));
+    let is_centred = of_parameter || std_error(&means).is_none_or(|error| error > change);
+    let rows = if is_centred { centred } else { rows };
+    Curve {
+        at: (0..points).map(|k| from + share(k) * width).collect(),
+        value: rows.iter().map(|row| value(row)).collect(),
+        std_error: rows.iter().map(|row| std_error(row)).collect(),
+        is_centred,
     }
-    curve
 }

@@ -37,10 +37,13 @@ impl Identify {
             ..self.reading.options()
         };
         let reading = read_csv(path, columns, &options).map_err(self.named_by())?;
-        let Reading { record, summary } = reading;
+        let Reading {
+            record,
+            mut summary,
+        } = reading;
         let mut record = self.without_unnamed(record);
         if let Some(own) = own {
-            own.convert(&mut record)?;
+            own.convert(&mut record, &mut summary)?;
         }
         Ok(Reading { record, summary })
     }

@@ -16,12 +16,25 @@ impl<'a> Session<'a> {
             self.bad(|| BadLine::NotText.to_string());
             return Ok(false);
         };
-        let said = text.trim_start_matches('\u{feff}').trim();
-        if said.is_empty() || said.starts_with('#') {
+        if Rows::is_before_header(text) {
             return Ok(false);
         }
         let named = self.columns.names_any();
-        let (mut rows, is_row) = match Rows::begin(INPUT, self.line, text, &self.columns) {
+        let begun = Rows::begin(INPUT, self.line, text, &self.columns);
+        let begun = match (begun, self.not_header.take()) {
+            // Lines of text may stand above the header.
+            (Err(error), _) if error.lacks_a_column() => {
+                self.not_header = Some(error);
+                return Ok(false);
+            }
+            // A row: the line above it was the header.
+            (
+                Ok((_, true)) | Err(ct_signals::Error::Read(ct_signals::ReadError::NoOrder { .. })),
+                Some(error),
+            ) => return Err(error.into()),
+            (begun, _) => begun,
+        };
+        let (mut rows, is_row) = match begun {
             Err(ct_signals::Error::Read(ct_signals::ReadError::NoOrder { found, .. }))
                 if self.parts < PARTS =>
             {

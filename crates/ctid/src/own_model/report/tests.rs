@@ -23,6 +23,7 @@ fn unknown(effect: &str, variable: [&str; 2], unit: &str) -> Unknown {
         at: vec![0.0, 50.0, 100.0],
         value: vec![0.0, -2.0, 1.0],
         std_error: vec![None, Some(0.1), Some(0.2)],
+        is_centred: false,
         parameters: Vec::new(),
         places: vec![place(effect, Some(0.8)), place("course(T)", None)],
     }

@@ -185,6 +185,14 @@ fn what_is_no_row_at_all_is_refused() {
         "time,level\n1,2\n",
         "no column beginning with \"u\" for the input",
     );
+    refused(
+        "time,level\n",
+        "no column beginning with \"u\" for the input",
+    );
+    refused(
+        "t [s],u [V],y [cm]\ns,V,mm\n0,1,2\n",
+        "row 2, column \"y [cm]\"",
+    );
     place.write("m.toml", MODEL.replace("single-tank", "single-tonk"));
     refused("0,1,2,3\n", "unknown plant");
     place.write(

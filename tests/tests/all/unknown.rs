@@ -211,7 +211,7 @@ fn no_unknown_is_drawn_where_nothing_is_missing() {
     assert_eq!(found(&rig, 3).unknown, None);
 }
 
-/// `cargo test -p ctid-tests --test unknown study -- --ignored --nocapture`: of records on which something remains, how many
+/// `cargo test -p ctid-tests --test all unknown:: -- --ignored --nocapture`: of records on which something remains, how many
 /// are called a function of what.
 #[test]
 #[ignore = "a study of some minutes"]

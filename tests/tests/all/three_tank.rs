@@ -1,6 +1,6 @@
 //! Three tanks that are joined by valves, T3 measured: what is hidden in one of them is found there.
 //!
-//! Some of it always; all of it by `cargo test --release -p ctid-tests --test three_tank -- --include-ignored --nocapture`.
+//! Some of it always; all of it by `cargo test --release -p ctid-tests --test all three_tank:: -- --include-ignored --nocapture`.
 #![allow(clippy::unwrap_used)]
 
 use ct_signals::Record;

@@ -104,7 +104,7 @@ fn what_follows_the_clock_is_named_where_it_leaves_noise() {
     }
 }
 
-/// Twenty seeds of each: `cargo test -p ctid-tests --test honest_verdicts -- --ignored --nocapture`.
+/// Twenty seeds of each: `cargo test -p ctid-tests --test all honest_verdicts:: -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes minutes"]
 fn what_is_outside_the_catalogue_is_not_named_as_an_effect() {

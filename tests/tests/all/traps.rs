@@ -170,7 +170,7 @@ fn coloured_noise_is_not_taken_for_an_effect() {
     coloured_records_are_not_blamed(&[0.8, 0.95], 0.1, 2);
 }
 
-/// `cargo test -p ctid-tests --test traps -- --ignored --nocapture`
+/// `cargo test -p ctid-tests --test all traps:: -- --ignored --nocapture`
 #[test]
 #[ignore = "takes minutes"]
 fn coloured_noise_is_not_taken_for_an_effect_in_36_records() {
@@ -182,7 +182,7 @@ fn a_slow_disturbance_is_not_taken_for_an_effect() {
     coloured_records_are_not_blamed(&[0.98], 0.3, 4);
 }
 
-/// `cargo test -p ctid-tests --test traps -- --ignored --nocapture`
+/// `cargo test -p ctid-tests --test all traps:: -- --ignored --nocapture`
 #[test]
 #[ignore = "takes minutes"]
 fn a_slow_disturbance_is_not_taken_for_an_effect_in_40_records() {

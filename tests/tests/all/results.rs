@@ -152,7 +152,7 @@ fn explained_of(page: &str, name: &str, value: &Value, outputs: &[&str]) {
 
 #[test]
 fn every_key_of_a_result_is_explained() {
-    let page = include_str!("../../docs/results.md");
+    let page = include_str!("../../../docs/results.md");
     let named = json(&found(&named(), 2));
     assert!(named["control_loop"]["mismatch"].is_number());
     explained(page, &named);
@@ -259,7 +259,7 @@ fn what_several_outputs_have_not_in_common_is_not_written() {
 
 #[test]
 fn every_verdict_is_explained() {
-    let page = include_str!("../../docs/results.md");
+    let page = include_str!("../../../docs/results.md");
     let part = part_of(page, "").unwrap();
     let row = part.iter().find(|(keys, _)| keys.contains("verdict"));
     let named = quoted(row.unwrap().1);

@@ -7,8 +7,8 @@ use plants::Plant;
 
 #[test]
 fn the_page_shows_the_file() {
-    let file = include_str!("../../crates/plants/src/effects/pipe_height.rs");
-    let page = include_str!("../../docs/adding-an-effect.md");
+    let file = include_str!("../../../crates/plants/src/effects/pipe_height.rs");
+    let page = include_str!("../../../docs/adding-an-effect.md");
     assert!(
         page.contains(&format!("```rust\n{file}```\n")),
         "docs/adding-an-effect.md does not show crates/plants/src/effects/pipe_height.rs as it stands"
@@ -17,7 +17,7 @@ fn the_page_shows_the_file() {
 
 #[test]
 fn the_gallery_has_every_effect_in_words_and_in_a_picture() {
-    let gallery = include_str!("../../docs/gallery.md");
+    let gallery = include_str!("../../../docs/gallery.md");
     for effect in plants::CATALOGUE {
         let (row, picture) = (format!("| `{}`", effect.id), format!("### `{}`", effect.id));
         assert!(gallery.contains(&row), "no row for {}", effect.id);
@@ -27,8 +27,8 @@ fn the_gallery_has_every_effect_in_words_and_in_a_picture() {
 
 #[test]
 fn the_readme_shows_the_bundled_model_file() {
-    let readme = include_str!("../../README.md");
-    let model = include_str!("../../examples/records/tour.toml");
+    let readme = include_str!("../../../README.md");
+    let model = include_str!("../../../examples/records/tour.toml");
     assert!(
         readme.contains(&format!("```toml\n{model}```\n")),
         "README.md does not show examples/records/tour.toml as it stands"
@@ -37,7 +37,7 @@ fn the_readme_shows_the_bundled_model_file() {
 
 #[test]
 fn model_files_on_the_page_are_read() {
-    let page = include_str!("../../docs/model-file.md");
+    let page = include_str!("../../../docs/model-file.md");
     let blocks: Vec<&str> = page
         .split("```toml\n")
         .skip(1)
@@ -55,7 +55,7 @@ fn model_files_on_the_page_are_read() {
 /// Its example is the one of the crate's documentation, which is compiled and run.
 #[test]
 fn the_readme_shows_the_estimators_example() {
-    let readme = include_str!("../../README.md");
+    let readme = include_str!("../../../README.md");
     let code = readme
         .split("```rust\n")
         .nth(1)
@@ -66,7 +66,7 @@ fn the_readme_shows_the_estimators_example() {
         .map(|line| format!("{}\n", format!("/// {line}").trim_end()))
         .collect();
     assert!(
-        include_str!("../../crates/ct-rls/src/rls.rs").contains(&documented),
+        include_str!("../../../crates/ct-rls/src/rls.rs").contains(&documented),
         "README.md shows another example than ContinuousRls"
     );
 }

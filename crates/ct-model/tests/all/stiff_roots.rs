@@ -1,0 +1,81 @@
+//! Stiff models with roots whose slope is infinite where a trajectory passes: the pressures of a hydraulic cylinder.
+
+use crate::support::Case;
+
+/// The valve's flows follow the root of a pressure difference, which ends at zero (`$ROOT`) or changes its sign with it.
+const CYLINDER: &str = "model Cylinder
+  final parameter Real A = 1.2e-3;
+  final parameter Real m = 250;
+  final parameter Real Vd = 4e-4;
+  final parameter Real L = 0.5;
+  final parameter Real ps = 100e5;
+  parameter Real b = 1e4;
+  parameter Real F = 540;
+  parameter Real kv = 1.54e-6;
+  parameter Real beta = 1.16e9;
+  input Real u;
+  output Real yA = pA;
+  output Real yB = pB;
+  output Real yx = x;
+  Real x(start=0.24);
+  Real v(start=0);
+  Real pA(start=54.9e5);
+  Real pB(start=45.1e5);
+  Real dA = if u >= 0 then ps - pA else pA;
+  Real dB = if u >= 0 then pB else ps - pB;
+  Real qA = kv*u*$ROOT(dA);
+  Real qB = -kv*u*$ROOT(dB);
+equation
+  der(x) = v;
+  m*der(v) = A*(pA - pB) - b*v - F;
+  (Vd + A*x)/beta*der(pA) = qA - A*v;
+  (Vd + A*(L - x))/beta*der(pB) = qB + A*v;
+end Cylinder;";
+
+/// The valve is moved at once, so that the pressures swing to zero and to the supply.
+fn valve(k: usize) -> Vec<f64> {
+    let levels = [
+        60.0, -20.0, 60.0, -20.0, -60.0, 20.0, -60.0, 20.0, 0.0, 35.0,
+    ];
+    let long = [0, 1, 4, 5, 9].contains(&(k / 5 % 10));
+    let of = if long { k / 25 } else { k / 5 };
+    vec![levels[of % levels.len()]]
+}
+
+fn is_simulated(root: &str) {
+    let text = CYLINDER
+        .replace("$ROOT(dA)", &root.replace('d', "dA"))
+        .replace("$ROOT(dB)", &root.replace('d', "dB"));
+    for k in 0..8 {
+        let factor = |j: usize| 0.7 + 0.6 * ((k * (2 * j + 3)) % 8) as f64 / 8.0;
+        let of = |tolerance: f64| {
+            let case = Case {
+                tolerance,
+                ..Case::new(&text, 500, 0.01, valve)
+            };
+            let mut parameters = case.model.parameters();
+            for (j, value) in parameters[5..].iter_mut().enumerate() {
+                *value *= factor(j);
+            }
+            let initial = case.model.starts(&parameters);
+            case.run(&parameters, &initial).0
+        };
+        let (rough, fine) = (of(1e-6), of(1e-10));
+        for (o, scale) in [1e7, 1e7, 0.5].into_iter().enumerate() {
+            let apart = rough.iter().zip(&fine);
+            let apart = apart.map(|(a, b)| (a[o] - b[o]).abs());
+            let most = apart.fold(0.0, f64::max);
+            assert!(most < 1e-3 * scale, "{k}: output {o} differs by {most:e}");
+        }
+    }
+}
+
+#[test]
+fn a_pressure_that_ends_at_zero_is_passed() {
+    is_simulated("sqrt(max(d, 0)/1e5)");
+}
+
+#[test]
+fn a_flow_that_changes_its_sign_with_a_pressure_difference_is_passed() {
+    is_simulated("sign(d)*sqrt(abs(d)/1e5)");
+}

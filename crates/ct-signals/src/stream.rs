@@ -1,6 +1,6 @@
 //! Rows as they come on a stream, a line at a time: what a CSV file may hold, but without looking ahead.
 //!
-//! The first line of a table decides (blank lines, comments and `sep=;` are none): where it holds names, [`Columns`] says which column is what, as
+//! The first line of a table decides (blank lines, comments and `sep=;` are not part of it): where it holds names, [`Columns`] says which column is what, as
 //! in a file; where it holds a time and numbers, they are time, reference, command and readings, or time, command and readings.
 //! Understood as in a file: commas, semicolons or tabs, a decimal comma where commas do not separate, a byte-order mark, CRLF,
 //! blank lines and comments, quotes, words where a sample is missing, times as numbers in a unit or as dates. The first row's time says how
@@ -9,7 +9,7 @@
 mod bad_line;
 mod row;
 
-use csv::{ReaderBuilder, StringRecord, Terminator, Trim, WriterBuilder};
+use csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 
 pub use self::bad_line::BadLine;
 use crate::columns::{Found, Layout, Purpose};
@@ -47,6 +47,8 @@ pub struct Rows {
     delimiter: u8,
     /// The header, if there is one: it may be repeated in the stream.
     header: Option<String>,
+    /// The row of units below it, likewise.
+    units_row: Option<String>,
     /// Fields of a row.
     fields: usize,
     /// Positions of time, inputs and outputs.
@@ -98,23 +100,7 @@ impl Rows {
         let line = text(line);
         let delimiter = delimiter(line);
         let cells = cells(line, delimiter);
-        let mut rows = Self {
-            delimiter,
-            header: None,
-            fields: cells.len(),
-            at: Vec::new(),
-            inputs: 1,
-            names: Vec::new(),
-            units: Vec::new(),
-            conversions: Vec::new(),
-            values: Vec::new(),
-            seconds: 1.0,
-            columns: columns.clone(),
-            times: None,
-            start: None,
-            civil: false,
-            numbers: Numbers::new(delimiter != b',', false, &columns.missing),
-        };
+        let mut rows = Self::empty(delimiter, cells.len(), columns);
         if is_row(&cells, columns) {
             let outputs = columns.outputs.len().max(1);
             let inputs = usize::from(!columns.without_inputs);
@@ -158,6 +144,39 @@ impl Rows {
             rows.values = vec![Ok(f64::NAN); rows.at.len()];
             return Ok((rows, true));
         }
+        rows.take_header((file, row), line, &cells)?;
+        Ok((rows, false))
+    }
+
+    /// Rows whose columns are not known yet.
+    fn empty(delimiter: u8, fields: usize, columns: &Columns) -> Self {
+        Self {
+            delimiter,
+            header: None,
+            units_row: None,
+            fields,
+            at: Vec::new(),
+            inputs: 1,
+            names: Vec::new(),
+            units: Vec::new(),
+            conversions: Vec::new(),
+            values: Vec::new(),
+            seconds: 1.0,
+            columns: columns.clone(),
+            times: None,
+            start: None,
+            civil: false,
+            numbers: Numbers::new(delimiter != b',', false, &columns.missing),
+        }
+    }
+
+    /// Finds the columns by the names of a header.
+    fn take_header(
+        &mut self,
+        (file, row): (&str, u64),
+        line: &str,
+        cells: &[String],
+    ) -> Result<(), Error> {
         check_width(file, row, cells.len())?;
         let Layout {
             time,
@@ -165,10 +184,10 @@ impl Rows {
             inputs,
             outputs,
             ..
-        } = columns.resolve(file, row, &cells, Purpose::Fit)?;
-        rows.inputs = inputs.len();
-        rows.at = vec![time.index];
-        rows.names = vec![time.header];
+        } = self.columns.resolve(file, row, cells, Purpose::Fit)?;
+        self.inputs = inputs.len();
+        self.at = vec![time.index];
+        self.names = vec![time.header];
         for Found {
             index,
             header,
@@ -177,50 +196,67 @@ impl Rows {
             ..
         } in inputs.into_iter().chain(outputs)
         {
-            rows.at.push(index);
-            rows.names.push(header);
-            rows.units.push(escaped(&unit).into_owned());
-            rows.conversions.push(converted.map(|(_, by)| by));
+            self.at.push(index);
+            self.names.push(header);
+            self.units.push(escaped(&unit).into_owned());
+            self.conversions.push(converted.map(|(_, by)| by));
         }
-        rows.seconds = seconds;
-        rows.values = vec![Ok(f64::NAN); rows.at.len()];
-        rows.header = Some(line.to_string());
-        Ok((rows, false))
+        self.seconds = seconds;
+        self.values = vec![Ok(f64::NAN); self.at.len()];
+        self.header = Some(line.to_string());
+        Ok(())
     }
 
-    /// Whether a line is no part of a table: blank, a comment, or the line in which spreadsheets name the delimiter, `sep=;`.
-    #[must_use]
-    pub fn is_before_header(line: &str) -> bool {
-        let line = text(line);
-        let key = line.strip_prefix(DELIMITER_KEY);
-        line.is_empty() || line.starts_with('#') || key.is_some_and(|delimiter| delimiter.len() < 2)
-    }
-
-    /// The header with the units that the row below it gives; `None` if there is no header, or the line has no units. `file` and `row`: as of
-    /// [`Rows::begin`].
+    /// As [`Self::begin`], from a header and the row of units below it ([`Self::gives_units`]), both of which may be repeated in the stream.
     ///
     /// # Errors
-    /// If a column has another unit in the header.
-    pub fn header_with_units(
-        &self,
-        (file, row): (&str, u64),
-        line: &str,
-    ) -> Result<Option<String>, Error> {
-        let below = StringRecord::from(cells(text(line), self.delimiter));
-        let Some(header) = self.header.as_deref().filter(|_| are_units(&below)) else {
-            return Ok(None);
-        };
-        let names = cells(header, self.delimiter);
+    /// As [`Self::begin`]; [`ReadError::TwoUnits`] for a column that has another unit in the header.
+    pub fn begin_with_units(
+        file: &str,
+        row: u64,
+        (header, units): (&str, &str),
+        columns: &Columns,
+    ) -> Result<Self, Error> {
+        let (header, units) = (text(header), text(units));
+        let delimiter = delimiter(header);
+        let names = cells(header, delimiter);
+        let below = cells(units, delimiter);
         let named = names.iter().zip(&below);
-        let named = named.map(|(name, below)| with_unit(name, below, (file, row)));
+        let named = named.map(|(name, below)| with_unit(name, below, (file, row + 1)));
         let named = named.collect::<Result<Vec<String>, Error>>()?;
-        // Names with a delimiter in them need quotes.
-        let mut writer = WriterBuilder::new()
-            .delimiter(self.delimiter)
-            .from_writer(Vec::new());
-        let written = writer.write_record(&named).ok();
-        let line = written.and_then(|()| String::from_utf8(writer.into_inner().ok()?).ok());
-        Ok(line)
+        let mut rows = Self::empty(delimiter, named.len(), columns);
+        rows.take_header((file, row), header, &named)?;
+        rows.units_row = Some(units.to_string());
+        Ok(rows)
+    }
+
+    /// Whether a line is not part of a table: blank, empty cells alone, a comment, or the line in which spreadsheets name the delimiter, `sep=;`.
+    #[must_use]
+    pub fn is_before_table(line: &str) -> bool {
+        let line = text(line);
+        let is_empty = |line: &str| line.trim_matches([';', ',', '\t', ' ']).is_empty();
+        line.starts_with('#') || is_empty(line.strip_prefix(DELIMITER_KEY).unwrap_or(line))
+    }
+
+    /// Whether the cells of the line below a header are units.
+    #[must_use]
+    pub fn gives_units(header: &str, below: &str) -> bool {
+        let delimiter = delimiter(text(header));
+        let names = cells(text(header), delimiter);
+        let below = cells(text(below), delimiter);
+        let used = below.iter().filter(|cell| !cell.is_empty()).count();
+        names.len() == below.len()
+            && 2 * used >= below.len()
+            && are_units(&StringRecord::from(below))
+    }
+
+    /// Whether a line has samples: most of its cells are numbers, times, or marks of missing samples.
+    #[must_use]
+    pub fn has_samples(line: &str, columns: &Columns) -> bool {
+        let cells = cells(text(line), delimiter(text(line)));
+        let used = || cells.iter().filter(|cell| !cell.is_empty());
+        let is_sample = |cell: &&String| is_number(cell) || TimestampReader::understands(cell);
+        is_row(&cells, columns) || 2 * used().filter(is_sample).count() > used().count()
     }
 
     /// Whether a header has named the columns.

@@ -103,6 +103,9 @@ impl ReadSummary {
                 to: to.to_string(),
             }),
         }
+        // Converted forth and back.
+        self.converted
+            .retain(|converted| converted.from != converted.to);
     }
 
     /// The line with the caller's names for the settings of reading.

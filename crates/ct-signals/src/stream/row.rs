@@ -15,7 +15,7 @@ impl Rows {
         if line.is_empty() || line.starts_with('#') {
             return Ok(Line::Nothing);
         }
-        if self.header.as_deref() == Some(line) {
+        if self.header.as_deref() == Some(line) || self.units_row.as_deref() == Some(line) {
             return Ok(Line::Nothing);
         }
         if line.contains('"') {

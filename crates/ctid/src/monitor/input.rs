@@ -2,6 +2,8 @@
 
 mod first_row;
 
+pub(super) use self::first_row::Header;
+
 use ::monitor::{NotUsed, Row};
 use ct_signals::{BadLine, LONGEST_LINE, Line, Rows, TimestampError, quoted};
 
@@ -32,7 +34,11 @@ impl<'a> Session<'a> {
             }
         };
         let begins = self.rows.is_none();
-        if begins && !self.first(line)? || !begins && self.has_units(line)? {
+        let is_row = match self.header.take() {
+            Some(header) => self.after_header(header, line)?,
+            None => !begins || self.first(line)?,
+        };
+        if !is_row {
             return Ok(());
         }
         let mut read = self.read(line);
@@ -85,23 +91,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Whether a line below the header gives units: the rows after it are read in these.
-    fn has_units(&mut self, line: &[u8]) -> Result<bool, Error> {
-        let text = match (self.taken, std::str::from_utf8(line)) {
-            (0, Ok(text)) if !self.timed => text,
-            _ => return Ok(false),
-        };
-        let rows = self.rows.take_if(|rows| rows.times().is_none());
-        let Some(rows) = rows else { return Ok(false) };
-        match rows.header_with_units((INPUT, self.line), text)? {
-            Some(header) => self.first(header.as_bytes()).map(|_| true),
-            None => {
-                self.rows = Some(rows);
-                Ok(false)
-            }
-        }
-    }
-
     /// The last row, and the reason for its first missing reading, if the line gives one.
     fn readings(&self, time: f64) -> (Row, Option<BadLine>) {
         let mut row = Row::with_inputs(time, &[], &[]);
@@ -135,15 +124,22 @@ impl<'a> Session<'a> {
 
     /// Whether a line that is no row is a header of another form: later rows are read in its order.
     fn header_again(&mut self, line: &[u8]) -> Result<bool, Error> {
-        let (Some(known), Ok(text)) = (&self.rows, std::str::from_utf8(line)) else {
+        let (Some(_), Ok(text)) = (&self.rows, std::str::from_utf8(line)) else {
             return Ok(false);
         };
-        let mut rows = match Rows::begin(INPUT, self.line, text, &self.columns) {
-            Ok((rows, false)) => rows,
+        match Rows::begin(INPUT, self.line, text, &self.columns) {
+            Ok((_, false)) => {
+                self.header = Some(Header::new(text, self.line));
+                Ok(true)
+            }
             // The rows after it are in units that are not those of the model.
-            Err(error) if error.of_units() => return Err(error.into()),
-            _ => return Ok(false),
-        };
+            Err(error) if error.of_units() => Err(error.into()),
+            _ => Ok(false),
+        }
+    }
+
+    /// Reads the rows after another header in its order.
+    fn go_on(&mut self, mut rows: Rows, known: &Rows) -> Result<(), Error> {
         rows.go_on(known);
         // A file without a unit does not change the unit.
         let pairs = known.units().zip(rows.units());
@@ -166,7 +162,7 @@ impl<'a> Session<'a> {
             self.screen.say(&one_line(&text));
         }
         self.rows = Some(rows);
-        Ok(true)
+        Ok(())
     }
 
     /// The header of the time.

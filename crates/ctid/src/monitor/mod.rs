@@ -22,6 +22,7 @@ use crate::look::Look;
 use crate::model_file::ModelFile;
 use crate::own_model::{AnyModelFile, OwnModelFile};
 use crate::{Error, MessageNames};
+use input::Header;
 use lines::Lines;
 use saver::Saver;
 use screen::{DRAWN_EVERY, Screen};
@@ -159,8 +160,8 @@ struct Session<'a> {
     /// Whether the monitor continues from a saved state.
     restored: bool,
     rows: Option<Rows>,
-    /// The error of the last line of text, if that is the header: a needed column is missing.
-    not_header: Option<ct_signals::Error>,
+    /// The last line of names, until the next line tells whether it is the header.
+    header: Option<Header>,
     /// Number of lines before the first row.
     parts: usize,
     line: u64,
@@ -231,7 +232,7 @@ impl<'a> Session<'a> {
             conversions: Vec::new(),
             restored,
             rows: None,
-            not_header: None,
+            header: None,
             parts: 0,
             line: 0,
             trouble: Trouble::default(),
@@ -265,8 +266,9 @@ impl<'a> Session<'a> {
     }
 
     fn end(&mut self, why: &str, saved: bool) -> Result<(), Error> {
-        if let Some(error) = self.not_header.take() {
-            return Err(error.into());
+        let header = self.header.take().filter(|_| why != "stopped");
+        if let Some(header) = header.filter(|_| self.rows.is_none()) {
+            self.accept(&header, None)?;
         }
         if self.rows.is_none() && self.parts == 0 && why != "stopped" {
             return Err(Error::Usage(format!(

@@ -288,7 +288,7 @@ fn outside(file: &OwnModelFile, reach: &Reach) -> Option<String> {
     let unit = file.unit_of(&reach.output);
     (reach.excursion() > FAR).then(|| {
         format!(
-            "Either model is a guess that far outside the records: {} would reach {}, and was within {} so far. Give narrower ranges of the inputs if the plant may not go there.",
+            "Neither model is validated far outside the records: {} would reach {}, and was within {} in the records. Give narrower ranges of the inputs if the plant must not reach these values.",
             reach.output,
             range(reach.low, reach.high, unit),
             range(reach.visited_low, reach.visited_high, unit)

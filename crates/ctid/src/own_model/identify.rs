@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use ct_model::{Linearity, TransferFunction};
-use ct_signals::{Columns, Hold, ReadSummary, Record, quoted};
+use ct_signals::{Columns, Hold, OutOfRange, ReadSummary, Record, quoted};
 use serde::Serialize;
 
 use super::controller::OwnController;
@@ -178,6 +178,10 @@ impl<'f> OneByOne<'f> {
         for (channel, about) in channels.zip(signals) {
             super::file::convert(summary, channel, about)?;
         }
+        let about = &spec.inputs[self.input].about;
+        let input = record.inputs.first();
+        let outside = input.and_then(|input| OutOfRange::find(input, about.min, about.max));
+        summary.out_of_range.extend(outside);
         Ok(())
     }
 

@@ -143,7 +143,7 @@ fn the_ways_to_write_rows_are_those_of_the_csv_reader() {
         ),
         (
             "a delimiter key, lines above the header and a row of units, as loggers and spreadsheets write them",
-            "sep=;\nDevice;DAQ 4\nRate;0,5\n\nt;r;u;y\ns;cm;V;cm\n".to_string() + &semicolons,
+            "sep=;\nTest;Tank 3;;\nRate;0,5\n;;;\n\nt;r;u;y\ns;cm;V;cm\n".to_string() + &semicolons,
         ),
         (
             "the header again",
@@ -166,6 +166,46 @@ fn the_ways_to_write_rows_are_those_of_the_csv_reader() {
     );
     assert_eq!(three.out, lone.out);
     assert_eq!(events(&lone.out).len(), events(&plain.out).len());
+}
+
+/// A row of units below the header is applied, also where header and units come again, and after a restart.
+#[test]
+fn a_row_of_units_is_applied() {
+    let rows = rows(1400, 1100);
+    let place = place();
+    let model = place.read("m.toml") + "\n[columns]\noutput = \"y [cm]\"\n";
+    place.write("m.toml", model);
+    let plain = fed(&place, "", text(HEADER, &rows));
+    // Several effects explain it alike, so that rounding decides which is first.
+    let alarms = |out: &str| -> Vec<(serde_json::Value, serde_json::Value)> {
+        let events = events(out);
+        let alarm = |e: &serde_json::Value| (e["event"].clone(), e["time"].clone());
+        events.iter().map(alarm).collect()
+    };
+    assert!(!plain.out.is_empty(), "{}", plain.err);
+    let millimetres = |header: &str, rows: &[[f64; 3]]| {
+        let rows = rows
+            .iter()
+            .map(|[t, u, y]| format!("{t},15,{u},{:.3}\n", 10.0 * y));
+        header.to_string() + &rows.collect::<String>()
+    };
+    let header = "t,r,u,y\ns,cm,V,mm\n";
+    let again = millimetres(header, &rows[..700]) + &millimetres(header, &rows[700..]);
+    let outcome = fed(&place, "", again);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.err);
+    assert_eq!(alarms(&outcome.out), alarms(&plain.out), "{}", outcome.err);
+    assert!(!outcome.err.contains("skipped"), "{}", outcome.err);
+    assert_eq!(
+        outcome.err.matches("a header:").count(),
+        1,
+        "{}",
+        outcome.err
+    );
+
+    fed(&place, "--state a.state", millimetres(header, &rows[..700]));
+    let outcome = fed(&place, "--state a.state", millimetres(header, &rows[700..]));
+    assert_says(&outcome, "goes on from 700 rows");
+    assert_eq!(alarms(&outcome.out), alarms(&plain.out), "{}", outcome.err);
 }
 
 /// A logger that restarts with another order of its columns does not exchange signals.

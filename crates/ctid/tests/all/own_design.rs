@@ -89,6 +89,17 @@ fn an_experiment_at_one_input_or_at_both_is_written_as_a_record() {
             .any(|e| e["inputs"].as_array().unwrap().len() == n)
     };
     assert!(inputs(1) && inputs(2));
+    // One by one also with the other one held at an end of its range.
+    let sequences = experiments.iter();
+    let sequences = sequences.flat_map(|e| e["inputs"].as_array().unwrap());
+    let mut held = sequences.filter(|input| input["kind"] == "constant");
+    let ranges = both["ranges"].as_array().unwrap();
+    let is_end = |input: &serde_json::Value| {
+        let range = ranges.iter().find(|range| range["input"] == input["input"]);
+        let range = range.unwrap();
+        input["low"] == range["low"] || input["low"] == range["high"]
+    };
+    assert!(held.by_ref().next().is_some_and(is_end) && held.all(is_end));
     assert_eq!(both["ranges"].as_array().unwrap().len(), 2);
 }
 

@@ -230,7 +230,7 @@ fn alternative(context: &Context, base: &Node, node: &Node) -> Alternative {
 }
 
 /// Every sequence at every input that is applied, the others held at their median; then sequences of all of them at once; then those of every
-/// input with the other ones held at an end of their ranges: an effect may be absent where they usually are.
+/// input with all others held at their lower, or all at their upper end: an effect may be absent where they usually are.
 fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Sequenced>, Error> {
     let held: Vec<Vec<f64>> = bounds
         .held
@@ -289,6 +289,10 @@ fn candidates(problem: &Problem, bounds: &Bounds, seed: u64) -> Result<Vec<Seque
         ] {
             for (own, sequences) in bounds.applied.iter().zip(&of_each) {
                 let others = || bounds.applied.iter().filter(|other| other.0 != own.0);
+                // Their medians may be the ends.
+                if others().all(|(input, range, _)| bounds.held[*input] == end(range)) {
+                    continue;
+                }
                 let mut held = held.clone();
                 for (input, range, _) in others() {
                     held[*input].fill(end(range));

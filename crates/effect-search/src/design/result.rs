@@ -70,7 +70,7 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// Largest distance from the range of the records, as a share of that range.
+    /// Sum of the excursions below and above the range of the records, as a share of that range.
     #[must_use]
     pub fn excursion(&self) -> f64 {
         let out = (self.visited_low - self.low).max(0.0) + (self.high - self.visited_high).max(0.0);

@@ -199,8 +199,8 @@ struct Curve {
     is_centred: bool,
 }
 
-/// The function over its range, with standard errors. Its mean is removed where the model's parameters compensate for it: at a parameter,
-/// whose own value does, and where the mean is less certain than the function changes.
+/// The function over its range, with standard errors. Its mean is removed where the parameters of the model compensate for it: for a function at
+/// a parameter, because the value of that parameter does; else if the mean is not significant, and less certain than the function changes.
 fn curve(set: &Node, candidate: &Candidate, points: usize) -> Curve {
     let numbers = &candidate.record_numbers;
     let number = |name: &str, other: f64| numbers.get(name).copied().unwrap_or(other);
@@ -261,7 +261,9 @@ fn curve(set: &Node, candidate: &Candidate, points: usize) -> Curve {
     let squares = centred.iter().map(|row| value(row).powi(2));
     let change = (squares.sum::<f64>() / points as f64).sqrt();
     let of_parameter = matches!(candidate.port, Port::Value(_) | Port::Dependence(..));
-    let is_centred = of_parameter || std_error(&means).is_none_or(|error| error > change);
+    let mean = value(&means).abs();
+    let is_open = std_error(&means).is_some_and(|error| error > change && mean < 2.0 * error);
+    let is_centred = of_parameter || is_open;
     let rows = if is_centred { centred } else { rows };
     Curve {
         at: (0..points).map(|k| from + share(k) * width).collect(),

@@ -9,32 +9,45 @@ use super::{HEADER_FIRST, PARTS};
 use crate::Error;
 use crate::own_model::{OwnModelFile, conversion};
 
+/// Largest number of lines of text above a header.
+const MOST_ABOVE: usize = 60;
+
+/// A line of names, as long as the next line may give its units.
+pub(in super::super) struct Header {
+    text: String,
+    /// Number of the line.
+    row: u64,
+    /// Number of lines of text above it.
+    above: usize,
+}
+
+impl Header {
+    pub(super) fn new(text: &str, row: u64) -> Self {
+        Self {
+            text: text.to_string(),
+            row,
+            above: 0,
+        }
+    }
+}
+
 impl<'a> Session<'a> {
-    /// The first line with content; returns whether it is a row.
+    /// A line before the columns are known; returns whether it is a row.
     pub(super) fn first(&mut self, line: &[u8]) -> Result<bool, Error> {
         let Ok(text) = std::str::from_utf8(line) else {
             self.bad(|| BadLine::NotText.to_string());
             return Ok(false);
         };
-        if Rows::is_before_header(text) {
+        if Rows::is_before_table(text) {
+            return Ok(false);
+        }
+        if !Rows::has_samples(text, &self.columns) {
+            self.header = Some(Header::new(text, self.line));
             return Ok(false);
         }
         let named = self.columns.names_any();
         let begun = Rows::begin(INPUT, self.line, text, &self.columns);
-        let begun = match (begun, self.not_header.take()) {
-            // Lines of text may stand above the header.
-            (Err(error), _) if error.lacks_a_column() => {
-                self.not_header = Some(error);
-                return Ok(false);
-            }
-            // A row: the line above it was the header.
-            (
-                Ok((_, true)) | Err(ct_signals::Error::Read(ct_signals::ReadError::NoOrder { .. })),
-                Some(error),
-            ) => return Err(error.into()),
-            (begun, _) => begun,
-        };
-        let (mut rows, is_row) = match begun {
+        let (rows, is_row) = match begun {
             Err(ct_signals::Error::Read(ct_signals::ReadError::NoOrder { found, .. }))
                 if self.parts < PARTS =>
             {
@@ -60,6 +73,63 @@ impl<'a> Session<'a> {
             }
             begun => begun?,
         };
+        self.begin(rows, is_row)?;
+        Ok(is_row)
+    }
+
+    /// The line after a header, which may give its units; returns whether it is a row.
+    pub(super) fn after_header(&mut self, header: Header, line: &[u8]) -> Result<bool, Error> {
+        let Ok(text) = std::str::from_utf8(line) else {
+            self.bad(|| BadLine::NotText.to_string());
+            self.header = Some(header);
+            return Ok(false);
+        };
+        if Rows::is_before_table(text) {
+            self.header = Some(header);
+            return Ok(false);
+        }
+        if Rows::gives_units(&header.text, text) {
+            self.accept(&header, Some(text))?;
+            return Ok(false);
+        }
+        // Lines of text may stand above the header.
+        let may_be_above = self.rows.is_none() && header.above < MOST_ABOVE;
+        if may_be_above && !Rows::has_samples(text, &self.columns) {
+            self.header = Some(Header {
+                above: header.above + 1,
+                ..Header::new(text, self.line)
+            });
+            return Ok(false);
+        }
+        self.accept(&header, None)?;
+        Ok(true)
+    }
+
+    /// Takes the columns from a header, and the units from the row below it.
+    pub(in super::super) fn accept(
+        &mut self,
+        header: &Header,
+        units: Option<&str>,
+    ) -> Result<(), Error> {
+        let columns = &self.columns;
+        let rows = match units {
+            None => Rows::begin(INPUT, header.row, &header.text, columns).map(|(rows, _)| rows),
+            Some(units) => {
+                Rows::begin_with_units(INPUT, header.row, (&header.text, units), columns)
+            }
+        }?;
+        // Messages name the row of the header.
+        let present = std::mem::replace(&mut self.line, header.row);
+        let accepted = match self.rows.take() {
+            None => self.begin(rows, false),
+            Some(known) => self.go_on(rows, &known),
+        };
+        self.line = present;
+        accepted
+    }
+
+    /// Begins to read rows in the order of their columns.
+    fn begin(&mut self, mut rows: Rows, is_row: bool) -> Result<(), Error> {
         let hint = if is_row {
             format!("; where that is wrong, {HEADER_FIRST}")
         } else {
@@ -99,7 +169,7 @@ impl<'a> Session<'a> {
             }
         }
         self.rows = Some(rows);
-        Ok(is_row)
+        Ok(())
     }
 
     /// The units of the rows: the number of readings equals the number of the model's outputs, with a single unit.

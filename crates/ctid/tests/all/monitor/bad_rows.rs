@@ -190,6 +190,10 @@ fn what_is_no_row_at_all_is_refused() {
         "no column beginning with \"u\" for the input",
     );
     refused(
+        "time,level,state\n0,2.3,RUN\n1,2.4,RUN\n",
+        "row 1: no column beginning with \"u\" for the input",
+    );
+    refused(
         "t [s],u [V],y [cm]\ns,V,mm\n0,1,2\n",
         "row 2, column \"y [cm]\"",
     );

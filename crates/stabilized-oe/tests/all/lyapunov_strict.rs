@@ -27,7 +27,8 @@ fn fallen(epsilon: f64, s: f64, weights: Weights, dt: f64) -> f64 {
     let plus = |x: [f64; 3], k: [f64; 3], h: f64| core::array::from_fn(|j| x[j] + h * k[j]);
     let (mut x, mut rest) = ([epsilon, s, 0.0], dt);
     while rest > 0.0 {
-        if x[0].abs() < 1e-9 * epsilon.abs() {
+        // At zero it stays zero.
+        if x[0].abs() <= 1e-9 * epsilon.abs() {
             return x[2] * (-eta * rest).exp();
         }
         let h = (0.02 / ((2.0 * c + gamma) * x[1] + eta)).min(rest);

@@ -103,7 +103,7 @@ impl ReadSummary {
                 to: to.to_string(),
             }),
         }
-        // Converted forth and back.
+        // A conversion that was undone.
         self.converted
             .retain(|converted| converted.from != converted.to);
     }

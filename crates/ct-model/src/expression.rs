@@ -184,35 +184,39 @@ impl Expression {
         }
     }
 
-    /// Calls `each` for every occurrence of a variable.
-    pub fn each_variable(&self, each: &mut impl FnMut(Variable)) {
+    /// Calls `each` for the expression and each of its parts.
+    pub fn each_part<'a>(&'a self, each: &mut impl FnMut(&'a Self)) {
+        each(self);
         match self {
-            Self::Number(_) | Self::Time => {}
-            Self::Variable(variable) => each(*variable),
-            Self::Negative(a) => a.each_variable(each),
+            Self::Number(_) | Self::Time | Self::Variable(_) => {}
+            Self::Negative(a) => a.each_part(each),
             Self::Binary(_, a, b) | Self::Delay(a, b) => {
-                a.each_variable(each);
-                b.each_variable(each);
+                a.each_part(each);
+                b.each_part(each);
             }
-            Self::Call(_, arguments) => arguments.iter().for_each(|a| a.each_variable(each)),
+            Self::Call(_, arguments) => arguments.iter().for_each(|a| a.each_part(each)),
             Self::If(condition, a, b) => {
-                condition.each_variable(each);
-                a.each_variable(each);
-                b.each_variable(each);
+                condition.each_part(each);
+                a.each_part(each);
+                b.each_part(each);
             }
         }
     }
 
+    /// Calls `each` for every occurrence of a variable.
+    pub fn each_variable(&self, each: &mut impl FnMut(Variable)) {
+        self.each_part(&mut |part| {
+            if let Self::Variable(variable) = part {
+                each(*variable);
+            }
+        });
+    }
+
     /// Whether some part satisfies a test.
     pub fn any(&self, test: &impl Fn(&Self) -> bool) -> bool {
-        test(self)
-            || match self {
-                Self::Number(_) | Self::Time | Self::Variable(_) => false,
-                Self::Negative(a) => a.any(test),
-                Self::Binary(_, a, b) | Self::Delay(a, b) => a.any(test) || b.any(test),
-                Self::Call(_, arguments) => arguments.iter().any(|a| a.any(test)),
-                Self::If(condition, a, b) => condition.any(test) || a.any(test) || b.any(test),
-            }
+        let mut found = false;
+        self.each_part(&mut |part| found |= test(part));
+        found
     }
 
     /// The expression with other expressions substituted for its variables.
@@ -327,30 +331,36 @@ impl Condition {
         }
     }
 
-    /// As [`Expression::each_variable`].
-    pub fn each_variable(&self, each: &mut impl FnMut(Variable)) {
+    /// As [`Expression::each_part`].
+    pub fn each_part<'a>(&'a self, each: &mut impl FnMut(&'a Expression)) {
         match self {
             Self::Constant(_) => {}
             Self::Compare(_, a, b) => {
-                a.each_variable(each);
-                b.each_variable(each);
+                a.each_part(each);
+                b.each_part(each);
             }
-            Self::Not(a) => a.each_variable(each),
+            Self::Not(a) => a.each_part(each),
             Self::And(a, b) | Self::Or(a, b) => {
-                a.each_variable(each);
-                b.each_variable(each);
+                a.each_part(each);
+                b.each_part(each);
             }
         }
     }
 
+    /// As [`Expression::each_variable`].
+    pub fn each_variable(&self, each: &mut impl FnMut(Variable)) {
+        self.each_part(&mut |part| {
+            if let Expression::Variable(variable) = part {
+                each(*variable);
+            }
+        });
+    }
+
     /// As [`Expression::any`].
     pub fn any(&self, test: &impl Fn(&Expression) -> bool) -> bool {
-        match self {
-            Self::Constant(_) => false,
-            Self::Compare(_, a, b) => a.any(test) || b.any(test),
-            Self::Not(a) => a.any(test),
-            Self::And(a, b) | Self::Or(a, b) => a.any(test) || b.any(test),
-        }
+        let mut found = false;
+        self.each_part(&mut |part| found |= test(part));
+        found
     }
 
     /// Whether the condition is true for these values of the variables.

@@ -49,6 +49,7 @@
 
 pub mod effects;
 mod expression;
+mod hard_nonlinearity;
 mod linear_form;
 mod linearity;
 mod scalar;
@@ -60,6 +61,7 @@ mod time_unit;
 mod units;
 
 pub use expression::{Comparison, Condition, Expression, Function, Operator, Variable};
+pub use hard_nonlinearity::OperatingPoint;
 pub use linear_form::{LinearForm, TransferFunction};
 pub use linearity::Linearity;
 pub use scalar::{Dual, Scalar};

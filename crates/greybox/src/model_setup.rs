@@ -19,7 +19,6 @@ use ct_signals::Record;
 use estimation::Prior;
 
 use self::build::samples_of;
-use self::fit::START_TOLERANCE;
 pub use self::simulated_loop::{LoopController, SimulatedLoop};
 use crate::{Error, PriorValue, TimeLimit, clock::Clock, output_noise::output_noise};
 
@@ -187,7 +186,11 @@ impl<'a> ModelSetup<'a> {
         Self { tolerance, ..self }
     }
 
-    /// The largest tolerance, up to 1e-6, with which the outputs change by at most a hundredth of their noise, the standard deviation at each
+    /// The largest tolerance that fits take \[relative\]: that of fits from many starts, whose best result is fitted again with the tolerance of
+    /// the setup.
+    pub const LARGEST_TOLERANCE: f64 = 1e-6;
+
+    /// The largest tolerance, up to [`Self::LARGEST_TOLERANCE`], with which the outputs change by at most a hundredth of their noise, the standard deviation at each
     /// output: that of [`ct_model::TOLERANCE`] where no larger one is sufficient, or the simulation is not finite.
     #[must_use]
     pub fn sufficient_tolerance(&self, x: &[f64], noise: &[f64]) -> f64 {
@@ -203,7 +206,7 @@ impl<'a> ModelSetup<'a> {
             });
             changes.all(|change| change <= OF_NOISE)
         };
-        let mut tolerance = START_TOLERANCE;
+        let mut tolerance = Self::LARGEST_TOLERANCE;
         while tolerance > 2.0 * ct_model::TOLERANCE {
             if with(tolerance).is_some_and(is_sufficient) {
                 return tolerance;

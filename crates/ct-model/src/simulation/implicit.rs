@@ -5,7 +5,7 @@
 //!
 //! **Reference**: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd edition, section IV.6, table 6.5.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Schur};
 
 use super::drive::Drive;
 use super::step::{Step, largest};
@@ -37,6 +37,9 @@ const CONVERGED: f64 = 1e-3;
 
 /// Perturbation for finite differences, as a share of a state's size.
 const DIFFERENCE: f64 = 1e-7;
+
+/// Largest number of iterations for the eigenvalues of the Jacobian.
+const SCHUR_STEPS: usize = 200;
 
 /// Number of columns of the Jacobian that are computed together, as derivatives of one dual.
 const LANES: usize = 4;
@@ -103,11 +106,18 @@ impl Jacobian {
         }
     }
 
-    /// The infinity norm: the largest row sum of absolute values.
-    pub fn norm(&self) -> f64 {
-        let rows = self.matrix.row_iter();
-        rows.map(|row| row.iter().map(|v| v.abs()).sum())
-            .fold(0.0, f64::max)
+    /// The largest absolute value of the eigenvalues: unlike a norm, it does not depend on the units of the states. Infinite where it cannot be
+    /// computed.
+    pub fn spectral_radius(&self) -> f64 {
+        if self.matrix.iter().any(|value| !value.is_finite()) {
+            return f64::INFINITY;
+        }
+        let schur = Schur::try_new(self.matrix.clone(), f64::EPSILON, SCHUR_STEPS);
+        schur.map_or(f64::INFINITY, |schur| {
+            let eigenvalues = schur.complex_eigenvalues();
+            let sizes = eigenvalues.iter().map(|value| value.norm());
+            sizes.fold(0.0, f64::max)
+        })
     }
 }
 

@@ -4,6 +4,7 @@ use super::delays::{Delays, POINTS};
 use super::drive::{Drive, Interval};
 use super::events::Event;
 use super::explicit::Interpolation;
+use super::implicit::Jacobian;
 use super::{Method, NoSolution, SimulationState, explicit, implicit, order_four};
 use crate::scalar::Scalar;
 use crate::tape::Tape;
@@ -21,13 +22,16 @@ const STRETCH: f64 = 1.1;
 pub(super) const MOST_STEPS: usize = 50_000;
 /// ... and the number that every interval adds to the budget. A simulation whose steps are always short therefore fails within seconds.
 const STEPS_PER_INTERVAL: usize = 300;
-/// If an interval has more steps than this, the model is tested for stiffness.
+/// After so many explicit steps in one interval, the model is tested for stiffness.
 const MANY_STEPS: usize = 40;
+/// After so many implicit steps, it is tested whether explicit ones may be as long.
+const MANY_IMPLICIT_STEPS: u32 = 16;
 /// The least tolerance for steps of order four.
 const LEAST_FOR_ORDER_FOUR: f64 = 1e-8;
 /// The most steps of order five before order four is attempted again.
 const MOST_OF_ORDER_FIVE: u32 = 64;
-/// The model is stiff if the step length times the norm of the Jacobian is above this: stability, not accuracy, then limits the steps.
+/// The model is stiff if the step length times the largest absolute eigenvalue of the Jacobian is above this: stability, not accuracy, then
+/// limits explicit steps.
 const STABILITY: f64 = 1.5;
 
 /// Ratio of the next attempt to a step whose error is too large; a NaN error asks for a much shorter step.
@@ -193,6 +197,7 @@ impl<T: Scalar> SimulationState<T> {
                 return Ok(());
             }
             taken += 1;
+            self.look_for_accuracy();
             self.steps_left = (most - taken).min(MOST_STEPS);
             if taken == most {
                 return Err(NoSolution { time: now });
@@ -248,6 +253,9 @@ impl<T: Scalar> SimulationState<T> {
                 .go_on(event.is_none() && !sliding && self.method == Method::Explicit);
             self.state.copy_from_slice(&self.work.next);
             self.time = self.time + h;
+            if self.method == Method::Implicit {
+                self.implicit_steps = (self.implicit_steps.0 + 1, h.value());
+            }
             if sliding {
                 self.put_back(tape, &Drive::new(interval, delays));
             }
@@ -282,7 +290,7 @@ impl<T: Scalar> SimulationState<T> {
                     }
                 }
             }
-            if taken == MANY_STEPS && self.method == Method::Explicit {
+            if taken % MANY_STEPS == 0 && self.method == Method::Explicit {
                 self.look_for_stiffness(tape, h.value());
             }
         }
@@ -330,12 +338,26 @@ impl<T: Scalar> SimulationState<T> {
         }
     }
 
+    /// Changes to implicit steps where stability limits the explicit ones.
     fn look_for_stiffness(&mut self, tape: &Tape, h: f64) {
         if let Some(jacobian) = &mut self.jacobian {
             jacobian.compute(tape, &self.work.registers);
-            if self.length.min(h) * jacobian.norm() > STABILITY {
+            if self.length.min(h) * jacobian.spectral_radius() > STABILITY {
                 self.method = Method::Implicit;
             }
+        }
+    }
+
+    /// Changes to explicit steps where accuracy alone limits the implicit ones, which take longer and have the lower order.
+    fn look_for_accuracy(&mut self) {
+        let (count, h) = self.implicit_steps;
+        if count < MANY_IMPLICIT_STEPS {
+            return;
+        }
+        self.implicit_steps.0 = 0;
+        let radius = self.jacobian.as_ref().map(Jacobian::spectral_radius);
+        if radius.is_some_and(|radius| h * radius < STABILITY) {
+            self.method = Method::Explicit;
         }
     }
 

@@ -3,8 +3,8 @@
 //! - Models without delays whose equations are linear in the states are integrated exactly from sample to sample: for held inputs in all
 //!   cases, for linearly interpolated inputs if the equations are linear in the inputs too.
 //! - All other models are integrated by an explicit method of order five with step-size control, or of order four where the tolerance is
-//!   large and the sampling interval short. If its steps become far shorter than the error requires, the model is stiff, and an implicit
-//!   method of order four continues ([`Method`]).
+//!   large and the sampling interval short. Where its steps become far shorter than the error requires, the model is stiff, and an implicit
+//!   method of order four continues until accuracy alone limits the steps again ([`Method`]).
 //! - While the inputs are held, a step may have several sampling intervals, and the states at the samples are interpolated.
 //! - Steps end where an input jumps, where a jump leaves a delay, and where a branch changes (`if`, `min`, `max`, `abs`, `sign`). Such a
 //!   time depends on the parameters, and the step length carries its derivative, so that the later states have the derivatives of the exact
@@ -87,6 +87,8 @@ pub struct SimulationState<T> {
     steps_left: usize,
     /// Step length that the error of the last step allows.
     length: f64,
+    /// Number of implicit steps since explicit ones were considered, and the length of the last one.
+    implicit_steps: (u32, f64),
     /// The present step is one of order four.
     order_four: bool,
     /// Number of steps of order five before order four is attempted again, now and after the next failure.
@@ -149,6 +151,7 @@ impl<T: Scalar> SimulationState<T> {
             largest: initial.iter().map(|x| x.value().abs()).collect(),
             steps_left: MOST_STEPS,
             length: f64::INFINITY,
+            implicit_steps: (0, 0.0),
             order_four: false,
             order_five: (0, 1),
             long_step: LongStep::new(tape.states),

@@ -1,10 +1,10 @@
 //! Stiff models with roots whose slope is infinite where a trajectory passes: the pressures of a hydraulic cylinder.
 
-use ct_model::Method;
+use ct_model::{Method, Simulation};
 
 use crate::support::Case;
 
-/// The valve's flows follow the root of a pressure difference, which ends at zero (`$ROOT`) or changes its sign with it.
+/// The valve is fast, so that all steps are implicit; its flows follow the root of a pressure difference, which ends at zero (`$ROOT`) or changes its sign with it.
 const CYLINDER: &str = "model Cylinder
   final parameter Real A = 1.2e-3;
   final parameter Real m = 250;
@@ -23,12 +23,14 @@ const CYLINDER: &str = "model Cylinder
   Real v(start=0);
   Real pA(start=54.9e5);
   Real pB(start=45.1e5);
-  Real dA = if u >= 0 then ps - pA else pA;
-  Real dB = if u >= 0 then pB else ps - pB;
-  Real qA = kv*u*$ROOT(dA);
-  Real qB = -kv*u*$ROOT(dB);
+  Real z(start=60);
+  Real dA = if z >= 0 then ps - pA else pA;
+  Real dB = if z >= 0 then pB else ps - pB;
+  Real qA = kv*z*$ROOT(dA);
+  Real qB = -kv*z*$ROOT(dB);
 equation
   der(x) = v;
+  der(z) = 1e5*(u - z);
   m*der(v) = A*(pA - pB) - b*v - F;
   (Vd + A*x)/beta*der(pA) = qA - A*v;
   (Vd + A*(L - x))/beta*der(pB) = qB + A*v;
@@ -44,10 +46,14 @@ fn valve(k: usize) -> Vec<f64> {
     vec![levels[of % levels.len()]]
 }
 
-fn is_simulated(root: &str) {
-    let text = CYLINDER
+fn with_root(root: &str) -> String {
+    CYLINDER
         .replace("$ROOT(dA)", &root.replace('d', "dA"))
-        .replace("$ROOT(dB)", &root.replace('d', "dB"));
+        .replace("$ROOT(dB)", &root.replace('d', "dB"))
+}
+
+fn is_simulated(root: &str) {
+    let text = with_root(root);
     let mut is_stiff = false;
     for k in 0..8 {
         let factor = |j: usize| 0.7 + 0.6 * ((k * (2 * j + 3)) % 8) as f64 / 8.0;
@@ -81,4 +87,37 @@ fn a_pressure_that_ends_at_zero_is_passed() {
 #[test]
 fn a_flow_that_changes_its_sign_with_a_pressure_difference_is_passed() {
     is_simulated("sign(d)*sqrt(abs(d)/1e5)");
+}
+
+/// The units of the states do not make a model stiff: pressures of 1e7 Pa beside speeds of 0.1 m/s.
+#[test]
+fn states_of_very_different_size_are_not_stiff() {
+    let text = with_root("sign(d)*sqrt(abs(d)/1e5)").replace("1e5*(u - z)", "5*(u - z)");
+    let case = Case {
+        tolerance: 1e-8,
+        ..Case::new(&text, 20, 0.5, |_| vec![10.0])
+    };
+    assert_eq!(case.plain().1, Method::Explicit);
+}
+
+/// Explicit steps continue after a stiff part of a record.
+#[test]
+fn a_model_that_is_stiff_for_a_while_is_stiff_no_longer() {
+    let text = "model Valve input Real u; output Real y = x; Real x(start=0); Real p(start=1); Real q(start=0);
+equation
+  der(x) = (1 + 1e5*u)*(0.5 + 0.1*p - x - x^3);
+  der(p) = 30*q;
+  der(q) = -30*sin(p);
+end Valve;";
+    let case = Case::new(text, 40, 0.1, |k| vec![if k < 10 { 1.0 } else { 0.0 }]);
+    let parameters = case.model.parameters();
+    let initial = case.model.starts(&parameters);
+    let mut simulation = Simulation::new(&case.model, &parameters, &initial, 0.0);
+    let mut methods = Vec::new();
+    for (inputs, until) in case.inputs.iter().zip(&case.time[1..]) {
+        simulation.advance(inputs, inputs, *until).unwrap();
+        methods.push(simulation.method());
+    }
+    assert_eq!(methods[9], Method::Implicit);
+    assert_eq!(methods[12..], [Method::Explicit; 27]);
 }

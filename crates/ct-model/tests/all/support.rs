@@ -27,7 +27,7 @@ impl Case {
         }
     }
 
-    /// The outputs of all rows, and the method at the end.
+    /// The outputs of all rows, and the method at the end, or the implicit one if it was used at any row.
     pub fn run<T: SimulationNumber>(
         &self,
         parameters: &[T],
@@ -36,6 +36,7 @@ impl Case {
         let mut simulation =
             Simulation::new(&self.model, parameters, initial, 0.0).with_tolerance(self.tolerance);
         let mut rows = Vec::new();
+        let mut method = simulation.method();
         for k in 0..self.time.len() {
             let mut y = vec![T::constant(0.0); self.model.spec().outputs.len()];
             simulation.read(&self.inputs[k], &mut y);
@@ -45,9 +46,12 @@ impl Case {
                 simulation
                     .advance(&self.inputs[k], to, self.time[k + 1])
                     .unwrap_or_else(|error| panic!("{error}"));
+                if method != Method::Implicit {
+                    method = simulation.method();
+                }
             }
         }
-        (rows, simulation.method())
+        (rows, method)
     }
 
     pub fn plain(&self) -> (Vec<Vec<f64>>, Method) {

@@ -51,6 +51,9 @@ pub fn of_the_loop(known: &ControlLoop, input_unit: &str, names: &MessageNames) 
             output: output.clone(),
             input: input.clone(),
         }),
+        NotSimulated::HardNonlinearity { of } => format!(
+            "a hard nonlinearity of {of} acts in the records (a limit, a dead zone, friction, backlash, a branch), and a simulated loop takes fed-back noise out of the residual by a linear plant"
+        ),
         NotSimulated::Unstable { radius } => format!(
             "the controller makes the fitted model unstable ({}), so it cannot have produced the record: check its sign, gain and times, and their units",
             match radius {

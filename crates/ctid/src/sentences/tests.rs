@@ -220,6 +220,13 @@ fn a_loop_that_is_not_simulated_says_why() {
             ["v depends on i without a state in between", "reads it"],
         ),
         (
+            NotSimulated::HardNonlinearity {
+                of: "u".to_string(),
+            },
+            None,
+            ["a hard nonlinearity of u acts", "by a linear plant"],
+        ),
+        (
             NotSimulated::Unstable { radius: Some(1.25) },
             None,
             ["an eigenvalue of magnitude 1.250", "check its sign"],

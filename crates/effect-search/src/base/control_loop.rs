@@ -76,6 +76,12 @@ pub enum NotSimulated {
         /// The input that the controller drives.
         input: String,
     },
+    /// A hard nonlinearity of the model acts in the records: a limit, a dead zone, friction, backlash. A linear plant does then not take the
+    /// noise that controllers feed back out of the residual.
+    HardNonlinearity {
+        /// The state, or the input that a controller drives.
+        of: String,
+    },
     /// The linear loop of the fitted model and its controllers grows, so it cannot have produced the records.
     Unstable {
         /// Largest magnitude of its eigenvalues over one sampling interval; `None` if the simulation of the loop fails.
@@ -258,6 +264,9 @@ pub fn enclose<'a>(
     if !simulate {
         return measured(setup, fit, why(NotSimulated::AsRequested));
     }
+    if let Some(hard) = hard_nonlinearity(&setup, &fit.x, controllers) {
+        return measured(setup, fit, why(hard));
+    }
     if let Some(record) = lacking(setup.records(), controllers, thresholds.lacking_readings) {
         return measured(setup, fit, why(NotSimulated::MissingReadings { record }));
     }
@@ -291,6 +300,19 @@ pub fn enclose<'a>(
         }
         Err(error) => Err(error.into()),
     }
+}
+
+/// The variable whose hard nonlinearity acts in the records ([`NotSimulated::HardNonlinearity`]).
+pub(crate) fn hard_nonlinearity(
+    setup: &ModelSetup,
+    x: &[f64],
+    controllers: &[LoopController],
+) -> Option<NotSimulated> {
+    let driven: Vec<usize> = controllers.iter().map(|of| of.input).collect();
+    let of = setup.hard_nonlinearity(x, &driven)?;
+    Some(NotSimulated::HardNonlinearity {
+        of: setup.model().spec().about(of).name.clone(),
+    })
 }
 
 /// Standard errors that allow for a bias from feedback, by the change of each entry with the other weighting

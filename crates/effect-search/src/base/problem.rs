@@ -96,6 +96,8 @@ pub(crate) struct Limit<'a> {
     time: Arc<TimeLimit>,
     whole: Option<Duration>,
     interrupt: Option<&'a AtomicBool>,
+    /// Share of the time that had passed when the phases began.
+    from: f64,
 }
 
 /// A phase of a search, which ends when a share of the whole time has passed since the beginning.
@@ -140,12 +142,23 @@ impl<'a> Limit<'a> {
             time: Arc::new(TimeLimit::new(options.time_limit)),
             whole: options.time_limit,
             interrupt: options.interrupt,
+            from: 0.0,
         }
     }
 
     /// Begins a phase: fits continue until its share of the time has passed.
     pub fn begin(&self, phase: Phase) {
-        self.time.allow(phase.share());
+        self.time
+            .allow(self.from + (1.0 - self.from) * phase.share());
+    }
+
+    /// The same limit for phases that begin again in the time that is left.
+    pub fn begun_again(&self) -> Self {
+        let passed = |whole: Duration| self.time.elapsed().as_secs_f64() / whole.as_secs_f64();
+        Self {
+            from: self.whole.map_or(0.0, passed).min(1.0),
+            ..self.clone()
+        }
     }
 
     /// Whether the time of the phase has passed.
@@ -178,6 +191,7 @@ impl<'a> Limit<'a> {
             time: Arc::new(TimeLimit::new(whole)),
             whole,
             interrupt: self.interrupt,
+            from: 0.0,
         }
     }
 

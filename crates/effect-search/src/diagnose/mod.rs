@@ -46,7 +46,7 @@ pub fn diagnose(
     context.limit.leaves_out("starts of the model's fit");
 
     tell("searching the effects");
-    let mut searched = context.searched(&base, options.max_effects)?;
+    let (context, base, mut searched) = context.searched(base, options.max_effects)?;
 
     tell("confirming");
     let mut answer = context.accepted(&searched)?;

@@ -95,7 +95,7 @@ pub(crate) fn begin<'a>(
         scales: None,
         ties: Vec::new(),
         absorbed: Vec::new(),
-        tolerance: ct_model::TOLERANCE,
+        tolerance: ModelSetup::LARGEST_TOLERANCE,
         simulated_loop: None,
         control_loop: None,
         limit,
@@ -127,7 +127,13 @@ pub(crate) fn begin<'a>(
         let tolerance = noise.map(|noise| setup.sufficient_tolerance(&fit.x, &noise));
         (visited, tolerance)
     };
-    context.tolerance = tolerance.unwrap_or(ct_model::TOLERANCE);
+    let tolerance = tolerance.unwrap_or(ct_model::TOLERANCE);
+    if tolerance < context.tolerance {
+        context.tolerance = tolerance;
+        let white = Noise::white(problem.spec.outputs.len());
+        // With this tolerance a state that grows may need more steps than a simulation may take.
+        bare = context.refitted(&bare, &white, FINE).unwrap_or(bare);
+    }
     context.level_shifts = level_shifts(&problem.spec, &visited);
     let mut all = all_candidates(&problem.spec, &visited, &problem.kept, &problem.candidates)?;
     all.retain(|candidate| {
@@ -140,6 +146,9 @@ pub(crate) fn begin<'a>(
     let mut node = bare;
     for id in &problem.effects {
         node = context.with_listed(node, id)?;
+    }
+    if let Some(why) = context.hard_nonlinearity(&node)? {
+        return context.not_simulated(&node, why);
     }
     Ok((context, node))
 }

@@ -9,7 +9,7 @@ use estimation::{Fit, Noise, Start, Stopping, fit_from};
 use greybox::{FitOptions, ModelSetup, SimulatedLoop};
 
 use crate::Error;
-use crate::base::control_loop::ControlLoop;
+use crate::base::control_loop::{ControlLoop, NotSimulated, hard_nonlinearity};
 use crate::base::problem::{Limit, Problem};
 use crate::fit::relations::{Absorbed, Tie};
 use crate::thresholds::Thresholds;
@@ -100,6 +100,32 @@ impl Context<'_> {
         let mut measured = self.clone();
         measured.simulated_loop = None;
         Some(measured)
+    }
+
+    /// Why a set is not simulated in the loop of this search: a hard nonlinearity.
+    pub fn hard_nonlinearity(&self, set: &Node) -> Result<Option<NotSimulated>, Error> {
+        let Some(simulated) = &self.simulated_loop else {
+            return Ok(None);
+        };
+        let setup = self.setup(&set.model)?;
+        Ok(hard_nonlinearity(
+            &setup,
+            &set.fit.x,
+            simulated.controllers(),
+        ))
+    }
+
+    /// The same search with the measured inputs for this reason, and a set fitted to them.
+    pub fn not_simulated(self, set: &Node, why: NotSimulated) -> Result<(Self, Node), Error> {
+        let context = Self {
+            simulated_loop: None,
+            control_loop: Some(ControlLoop::measured(why)),
+            limit: self.limit.begun_again(),
+            ..self
+        };
+        let white = Noise::white(context.problem.spec.outputs.len());
+        let set = context.refitted(set, &white, FINE)?;
+        Ok((context, set))
     }
 
     /// A model against the fitted records.

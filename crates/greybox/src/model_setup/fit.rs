@@ -8,14 +8,12 @@ use crate::{Error, FitOptions};
 
 /// Largest number of iterations of the output weights.
 const WEIGHTINGS: usize = 12;
-/// Tolerance of simulations in fits from many starts, whose best result is fitted again with the tolerance of the setup, ...
-pub(super) const START_TOLERANCE: f64 = 1e-6;
-/// ... and the least relative fall of their cost.
+/// Least relative fall of the cost in fits from many starts.
 const START_COST: f64 = 1e-6;
 
 impl ModelSetup<'_> {
     /// Fits from many starts. Outputs are weighted by their noise, estimated from the part of the residual that its past does not predict:
-    /// a model error at one output does not increase the weight of the others. All starts are simulated with a tolerance of at least 1e-6; the
+    /// a model error at one output does not increase the weight of the others. All starts are simulated with [`Self::LARGEST_TOLERANCE`]; the
     /// best end is fitted again with that of the setup. Parameters without bounds in the text stay near their start values, unless that is too
     /// narrow: far away, a search from many starts takes twice as long.
     ///
@@ -41,7 +39,7 @@ impl ModelSetup<'_> {
         };
         let mut setup = self
             .clone()
-            .with_tolerance(START_TOLERANCE.max(self.tolerance));
+            .with_tolerance(Self::LARGEST_TOLERANCE.max(self.tolerance));
         let starts = setup.starts(options.starts, options.seed, stopping);
         let mut fit = estimation::fit_from_best(&setup, starts.clone(), &white, stopping)?;
         let weightings = if self.samples.len() > 1 {

@@ -1,6 +1,6 @@
 //! Simulates the records: rows of residuals and their derivatives.
 
-use ct_model::{Dual, Model, Output, Simulation, SimulationNumber, Variable};
+use ct_model::{Dual, Model, OperatingPoint, Output, Simulation, SimulationNumber, Variable};
 use ct_signals::{Hold, Record};
 use estimation::{Prior, Residuals, Sample};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,6 +39,30 @@ impl<'a> ModelSetup<'a> {
             Some(())
         })?;
         Some(all)
+    }
+
+    /// The first variable with a hard nonlinearity that acts in the records, of states or of `driven` inputs
+    /// ([`ct_model::ModelSpec::hard_nonlinearity`]); `None` without one, and where the simulation cannot go on.
+    #[must_use]
+    pub fn hard_nonlinearity(&self, x: &[f64], driven: &[usize]) -> Option<Variable> {
+        let spec = self.model.spec();
+        let (count, states) = (self.parameter_count(), spec.states.len());
+        let series = self.simulate_states(x)?;
+        let mut points = Vec::new();
+        for (r, record) in self.records.iter().enumerate() {
+            let states = &series[r * states..][..states];
+            points.extend(self.model_time(r).into_iter().enumerate().map(|(k, time)| {
+                let states: Vec<f64> = states.iter().map(|series| series[k]).collect();
+                let inputs = record.inputs.iter().map(|input| input.values[k]);
+                (time, states, inputs.collect::<Vec<f64>>())
+            }));
+        }
+        let points = points.iter().map(|(time, states, inputs)| OperatingPoint {
+            time: *time,
+            states,
+            inputs,
+        });
+        spec.hard_nonlinearity(&x[..count], driven, points)
     }
 
     /// The states that the model gives, a series for each record and state; `None` where the simulation cannot go on.

@@ -5,6 +5,7 @@ mod closed_loop;
 mod coverage;
 mod design;
 mod docs;
+mod hard_nonlinearity_in_loop;
 mod honest_verdicts;
 mod library_records;
 mod modelica;

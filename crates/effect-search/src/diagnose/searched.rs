@@ -3,7 +3,6 @@
 use estimation::Noise;
 
 use crate::Error;
-use crate::base::control_loop::NotSimulated;
 use crate::base::problem::Phase;
 use crate::fit::node::{Context, FINE, Node};
 use crate::search::grow::Grown;
@@ -21,29 +20,24 @@ pub(super) struct Searched {
 
 impl Context<'_> {
     /// The searches in the simulated loop of the records. If the best set has a hard nonlinearity, all is searched on the measured inputs:
-    /// in the loop the set would be biased ([`NotSimulated::HardNonlinearity`]), and further effects would make up for that.
+    /// in the loop the set would be biased ([`crate::NotSimulated::HardNonlinearity`]), and further effects would make up for that.
     pub(super) fn searched(
         self,
         base: Node,
         max_effects: usize,
     ) -> Result<(Self, Node, Searched), Error> {
-        let searched = match self.searched_with(&base, max_effects)? {
-            Ok(searched) => searched,
-            Err(why) => {
+        let searched = self.searched_once(&base, max_effects)?;
+        match self.hard_nonlinearity(&searched.grown.best)? {
+            Some(why) => {
                 let (context, base) = self.not_simulated(&base, why)?;
-                return context.searched(base, max_effects);
+                context.searched(base, max_effects)
             }
-        };
-        Ok((self, base, searched))
+            None => Ok((self, base, searched)),
+        }
     }
 
-    /// The search with white noise, and the one with the noise model of the residual; otherwise why the best set is not simulated
-    /// in the loop.
-    fn searched_with(
-        &self,
-        base: &Node,
-        max_effects: usize,
-    ) -> Result<Result<Searched, NotSimulated>, Error> {
+    /// The search with white noise, and the one with the noise model of the residual.
+    fn searched_once(&self, base: &Node, max_effects: usize) -> Result<Searched, Error> {
         self.limit.begin(Phase::White);
         let white = Noise::white(self.problem.spec.outputs.len());
         let all: Vec<usize> = (0..self.candidates.len()).collect();
@@ -56,9 +50,6 @@ impl Context<'_> {
             grown = self.grow_on(grown, &white, most)?;
             (noise, _) = self.noise_of(&grown.best)?;
         }
-        if let Some(why) = self.hard_nonlinearity(&grown.best)? {
-            return Ok(Err(why));
-        }
         let mut by_error = grown.fitted.clone();
         by_error.push(grown.best.clone());
         if slow {
@@ -69,15 +60,12 @@ impl Context<'_> {
         }
         let singles_by_error = (grown.singles.clone(), grown.base.clone());
         let (grown, noise) = self.with_noise_model(grown, noise, most)?;
-        if let Some(why) = self.hard_nonlinearity(&grown.best)? {
-            return Ok(Err(why));
-        }
-        Ok(Ok(Searched {
+        Ok(Searched {
             grown,
             noise,
             by_error,
             singles_by_error,
-        }))
+        })
     }
 
     /// The search with prewhitened fits, if the noise model is not white.

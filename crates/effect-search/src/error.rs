@@ -33,6 +33,24 @@ pub enum Error {
         /// The given number of seconds.
         seconds: f64,
     },
+    /// The model is unstable and does not follow the records.
+    #[error(
+        "the model is unstable: a deviation grows by a factor of e in {growth_time:.3} s, and from the measured inputs {output} does not follow the record (error {error:.3e} {unit}, the readings vary by {varies:.3e} {unit}); cut the record into files of at most {longest:.3} s, in each of which the states begin anew"
+    )]
+    Unstable {
+        /// The output whose simulation is worst.
+        output: String,
+        /// Unit of the output.
+        unit: String,
+        /// Root mean square of its error \[unit of the output\].
+        error: f64,
+        /// Standard deviation of its readings \[unit of the output\].
+        varies: f64,
+        /// Time in which a deviation grows by a factor of e \[s\].
+        growth_time: f64,
+        /// Length of records that can be simulated \[s\].
+        longest: f64,
+    },
     /// An effect of the model file that cannot act in the model.
     #[error("effect {id} cannot act in this model")]
     UnknownEffect {
@@ -62,6 +80,7 @@ impl Error {
             | Self::Simulation(_)
             | Self::Design(_)
             | Self::TimeUnit { .. }
+            | Self::Unstable { .. }
             | Self::UnknownEffect { .. }
             | Self::NoStart { .. } => self.to_string(),
         }

@@ -3,7 +3,7 @@
 mod at_port;
 mod naming;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use self::at_port::candidate;
 pub use self::naming::check_term_name;
@@ -217,7 +217,11 @@ pub fn shapes_keeping(
     visited: &Visited,
     kept: &BTreeMap<String, BTreeMap<String, f64>>,
 ) -> Vec<Candidate> {
-    of_effects(shape::EFFECTS.iter(), spec, visited, kept)
+    let mut all = of_effects(shape::EFFECTS.iter(), spec, visited, kept);
+    // A state that is read itself has one name as a balance and as an output: the function of time is that of the balance.
+    let mut known = BTreeSet::new();
+    all.retain(|candidate| known.insert(candidate.id.clone()));
+    all
 }
 
 /// A level shift of each output, in the order of the outputs: `level_shift(y)`. They are no candidates of a search.

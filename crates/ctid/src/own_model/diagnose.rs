@@ -10,7 +10,7 @@ use super::problem::problem;
 use super::text::{failures, undetermined};
 use super::unknown;
 use super::words::{EffectWords, shown_unit};
-use super::{held_out, singles};
+use super::{held_out, hints, singles};
 use crate::look::{Look, Side, table_text};
 use crate::numbers;
 use crate::sentences::of_gaps;
@@ -206,6 +206,7 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
         single_minimum(base.starts, base.starts_agree, minimum)
     }));
     all.extend(held_out::rises(file, &diagnosis.steps));
+    all.extend(hints::of_text(file, diagnosis));
     all.extend(diagnosis.absorbed.iter().map(absorbed));
     all.extend(diagnosis.gaps.as_ref().and_then(of_gaps));
     let known = diagnosis.control_loop.iter();

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use ct_signals::Record;
-use effect_search::{ControlLoop, Options, held_out, widened};
+use effect_search::residual_tests::InputDependence;
+use effect_search::{ControlLoop, Options, Thresholds, held_out, widened};
 use greybox::{
     Fit, FitOptions, FitUncertainty, ModelSetup, Robust, SimulatedLoop, TimeLimit,
     moved_by_weighting,
@@ -219,6 +220,22 @@ impl FittedModel {
         let known = self.control_loop.as_ref().filter(|known| !known.simulated);
         let of_loop = known.map(|known| self.given.loop_sentence(known, &MessageNames::PROGRAM));
         cut_short(&self.effort).into_iter().chain(of_loop).collect()
+    }
+
+    /// A warning if the residual of the fit depends on the inputs: then it is more than noise.
+    pub(super) fn lacks_an_effect(&self) -> Result<Option<String>, Error> {
+        let setup = self.setup()?;
+        let thresholds = Thresholds::DEFAULT;
+        let found = InputDependence::at(&setup, &self.fit.x, &thresholds);
+        let found = found.filter(|found| found.p < thresholds.not_noise);
+        Ok(found.map(|found| {
+            let outputs = &setup.records()[0].outputs;
+            format!(
+                "the residual of the fit at {} depends on {}, and the band does not include this model error: `ctid diagnose` shows what is missing",
+                outputs[found.residual % outputs.len()].name,
+                found.input
+            )
+        }))
     }
 
     /// The model against its records, as it was fitted.

@@ -26,6 +26,7 @@ mod export;
 mod file;
 mod fitted;
 mod held_out;
+mod hints;
 mod identify;
 pub(crate) mod ports;
 mod problem;

@@ -64,6 +64,7 @@ pub(crate) fn simulate(
     found.warnings.extend(file.other_time_unit(time_unit));
     if let Some(fitted) = &fitted {
         found.warnings.extend(fitted.warnings());
+        found.warnings.extend(fitted.lacks_an_effect()?);
     }
     Ok((found, summaries))
 }

@@ -1,30 +1,16 @@
 //! Whether the residual of a set of effects is noise.
 
-use ct_signals::ArModel;
-use ct_signals::residual_tests::prewhitened_input_test;
 use estimation::Fit;
 use greybox::ModelSetup;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::Error;
 use crate::fit::node::{Context, Node};
-use crate::residual_tests::NotNoise;
 use crate::residual_tests::energy::concentrated;
 use crate::residual_tests::first_order::first_order_p;
 use crate::residual_tests::stationarity::stationary_p;
-use crate::residual_tests::white::{
-    harmonics_p, instant, level_p, of_command, period, standardised,
-};
-use crate::thresholds::Thresholds;
-
-/// Whether the past of a signal predicts nearly all of it.
-fn is_predictable(signal: &[f64], thresholds: &Thresholds) -> bool {
-    let mean = signal.iter().sum::<f64>() / signal.len().max(1) as f64;
-    let centred: Vec<f64> = signal.iter().map(|v| v - mean).collect();
-    let power = centred.iter().map(|v| v * v).sum::<f64>() / centred.len().max(1) as f64;
-    ArModel::fit(&[&centred], thresholds.noise_order)
-        .is_ok_and(|model| model.sigma() <= thresholds.predictable_input * power.sqrt())
-}
+use crate::residual_tests::white::{harmonics_p, instant, level_p, period, standardised};
+use crate::residual_tests::{InputDependence, NotNoise};
 
 impl Context<'_> {
     /// The first property of a set's residual that noise does not have, `None` if the residual is noise; `own` is the set's fit with the noise
@@ -54,34 +40,11 @@ impl Context<'_> {
         let outputs = records[0].outputs.len();
         let name = |i: usize| records[0].outputs[i % outputs].name.clone();
         let samples = |residual: &[f64]| residual.iter().filter(|e| !e.is_nan()).count();
-        // Inputs first: each signal derived from an input, at each output.
-        let (mut least, mut place, mut count) = (1.0, None, 0.0);
-        for (i, residual) in residuals.iter().enumerate() {
-            let record = &records[i / outputs];
-            let lags = (samples(residual) / 10).clamp(2, 25);
-            for input in setup.external_signals(record) {
-                let (low, high) = input.range();
-                if high <= low {
-                    continue;
-                }
-                for signal in of_command(&input.values) {
-                    if is_predictable(&signal, &self.thresholds) {
-                        continue;
-                    }
-                    count += 1.0;
-                    match prewhitened_input_test(&signal, residual, lags) {
-                        Ok((_, p)) if p < least => {
-                            (least, place) = (p, Some((input.name.clone(), i)));
-                        }
-                        _ => {}
-                    }
-                }
-            }
-        }
-        if let Some((input, i)) = place.filter(|_| least * count < self.thresholds.not_noise) {
+        let dependence = InputDependence::of(&setup, &residuals, &self.thresholds);
+        if let Some(of) = dependence.filter(|of| of.p < self.thresholds.not_noise) {
             return Ok(Some(NotNoise::Input {
-                input,
-                output: name(i),
+                input: of.input,
+                output: name(of.residual),
             }));
         }
         if let Some((period, i)) = self.harmonics(node, (&setup, own), &residuals) {

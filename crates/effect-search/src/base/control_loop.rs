@@ -256,7 +256,7 @@ pub fn enclose<'a>(
     };
     if controllers.is_empty() {
         let detected = may_test
-            .then(|| detected(&setup, &fit, thresholds))
+            .then(|| detected_feedback(&setup, &fit, thresholds))
             .flatten();
         return measured(setup, fit, detected);
     }
@@ -342,7 +342,11 @@ fn lacking(records: &[Record], controllers: &[LoopController], most: f64) -> Opt
 
 /// Feedback through an input, by the test with the smallest p-value, corrected for the number of tests; `None` if there is none, or the
 /// simulation is not finite.
-fn detected(setup: &ModelSetup, fit: &Fit, thresholds: &Thresholds) -> Option<ControlLoop> {
+pub(crate) fn detected_feedback(
+    setup: &ModelSetup,
+    fit: &Fit,
+    thresholds: &Thresholds,
+) -> Option<ControlLoop> {
     let residuals = estimation::residuals(setup, &fit.x)?;
     let gains = setup.step_gains(&fit.x, STEP_RESPONSE);
     let outputs = setup.outputs();

@@ -46,7 +46,7 @@ pub fn diagnose(
     context.limit.leaves_out("starts of the model's fit");
 
     tell("searching the effects");
-    let (context, base, mut searched) = context.searched(base, options.max_effects)?;
+    let (mut context, base, mut searched) = context.searched(base, options.max_effects)?;
 
     tell("confirming");
     let mut answer = context.accepted(&searched)?;
@@ -65,6 +65,9 @@ pub fn diagnose(
     let mut graded = context.graded(answer, &base, grown)?;
     let rounded = context.add_rounding(&mut graded, &base, options.max_effects);
 
+    if graded.verdict != Verdict::Unexplained {
+        context.control_loop = context.retested_feedback(&graded.set)?;
+    }
     let (last, own) = match graded.verdict {
         Verdict::Unexplained => (&base, context.in_own_noise(&base)?),
         _ => (&graded.set, graded.own),

@@ -129,7 +129,12 @@ impl Context<'_> {
         let untested = all.iter().all(|(_, share)| share.is_none());
         all.extend(courses.into_iter().map(|set| (set, None)));
         if !carries && !untested {
-            all.sort_by(|a, b| b.0.gain_over(&base).total_cmp(&a.0.gain_over(&base)));
+            // One that raises the error where it was not fitted comes last.
+            let raises = |share: Option<f64>| share.is_some_and(|share| share < 0.0);
+            all.sort_by(|a, b| {
+                let by_gain = b.0.gain_over(&base).total_cmp(&a.0.gain_over(&base));
+                raises(a.1).cmp(&raises(b.1)).then(by_gain)
+            });
         }
         let Some((best, share_left_out)) = all.first().cloned() else {
             return Ok(None);

@@ -11,8 +11,11 @@ use ct_model::effects::{
     shapes_keeping,
 };
 use ct_model::{Expression, Model, ModelSpec};
+use ct_signals::Record;
 use estimation::{Fit, Noise, Residuals, within};
 use greybox::{FitOptions, ModelSetup, possible_reading_steps};
+
+use statrs::statistics::Statistics;
 
 use crate::Error;
 use crate::base::control_loop::enclose;
@@ -110,9 +113,10 @@ pub(crate) fn begin<'a>(
     // The model is compared with sets of effects and needs their criterion, in which every output has a variance of its own: `fit` weights the
     // outputs by their noise.
     let fit = context.setup(&model)?.fit(&fit_options)?;
+    require_stable(&context.setup(&model)?, &fit)?;
     let mut bare = Node {
         added: Vec::new(),
-        model,
+        model: model.clone(),
         fit,
     };
     if problem.spec.outputs.len() > 1 {
@@ -120,6 +124,7 @@ pub(crate) fn begin<'a>(
         bare = context.refitted(&bare, &white, FINE)?;
     }
     bare = context.enclosed(bare, options)?;
+    require_stable(&context.setup(&model)?, &bare.fit)?;
     let (visited, tolerance) = {
         let (setup, fit) = (context.setup(&bare.model)?, &bare.fit);
         let visited = visited(problem, &setup, fit)?;
@@ -201,6 +206,38 @@ impl<'a> Context<'a> {
         added.push(i);
         self.fitted(added, trial.model, starts, &white, FINE)
     }
+}
+
+/// Growth of a deviation over a record, as a power of e, beyond which no initial state is known well enough for a simulation.
+const GROWS: f64 = 23.0;
+/// The same, for which a simulation follows well.
+const FOLLOWS: f64 = 7.0;
+
+/// Refuses a model that is unstable at its start values, if the fit describes an output no better than its mean does.
+fn require_stable(setup: &ModelSetup, fit: &Fit) -> Result<(), Error> {
+    let Some(growth_time) = setup.growth_time(setup.start()) else {
+        return Ok(());
+    };
+    let longest = setup.records().iter().map(Record::duration);
+    if longest.fold(0.0, f64::max) < GROWS * growth_time {
+        return Ok(());
+    }
+    let outputs = &setup.records()[0].outputs;
+    for (o, (output, error)) in outputs.iter().zip(&fit.rmse).enumerate() {
+        let readings = setup.records().iter().flat_map(|r| &r.outputs[o].values);
+        let varies = readings.filter(|y| !y.is_nan()).population_std_dev();
+        if error.is_nan() || *error > varies {
+            return Err(Error::Unstable {
+                output: output.name.clone(),
+                unit: output.unit.clone(),
+                error: *error,
+                varies,
+                growth_time,
+                longest: FOLLOWS * growth_time,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Ranges that the fitted model visits in all records.

@@ -9,7 +9,7 @@ use estimation::{Fit, Noise, Start, Stopping, fit_from};
 use greybox::{FitOptions, ModelSetup, SimulatedLoop};
 
 use crate::Error;
-use crate::base::control_loop::{ControlLoop, NotSimulated, hard_nonlinearity};
+use crate::base::control_loop::{ControlLoop, NotSimulated, detected_feedback, hard_nonlinearity};
 use crate::base::problem::{Limit, Problem};
 use crate::fit::relations::{Absorbed, Tie};
 use crate::thresholds::Thresholds;
@@ -113,6 +113,18 @@ impl Context<'_> {
             &set.fit.x,
             simulated.controllers(),
         ))
+    }
+
+    /// What is known of the loop, after a test for feedback with the residual of a set: what a model lacks may depend on past inputs, and look
+    /// like noise that no controller feeds back. A set with a function of time has fitted the noise too, and says nothing.
+    pub fn retested_feedback(&self, set: &Node) -> Result<Option<ControlLoop>, Error> {
+        let known = self.control_loop.clone();
+        let tested = |known: &ControlLoop| known.feedback_p.is_some();
+        if !known.as_ref().is_some_and(tested) || self.in_time(&set.added) > 0 {
+            return Ok(known);
+        }
+        let setup = self.setup(&set.model)?;
+        Ok(detected_feedback(&setup, &set.fit, &self.thresholds))
     }
 
     /// The same search with the measured inputs for this reason, and a set fitted to them.

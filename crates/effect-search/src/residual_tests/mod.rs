@@ -4,6 +4,7 @@ mod bands;
 pub(crate) mod energy;
 pub mod feedback;
 pub(crate) mod first_order;
+mod inputs;
 mod reported;
 mod spectral_line;
 pub(crate) mod stationarity;
@@ -11,6 +12,7 @@ pub mod white;
 
 use serde::{Deserialize, Serialize};
 
+pub use self::inputs::InputDependence;
 pub use self::reported::ResidualTests;
 pub use self::spectral_line::{Line, strongest_line};
 

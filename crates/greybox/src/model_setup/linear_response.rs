@@ -106,6 +106,29 @@ impl ModelSetup<'_> {
         Some(self.time_unit / fastest)
     }
 
+    /// Time in which a deviation of the states grows by a factor of e \[s\], by the linear form of the model at the initial states of the first
+    /// record and its mean inputs; `None` for a model that is not unstable there.
+    #[must_use]
+    pub fn growth_time(&self, x: &[f64]) -> Option<f64> {
+        let (n, count) = (self.model.spec().states.len(), self.parameter_count());
+        let record = self.records.first()?;
+        let inputs = record.inputs.iter();
+        let inputs: Vec<f64> = inputs
+            .map(|input| input.values.iter().sum::<f64>() / record.len() as f64)
+            .collect();
+        let states = x.get(count..count + n)?;
+        let form = self
+            .model
+            .linear_undelayed(&x[..count], states, &inputs, 0.0)?;
+        let a = DMatrix::from_fn(n, n, |i, j| form.a[i][j]);
+        if n == 0 || !a.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let rates = a.complex_eigenvalues();
+        let fastest = rates.iter().map(|rate| rate.re).fold(0.0, f64::max);
+        (fastest > 0.0).then(|| self.time_unit / fastest)
+    }
+
     /// The change of each output that a step of each input has caused after `steps` sampling intervals, by input and output, of the linear
     /// response at a fitted vector; zero for a model that has none.
     #[must_use]

@@ -177,6 +177,10 @@ pub(super) fn values(starts: Starts, span: &Span, visited: &Visited, balance: f6
             return places;
         }
         Starts::Values(all) => (all, Box::new(|share| share)),
+        Starts::Sides if span.low < 0.0 && span.high > 0.0 => {
+            (&[1.0, -1.0, 0.0], Box::new(|side| side))
+        }
+        Starts::Sides => (&[1.0, -1.0], Box::new(|side| side)),
         Starts::Range(all) => (all, Box::new(|share| span.low + share * span.width())),
         Starts::Widths(all) => (all, Box::new(|share| share * span.width())),
         Starts::Times(all) => {

@@ -64,7 +64,8 @@ pub enum Role {
 pub enum Starts {
     /// The values themselves.
     Values(&'static [f64]),
-    /// 1 and -1 for an effect at one end of the signal's range, and 0 for both ends if the signal has both signs.
+    /// 1 and -1 for an effect at one end of the signal's range, and 0 for both ends if the signal goes about as far below zero as
+    /// above it.
     Sides,
     /// Quantiles of the signal, or the same shares of its range if no quantiles are known; of a signal with few levels, values between
     /// them ([`super::Span::thresholds`]).

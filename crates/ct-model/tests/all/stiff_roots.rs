@@ -95,7 +95,7 @@ fn states_of_very_different_size_are_not_stiff() {
     let text = with_root("sign(d)*sqrt(abs(d)/1e5)").replace("1e5*(u - z)", "5*(u - z)");
     let case = Case {
         tolerance: 1e-8,
-        ..Case::new(&text, 20, 0.5, |_| vec![10.0])
+        ..Case::new(&text, 10, 0.5, |_| vec![10.0])
     };
     assert_eq!(case.plain().1, Method::Explicit);
 }

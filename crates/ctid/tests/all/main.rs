@@ -20,6 +20,7 @@ mod own_design;
 mod own_effects;
 mod own_gaps;
 mod own_held_out;
+mod own_hints;
 mod own_limits;
 mod own_loop;
 mod own_records;

@@ -53,3 +53,19 @@ fn a_cut_out_is_a_limit_of_the_temperature() {
     let bound = last.parameters.iter().find(|p| p.name == "limit_T_bound");
     assert!((bound.unwrap().value - 75.0).abs() < 0.1);
 }
+
+/// By the Magnus form of the vapour pressure, into air of a relative humidity that the user does not know.
+#[test]
+fn evaporation_into_humid_air_is_named() {
+    let pressure = |t: &str| format!("exp(17.27*{t}/({t} + 237.3))");
+    for (humidity, seed) in [(0.4, 3), (0.8, 4)] {
+        let hidden = block(&format!(
+            "g*u - k*(T - Ta) - 0.4*({} - {humidity}*{})",
+            pressure("T"),
+            pressure("Ta")
+        ));
+        let found = found(&problem(BLOCK, record(&hidden, 0.0, 0.1, seed)));
+        assert_eq!(found.effects.len(), 1, "{humidity}: {:?}", found.groups);
+        assert!(names(&found, "evaporation(T,Ta)"), "{:?}", found.groups);
+    }
+}

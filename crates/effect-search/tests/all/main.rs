@@ -4,9 +4,11 @@
 mod absorbed;
 mod at_a_bound;
 mod backlash;
+mod both_ends;
 mod design;
 mod detectable;
 mod failures;
+mod feedback;
 mod gaps;
 mod heat;
 mod hidden;
@@ -17,3 +19,4 @@ mod records;
 mod results;
 mod thresholds;
 mod together;
+mod unstable;

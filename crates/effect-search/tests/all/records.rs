@@ -40,12 +40,26 @@ pub(crate) const ROWS: usize = 500;
 pub(crate) const STEP: f64 = 5.0;
 
 /// Pseudo-random levels, the same in all tests.
-fn level(k: usize, of: usize) -> f64 {
+pub(crate) fn level(k: usize, of: usize) -> f64 {
     ((k / (17 + 6 * of) + of) * 7919 % 13) as f64 * 3.0
 }
 
 /// A record of a model with its own parameters, the noise of each output of first order.
 pub(crate) fn record(text: &str, correlation: f64, sigma: f64, seed: u64) -> Record {
+    let input = |name: &str, i: usize, k: usize| match name {
+        "Ta" => 15.0 + 4.0 * (0.013 * k as f64).sin(),
+        _ => level(k, i),
+    };
+    record_with(text, input, (correlation, sigma), seed)
+}
+
+/// The same with other inputs, of their names, positions and rows.
+pub(crate) fn record_with(
+    text: &str,
+    input: impl Fn(&str, usize, usize) -> f64,
+    (correlation, sigma): (f64, f64),
+    seed: u64,
+) -> Record {
     let spec = ModelSpec::parse(text).unwrap();
     let model = Model::new(spec);
     let parameters = model.parameters();
@@ -54,15 +68,8 @@ pub(crate) fn record(text: &str, correlation: f64, sigma: f64, seed: u64) -> Rec
     let spec = model.spec();
     let inputs: Vec<Vec<f64>> = (0..spec.inputs.len())
         .map(|i| {
-            let ambient = spec.inputs[i].about.name == "Ta";
-            let value = |k: usize| {
-                if ambient {
-                    15.0 + 4.0 * (0.013 * k as f64).sin()
-                } else {
-                    level(k, i)
-                }
-            };
-            (0..ROWS).map(value).collect()
+            let name = &spec.inputs[i].about.name;
+            (0..ROWS).map(|k| input(name, i, k)).collect()
         })
         .collect();
     let mut outputs = vec![Vec::new(); spec.outputs.len()];

@@ -167,6 +167,14 @@ pub(super) fn candidate(
     Some(candidate)
 }
 
+/// A signal has two ends if the smaller of its largest magnitudes on either side of zero is at least this share of the other.
+const TWO_SIDED: f64 = 0.5;
+
+fn is_two_sided(span: &Span) -> bool {
+    let (below, above) = (-span.low, span.high);
+    below.min(above) >= TWO_SIDED * below.max(above)
+}
+
 pub(super) fn values(starts: Starts, span: &Span, visited: &Visited, balance: f64) -> Vec<f64> {
     let (shares, of): (&[f64], Box<dyn Fn(f64) -> f64 + '_>) = match starts {
         Starts::Quantiles(all) => return span.thresholds(all),
@@ -177,9 +185,7 @@ pub(super) fn values(starts: Starts, span: &Span, visited: &Visited, balance: f6
             return places;
         }
         Starts::Values(all) => (all, Box::new(|share| share)),
-        Starts::Sides if span.low < 0.0 && span.high > 0.0 => {
-            (&[1.0, -1.0, 0.0], Box::new(|side| side))
-        }
+        Starts::Sides if is_two_sided(span) => (&[1.0, -1.0, 0.0], Box::new(|side| side)),
         Starts::Sides => (&[1.0, -1.0], Box::new(|side| side)),
         Starts::Range(all) => (all, Box::new(|share| span.low + share * span.width())),
         Starts::Widths(all) => (all, Box::new(|share| share * span.width())),

@@ -1,4 +1,7 @@
 //! `evaporation(T,Ta)`: heat loss by evaporation.
+//!
+//! **Reference**: O. A. Alduchov, R. E. Eskridge, J. Applied Meteorology 35 (1996) 601-609 (the Magnus form of the vapour pressure of water,
+//! `6.1 hPa exp(17.27 t/(t + 237.3))`, t in degC).
 
 use crate::effects::{Effect, Place, Role, Starts};
 
@@ -11,13 +14,20 @@ model evaporation
   input Real a;
   constant Real balance(unit="balance") = 1;
   constant Real middle(unit="signal") = 0;
-  constant Real rise(unit="signal") = 17 "the vapour pressure of water rises by a factor of e";
-  parameter Real flow_at_middle(unit="balance", min=0, max=10*balance) = 0 "loss where the temperature is in the middle of its range";
-  output Real v(unit="balance") = -flow_at_middle*(exp((x - middle)/rise) - exp((a - middle)/rise));
+  constant Real zero(unit="signal") = 273.15 "zero of the unit above absolute zero";
+  constant Real pole(unit="signal") = 35.85 "of the vapour pressure, above absolute zero";
+  constant Real rise(unit="signal") = 4098 "of its logarithm, times the distances from the pole";
+  parameter Real flow_at_middle(unit="balance", min=0, max=10*balance) = 0 "loss to dry air where the temperature is in the middle of its range";
+  parameter Real humidity(unit="1", min=0, max=1) = 0.5 "relative humidity of the air";
+  Real at_middle = rise/(middle + zero - pole);
+  output Real v(unit="balance") = -flow_at_middle*(exp(at_middle - rise/(x + zero - pole)) - humidity*exp(at_middle - rise/(a + zero - pole)));
 end evaporation;
 "#,
-    parameters: &[("flow_at_middle", Role::Size, Starts::Balances(&[0.05, 0.3]))],
-    physics: "Water evaporates and takes heat with it, in proportion to the difference of the vapour pressures, which rise steeply with temperature.",
+    parameters: &[
+        ("flow_at_middle", Role::Size, Starts::Balances(&[0.05, 0.3])),
+        ("humidity", Role::Shape, Starts::Values(&[0.3, 0.8])),
+    ],
+    physics: "Water evaporates and takes heat with it, in proportion to the difference of the vapour pressures at the surface and in the air, which rise steeply with temperature.",
     confused_with: &["radiation(T,Ta)", "varies_with(p,x)"],
     confirm: "Cover the surface with a lid or a film of oil, and repeat a hot run.",
     symptoms: &["loses much more when hot", "steam", "level sinks"],

@@ -92,10 +92,14 @@ fn a_flow_that_changes_its_sign_with_a_pressure_difference_is_passed() {
 /// The units of the states do not make a model stiff: pressures of 1e7 Pa beside speeds of 0.1 m/s.
 #[test]
 fn states_of_very_different_size_are_not_stiff() {
-    let text = with_root("sign(d)*sqrt(abs(d)/1e5)").replace("1e5*(u - z)", "5*(u - z)");
+    let text = "model Column input Real u; output Real y = p; Real v(start=0); Real p(start=1e6);
+equation
+  250*der(v) = 1.2e-3*p - 500*v - 100*v^3;
+  7e-4/1e9*der(p) = 1.5e-5*u - 1.2e-3*v;
+end Column;";
     let case = Case {
         tolerance: 1e-8,
-        ..Case::new(&text, 10, 0.5, |_| vec![10.0])
+        ..Case::new(text, 10, 1.0, |_| vec![10.0])
     };
     assert_eq!(case.plain().1, Method::Explicit);
 }

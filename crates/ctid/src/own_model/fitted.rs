@@ -222,8 +222,11 @@ impl FittedModel {
         cut_short(&self.effort).into_iter().chain(of_loop).collect()
     }
 
-    /// A warning if the residual of the fit depends on the inputs: then it is more than noise.
+    /// A warning if the residual of the fit depends on the inputs: then it is more than noise. A fit that was cut short says nothing.
     pub(super) fn lacks_an_effect(&self) -> Result<Option<String>, Error> {
+        if !self.effort.left_out.is_empty() {
+            return Ok(None);
+        }
         let setup = self.setup()?;
         let thresholds = Thresholds::DEFAULT;
         let found = InputDependence::at(&setup, &self.fit.x, &thresholds);

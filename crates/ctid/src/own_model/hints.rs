@@ -40,7 +40,11 @@ fn at_bounds(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<String> {
         } else {
             "the bound, a unit or the equation may be wrong"
         };
-        let value = with_unit(&numbers::significant(value, 4), shown_unit(&about.unit));
+        let number = match value {
+            0.0 => "0".to_string(),
+            value => numbers::significant(value, 4),
+        };
+        let value = with_unit(&number, shown_unit(&about.unit));
         Some(format!(
             "In the fit of the model alone {name} is at its {attribute} of {value}: {sign}."
         ))

@@ -1,6 +1,6 @@
 //! Hard nonlinearities: limits, dead zones, friction, backlash. Near one a linear form of the model says nothing.
 
-use crate::expression::{Condition, Expression, Function, Variable};
+use crate::expression::{Condition, Expression, Function, Operator, Variable};
 use crate::spec::ModelSpec;
 
 /// Time, states and inputs at one row of a simulation.
@@ -15,7 +15,7 @@ pub struct OperatingPoint<'a> {
 }
 
 /// What decides between the branches of a part of an equation.
-enum Selector<'a> {
+enum Choice<'a> {
     Condition(&'a Condition),
     /// The smaller one of two: of `min` and `max`.
     Smaller(&'a Expression, &'a Expression),
@@ -25,14 +25,15 @@ enum Selector<'a> {
     Past(&'a Expression),
 }
 
-impl Selector<'_> {
-    /// The branch that is taken, for these values of the variables; `None` where the past decides.
+impl Choice<'_> {
+    /// The branch that is taken, for these values of the variables; `None` between two branches, where both give the same value.
     fn branch(&self, time: f64, of: &impl Fn(Variable) -> f64) -> Option<bool> {
+        let less = |a: f64, b: f64| (a != b).then_some(a < b);
         match self {
             Self::Condition(condition) => Some(condition.holds(time, of)),
-            Self::Smaller(a, b) => Some(a.value(time, of) < b.value(time, of)),
-            Self::Sign(a) => Some(a.value(time, of) < 0.0),
-            Self::Past(_) => None,
+            Self::Smaller(a, b) => less(a.value(time, of), b.value(time, of)),
+            Self::Sign(a) => less(a.value(time, of), 0.0),
+            Self::Past(_) => Some(true),
         }
     }
 
@@ -48,24 +49,85 @@ impl Selector<'_> {
     }
 }
 
-/// The selectors of an expression; rounding has none: on the average it is linear.
-fn selectors(expression: &Expression) -> Vec<Selector<'_>> {
-    let mut all = Vec::new();
-    expression.each_part(&mut |part| match part {
-        Expression::If(condition, ..) => all.push(Selector::Condition(condition)),
-        Expression::Call(Function::Abs | Function::Sign, arguments) => {
-            all.push(Selector::Sign(&arguments[0]));
+/// A choice, and the branches of other choices that it is in.
+struct Selector<'a> {
+    choice: Choice<'a>,
+    within: Vec<(&'a Condition, bool)>,
+}
+
+impl Selector<'_> {
+    fn is_reached(&self, time: f64, of: &impl Fn(Variable) -> f64) -> bool {
+        let mut within = self.within.iter();
+        within.all(|(condition, taken)| condition.holds(time, of) == *taken)
+    }
+}
+
+/// Adds the selectors of an expression; rounding has none: on the average it is linear.
+fn add_selectors<'a>(
+    expression: &'a Expression,
+    within: &[(&'a Condition, bool)],
+    all: &mut Vec<Selector<'a>>,
+) {
+    let mut add = |choice: Choice<'a>| {
+        all.push(Selector {
+            choice,
+            within: within.to_vec(),
+        });
+    };
+    match expression {
+        Expression::If(condition, a, b) => {
+            add(Choice::Condition(condition));
+            for (arm, taken) in [(a, true), (b, false)] {
+                let within = [within, &[(&**condition, taken)]].concat();
+                add_selectors(arm, &within, all);
+            }
         }
-        Expression::Call(Function::Min | Function::Max, arguments) => {
-            all.push(Selector::Smaller(&arguments[0], &arguments[1]));
+        Expression::Call(function, arguments) => {
+            match function {
+                Function::Abs | Function::Sign => add(Choice::Sign(&arguments[0])),
+                Function::Min | Function::Max => {
+                    add(Choice::Smaller(&arguments[0], &arguments[1]));
+                }
+                Function::Play | Function::StickSlip | Function::StayBetween => {
+                    add(Choice::Past(&arguments[0]));
+                }
+                _ => {}
+            }
+            for argument in arguments {
+                add_selectors(argument, within, all);
+            }
         }
-        Expression::Call(
-            Function::Play | Function::StickSlip | Function::StayBetween,
-            arguments,
-        ) => all.push(Selector::Past(&arguments[0])),
-        _ => {}
-    });
-    all
+        Expression::Binary(Operator::Multiply, a, b) => {
+            let mut factors = Vec::new();
+            add_factors(a, &mut factors);
+            add_factors(b, &mut factors);
+            for factor in &factors {
+                // The slope of `v*abs(v)` has no jump.
+                let is_smooth = matches!(factor, Expression::Call(Function::Abs, of) if factors.contains(&&of[0]));
+                if !is_smooth {
+                    add_selectors(factor, within, all);
+                }
+            }
+        }
+        Expression::Binary(_, a, b) | Expression::Delay(a, b) => {
+            add_selectors(a, within, all);
+            add_selectors(b, within, all);
+        }
+        Expression::Negative(a) => add_selectors(a, within, all),
+        Expression::Number(_) | Expression::Time | Expression::Variable(_) => {}
+    }
+}
+
+/// Adds the factors of a product.
+fn add_factors<'a>(expression: &'a Expression, all: &mut Vec<&'a Expression>) {
+    match expression {
+        Expression::Binary(Operator::Multiply, a, b) => {
+            add_factors(a, all);
+            add_factors(b, all);
+        }
+        Expression::Negative(a) => add_factors(a, all),
+        other => all.push(other),
+    }
 }
 
 impl ModelSpec {
@@ -94,16 +156,16 @@ impl ModelSpec {
             });
             reads[i] = found;
         }
+        let mut all = Vec::new();
+        for expression in self.expressions() {
+            add_selectors(expression, &[], &mut all);
+        }
         let mut undecided: Vec<(Selector, Variable, Option<bool>)> = Vec::new();
-        for selector in self.expressions().flat_map(selectors) {
+        for selector in all {
             let mut of = None;
-            selector
-                .each_variable(&mut |variable| of = of.or_else(|| of_interest(variable, &reads)));
-            match (of, &selector) {
-                (Some(of), Selector::Past(_)) => return Some(of),
-                (Some(of), _) => undecided.push((selector, of, None)),
-                (None, _) => {}
-            }
+            let choice = &selector.choice;
+            choice.each_variable(&mut |variable| of = of.or_else(|| of_interest(variable, &reads)));
+            undecided.extend(of.map(|of| (selector, of, None)));
         }
         if undecided.is_empty() {
             return None;
@@ -117,11 +179,15 @@ impl ModelSpec {
             }
             let of = |variable: Variable| value_of(variable, parameters, point, &flows);
             for (selector, variable, first) in &mut undecided {
-                let branch = selector.branch(point.time, &of);
-                if first.is_some() && branch != *first {
+                if !selector.is_reached(point.time, &of) {
+                    continue;
+                }
+                let branch = selector.choice.branch(point.time, &of);
+                let changes = first.is_some() && branch.is_some() && branch != *first;
+                if changes || matches!(selector.choice, Choice::Past(_)) {
                     return Some(*variable);
                 }
-                *first = branch;
+                *first = first.or(branch);
             }
         }
         None
@@ -175,6 +241,9 @@ mod tests {
         assert_eq!(found("u - p*sign(x)", &[1.0]), of_x);
         assert_eq!(found("u - abs(q)", &[1.0]), of_x);
         assert_eq!(found("u - max(x + 2, 0)", &[1.0]), None);
+        // A limit that is reached and not exceeded.
+        assert_eq!(found("min(u, p) - x", &[2.0]), None);
+        assert_eq!(found("max(0, u) - x", &[1.0]), None);
     }
 
     #[test]
@@ -190,6 +259,8 @@ mod tests {
             "(if time > 1 then 2 else 1)*x",
             "quantise(u, 0.1) - x",
             "u - sin(x)^3",
+            "u - p*x*abs(x)",
+            "if p > 0.5 then u - x else abs(x)",
         ] {
             assert_eq!(found(right, &[1.0]), None, "{right}");
         }

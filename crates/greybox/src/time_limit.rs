@@ -34,6 +34,16 @@ impl TimeLimit {
         limit
     }
 
+    /// The same limit, which began at the same time, for a search that begins again: nothing is left out.
+    #[must_use]
+    pub fn begun_again(&self) -> Self {
+        let limit = Self::new(self.whole);
+        Self {
+            begun: self.begun,
+            ..limit
+        }
+    }
+
     /// Allows work until this share of the whole time has passed since the beginning.
     pub fn allow(&self, share: f64) {
         let until = self.whole.map_or(u64::MAX, |whole| {

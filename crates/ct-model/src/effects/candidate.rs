@@ -185,6 +185,13 @@ impl Candidate {
             });
             all = longer.collect();
         }
+        // A limit at both ends is the same with either sign.
+        let own = self.parameters.iter();
+        let limit = own.clone().position(|own| own.short == "limit");
+        let side = own.clone().position(|own| own.short == "side");
+        if let (Some(limit), Some(side)) = (limit, side) {
+            all.retain(|values| values[side] != 0.0 || values[limit] > 0.0);
+        }
         all
     }
 }

@@ -254,7 +254,8 @@ impl<T: Scalar> SimulationState<T> {
             self.state.copy_from_slice(&self.work.next);
             self.time = self.time + h;
             if self.method == Method::Implicit {
-                self.implicit_steps = (self.implicit_steps.0 + 1, h.value());
+                let (count, longest) = self.implicit_steps;
+                self.implicit_steps = (count + 1, longest.max(h.value()));
             }
             if sliding {
                 self.put_back(tape, &Drive::new(interval, delays));
@@ -350,13 +351,13 @@ impl<T: Scalar> SimulationState<T> {
 
     /// Changes to explicit steps where accuracy alone limits the implicit ones, which take longer and have the lower order.
     fn look_for_accuracy(&mut self) {
-        let (count, h) = self.implicit_steps;
+        let (count, longest) = self.implicit_steps;
         if count < MANY_IMPLICIT_STEPS {
             return;
         }
-        self.implicit_steps.0 = 0;
+        self.implicit_steps = (0, 0.0);
         let radius = self.jacobian.as_ref().map(Jacobian::spectral_radius);
-        if radius.is_some_and(|radius| h * radius < STABILITY) {
+        if radius.is_some_and(|radius| longest * radius < STABILITY) {
             self.method = Method::Explicit;
         }
     }

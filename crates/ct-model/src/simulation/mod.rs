@@ -87,7 +87,7 @@ pub struct SimulationState<T> {
     steps_left: usize,
     /// Step length that the error of the last step allows.
     length: f64,
-    /// Number of implicit steps since explicit ones were considered, and the length of the last one.
+    /// Number of implicit steps since explicit ones were considered, and the length of the longest of them.
     implicit_steps: (u32, f64),
     /// The present step is one of order four.
     order_four: bool,

@@ -229,8 +229,15 @@ impl FittedModel {
         }
         let setup = self.setup()?;
         let thresholds = Thresholds::DEFAULT;
-        let found = InputDependence::at(&setup, &self.fit.x, &thresholds);
-        let found = found.filter(|found| found.p < thresholds.not_noise);
+        let dependence = |setup: &ModelSetup| {
+            let found = InputDependence::at(setup, &self.fit.x, &thresholds);
+            found.filter(|found| found.p < thresholds.not_noise)
+        };
+        // In a simulated loop a part of the fed-back noise remains in the residual of a nonlinear plant.
+        let found = match (&self.simulated_loop, dependence(&setup)) {
+            (Some(_), Some(_)) => dependence(&setup_of(&self.model, &self.records)?),
+            (_, found) => found,
+        };
         Ok(found.map(|found| {
             let outputs = &setup.records()[0].outputs;
             format!(

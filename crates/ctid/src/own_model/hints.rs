@@ -21,9 +21,9 @@ pub(super) fn of_text(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<String>
     all
 }
 
-/// The parameters of the model alone that its fit ends with at a bound of the text.
+/// The parameters that are at a bound of the text in the fit of the model without the found effects, and with them.
 fn at_bounds(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<String> {
-    let Some(first) = diagnosis.steps.first() else {
+    let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) else {
         return Vec::new();
     };
     let spec = file.model.spec();
@@ -46,11 +46,16 @@ fn at_bounds(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<String> {
         };
         let value = with_unit(&number, shown_unit(&about.unit));
         Some(format!(
-            "In the fit of the model alone {name} is at its {attribute} of {value}: {sign}."
+            "{name} stays at its {attribute} of {value}: {sign}."
         ))
     };
-    let fitted = first.parameters.iter().filter(|p| !p.known);
-    fitted.filter_map(|p| bound(&p.name, p.value)).collect()
+    let mut fitted = first.parameters.iter().filter(|p| !p.known);
+    let stays = |name: &str, value: f64| {
+        let mut last = last.parameters.iter();
+        last.any(|p| p.name == name && p.value == value)
+    };
+    let at_bounds = fitted.by_ref().filter(|p| stays(&p.name, p.value));
+    at_bounds.filter_map(|p| bound(&p.name, p.value)).collect()
 }
 
 /// The parameters at which no effect is tried, because the text says that they are measured.
@@ -59,14 +64,18 @@ fn untried(file: &OwnModelFile) -> Option<String> {
     let measured = spec.parameters.iter();
     let measured = measured.filter(|p| p.given == Given::Measured && p.definition.is_none());
     let names: Vec<&str> = measured.map(|p| p.about.name.as_str()).collect();
-    if names.is_empty() || names.len() > FEW {
+    if names.is_empty() {
         return None;
     }
+    let more = match names.len().saturating_sub(FEW) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
     Some(format!(
         "{} measured (final parameter): effects at {} were not tried. For one that may change, write `parameter`, and its value under [known].",
         match names[..] {
             [only] => format!("{only} is"),
-            _ => format!("{} are", names.join(", ")),
+            _ => format!("{}{more} are", names[..names.len().min(FEW)].join(", ")),
         },
         if names.len() == 1 { "it" } else { "them" }
     ))

@@ -52,7 +52,7 @@ pub fn of_the_loop(known: &ControlLoop, input_unit: &str, names: &MessageNames) 
             input: input.clone(),
         }),
         NotSimulated::HardNonlinearity { of } => format!(
-            "a hard nonlinearity of {of} acts in the records (a limit, a dead zone, friction, backlash, a branch), and a simulated loop takes fed-back noise out of the residual by a linear plant"
+            "a hard nonlinearity of {of} acts in the records (a limit, a dead zone, friction, backlash, a branch), and a simulated loop needs a linear plant to remove fed-back noise from the residual"
         ),
         NotSimulated::Unstable { radius } => format!(
             "the controller makes the fitted model unstable ({}), so it cannot have produced the record: check its sign, gain and times, and their units",

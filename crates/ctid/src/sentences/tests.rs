@@ -224,7 +224,7 @@ fn a_loop_that_is_not_simulated_says_why() {
                 of: "u".to_string(),
             },
             None,
-            ["a hard nonlinearity of u acts", "by a linear plant"],
+            ["a hard nonlinearity of u acts", "needs a linear plant"],
         ),
         (
             NotSimulated::Unstable { radius: Some(1.25) },

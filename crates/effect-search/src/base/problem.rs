@@ -156,6 +156,7 @@ impl<'a> Limit<'a> {
     pub fn begun_again(&self) -> Self {
         let passed = |whole: Duration| self.time.elapsed().as_secs_f64() / whole.as_secs_f64();
         Self {
+            time: Arc::new(self.time.begun_again()),
             from: self.whole.map_or(0.0, passed).min(1.0),
             ..self.clone()
         }

@@ -6,7 +6,7 @@ use greybox::weighted_rms;
 use super::searched::Searched;
 use crate::Error;
 use crate::accept::partial::explained;
-use crate::base::problem::Phase;
+use crate::base::problem::{Options, Phase};
 use crate::fit::node::{Context, FINE, Node};
 use crate::residual_tests::NotNoise;
 
@@ -53,8 +53,25 @@ impl Context<'_> {
         })
     }
 
+    /// The answer of the searches, by all tests.
+    pub(super) fn answered(
+        &self,
+        base: &Node,
+        searched: &mut Searched,
+        options: &Options,
+    ) -> Result<Answer, Error> {
+        let mut answer = self.accepted(searched)?;
+        if answer.not_noise.is_some()
+            || answer.has_many(self, base)
+            || answer.is_flexible(self, base)
+        {
+            answer = self.reconsidered(answer, searched, options.max_effects)?;
+        }
+        self.or_level_shift(answer, searched)
+    }
+
     /// The effects of the best set that pass the acceptance test.
-    pub(super) fn accepted(&self, searched: &Searched) -> Result<Answer, Error> {
+    fn accepted(&self, searched: &Searched) -> Result<Answer, Error> {
         let (grown, noise) = (&searched.grown, &searched.noise);
         let effects = grown.base.added.len();
         self.limit.begin(Phase::Minima);
@@ -88,7 +105,7 @@ impl Context<'_> {
     }
 
     /// The answer after a floating search without functions of time: a better set, a set that explains a large part of the error, or the same.
-    pub(super) fn reconsidered(
+    fn reconsidered(
         &self,
         answer: Answer,
         searched: &mut Searched,
@@ -180,11 +197,7 @@ impl Context<'_> {
     }
 
     /// The model without effects, if a level shift of a reading explains more than those of the answer, or an abrupt change that they leave.
-    pub(super) fn or_level_shift(
-        &self,
-        answer: Answer,
-        searched: &Searched,
-    ) -> Result<Answer, Error> {
+    fn or_level_shift(&self, answer: Answer, searched: &Searched) -> Result<Answer, Error> {
         let base = &searched.grown.base;
         let some = answer.set.added.len() > base.added.len();
         if !some && !matches!(answer.not_noise, Some(NotNoise::Instant { .. })) {

@@ -46,17 +46,15 @@ pub fn diagnose(
     context.limit.leaves_out("starts of the model's fit");
 
     tell("searching the effects");
-    let (mut context, base, mut searched) = context.searched(base, options.max_effects)?;
+    let (mut context, mut base, mut searched) = context.searched(base, options.max_effects)?;
 
     tell("confirming");
-    let mut answer = context.accepted(&searched)?;
-    if answer.not_noise.is_some()
-        || answer.has_many(&context, &base)
-        || answer.is_flexible(&context, &base)
-    {
-        answer = context.reconsidered(answer, &mut searched, options.max_effects)?;
+    let mut answer = context.answered(&base, &mut searched, options)?;
+    if let Some(why) = context.hard_nonlinearity(&answer.set)? {
+        (context, base) = context.not_simulated(&base, why)?;
+        (context, base, searched) = context.searched(base, options.max_effects)?;
+        answer = context.answered(&base, &mut searched, options)?;
     }
-    answer = context.or_level_shift(answer, &searched)?;
     let grown = &mut searched.grown;
     grown.cut_short |= context.limit.leaves_out("tests of the effects one by one");
 

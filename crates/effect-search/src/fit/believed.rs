@@ -113,7 +113,6 @@ pub(crate) fn begin<'a>(
     // The model is compared with sets of effects and needs their criterion, in which every output has a variance of its own: `fit` weights the
     // outputs by their noise.
     let fit = context.setup(&model)?.fit(&fit_options)?;
-    require_stable(&context.setup(&model)?, &fit)?;
     let mut bare = Node {
         added: Vec::new(),
         model: model.clone(),
@@ -134,10 +133,16 @@ pub(crate) fn begin<'a>(
     };
     let tolerance = tolerance.unwrap_or(ct_model::TOLERANCE);
     if tolerance < context.tolerance {
-        context.tolerance = tolerance;
+        let finer = Context {
+            tolerance,
+            ..context.clone()
+        };
         let white = Noise::white(problem.spec.outputs.len());
         // With this tolerance a state that grows may need more steps than a simulation may take.
-        bare = context.refitted(&bare, &white, FINE).unwrap_or(bare);
+        if let Ok(again) = finer.refitted(&bare, &white, FINE) {
+            bare = again;
+            context.tolerance = tolerance;
+        }
     }
     context.level_shifts = level_shifts(&problem.spec, &visited);
     let mut all = all_candidates(&problem.spec, &visited, &problem.kept, &problem.candidates)?;
@@ -213,13 +218,17 @@ const GROWS: f64 = 23.0;
 /// The same, for which a simulation follows well.
 const FOLLOWS: f64 = 7.0;
 
-/// Refuses a model that is unstable at its start values, if the fit describes an output no better than its mean does.
+/// A simulation runs away if it leaves the readings by this multiple of their range.
+const AWAY: f64 = 100.0;
+
+/// Refuses a model that is unstable at its start values and runs away from the records there, if the fit describes an output no better than
+/// its mean does. A model that grows to a limit does not run away.
 fn require_stable(setup: &ModelSetup, fit: &Fit) -> Result<(), Error> {
     let Some(growth_time) = setup.growth_time(setup.start()) else {
         return Ok(());
     };
     let longest = setup.records().iter().map(Record::duration);
-    if longest.fold(0.0, f64::max) < GROWS * growth_time {
+    if longest.fold(0.0, f64::max) < GROWS * growth_time || !runs_away(setup) {
         return Ok(());
     }
     let outputs = &setup.records()[0].outputs;
@@ -238,6 +247,21 @@ fn require_stable(setup: &ModelSetup, fit: &Fit) -> Result<(), Error> {
         }
     }
     Ok(())
+}
+
+/// Whether the simulation with the start values leaves the range of the readings by far, or cannot go on.
+fn runs_away(setup: &ModelSetup) -> bool {
+    let Some(simulated) = setup.simulate(setup.start()) else {
+        return true;
+    };
+    let measured = setup.records().iter().flat_map(|record| &record.outputs);
+    measured.zip(simulated).any(|(measured, simulated)| {
+        let (low, high) = measured.range();
+        let away = AWAY * (high - low);
+        simulated
+            .iter()
+            .any(|y| !(low - away..=high + away).contains(y))
+    })
 }
 
 /// Ranges that the fitted model visits in all records.

@@ -10,7 +10,7 @@ use greybox::{FitOptions, ModelSetup, SimulatedLoop};
 
 use crate::Error;
 use crate::base::control_loop::{ControlLoop, NotSimulated, detected_feedback, hard_nonlinearity};
-use crate::base::problem::{Limit, Problem};
+use crate::base::problem::{Limit, Phase, Problem};
 use crate::fit::relations::{Absorbed, Tie};
 use crate::thresholds::Thresholds;
 
@@ -116,12 +116,11 @@ impl Context<'_> {
     }
 
     /// What is known of the loop, after a test for feedback with the residual of a set: what a model lacks may depend on past inputs, and look
-    /// like noise that no controller feeds back. A set with a function of time has fitted the noise too, and says nothing.
+    /// like noise that no controller feeds back. And a large error hides feedback. A set with a function of time has fitted the noise
+    /// too, and says nothing.
     pub fn retested_feedback(&self, set: &Node) -> Result<Option<ControlLoop>, Error> {
-        let known = self.control_loop.clone();
-        let tested = |known: &ControlLoop| known.feedback_p.is_some();
-        if !known.as_ref().is_some_and(tested) || self.in_time(&set.added) > 0 {
-            return Ok(known);
+        if !self.problem.controllers.is_empty() || self.in_time(&set.added) > 0 {
+            return Ok(self.control_loop.clone());
         }
         let setup = self.setup(&set.model)?;
         Ok(detected_feedback(&setup, &set.fit, &self.thresholds))
@@ -135,6 +134,7 @@ impl Context<'_> {
             limit: self.limit.begun_again(),
             ..self
         };
+        context.limit.begin(Phase::Believed);
         let white = Noise::white(context.problem.spec.outputs.len());
         let set = context.refitted(set, &white, FINE)?;
         Ok((context, set))

@@ -33,7 +33,7 @@ fn one_limit_at_both_ends_of_the_command_is_named() {
         assert_eq!(of("saturation_u_side").value, 0.0, "{limit}");
         let limited = of("saturation_u_limit");
         assert!(
-            (limited.value.abs() - limit).abs() < 4.0 * limited.std_error.unwrap(),
+            (limited.value - limit).abs() < 4.0 * limited.std_error.unwrap(),
             "{limit} {limited:?}"
         );
     }

@@ -24,7 +24,7 @@ end saturation;
             Starts::Quantiles(&[0.97, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1, 0.03]),
         ),
     ],
-    physics: "The actuator cannot give more than a limit (or less than one, or more in either direction) that lies within the range of the command.",
+    physics: "The actuator cannot give more than a limit, or less than one, within the range of the command; or its limit is the same in both directions.",
     confused_with: &["nonlinearity(u)", "limit(x)"],
     confirm: "Step the input near the end of its range: does the plant still respond?",
     symptoms: &[

@@ -1,7 +1,7 @@
 //! `evaporation(T,Ta)`: heat loss by evaporation.
 //!
-//! **Reference**: O. A. Alduchov, R. E. Eskridge, J. Applied Meteorology 35 (1996) 601-609 (the Magnus form of the vapour pressure of water,
-//! `6.1 hPa exp(17.27 t/(t + 237.3))`, t in degC).
+//! **Reference**: F. W. Murray, J. Applied Meteorology 6 (1967) 203-204 (the vapour pressure of water in its Magnus form,
+//! `6.1078 hPa exp(17.27 t/(t + 237.3))`, t in degC).
 
 use crate::effects::{Effect, Place, Role, Starts};
 

@@ -21,7 +21,8 @@ pub(super) fn of_text(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<String>
     all
 }
 
-/// The parameters that are at a bound of the text in the fit of the model without the found effects, and with them.
+/// The parameters that are at a bound of the text in the fit without the found effects; after a whole explanation, those that stay there: what
+/// the model lacks may have moved the others.
 fn at_bounds(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<String> {
     let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) else {
         return Vec::new();
@@ -46,16 +47,19 @@ fn at_bounds(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<String> {
         };
         let value = with_unit(&number, shown_unit(&about.unit));
         Some(format!(
-            "{name} stays at its {attribute} of {value}: {sign}."
+            "In the first fit {name} is at its {attribute} of {value}: {sign}."
         ))
     };
-    let mut fitted = first.parameters.iter().filter(|p| !p.known);
+    let is_whole = matches!(diagnosis.verdict, Verdict::Effect | Verdict::Undecided);
     let stays = |name: &str, value: f64| {
         let mut last = last.parameters.iter();
-        last.any(|p| p.name == name && p.value == value)
+        !is_whole || last.any(|p| p.name == name && p.value == value)
     };
-    let at_bounds = fitted.by_ref().filter(|p| stays(&p.name, p.value));
-    at_bounds.filter_map(|p| bound(&p.name, p.value)).collect()
+    let fitted = first.parameters.iter().filter(|p| !p.known);
+    fitted
+        .filter(|p| stays(&p.name, p.value))
+        .filter_map(|p| bound(&p.name, p.value))
+        .collect()
 }
 
 /// The parameters at which no effect is tried, because the text says that they are measured.

@@ -59,7 +59,7 @@ fn measured_parameters_without_candidates_are_named() {
         said.contains("R is measured (final parameter): effects at it were not tried."),
         "{said}"
     );
-    assert!(!said.contains("stays at its min"), "{said}");
+    assert!(!said.contains("is at its min"), "{said}");
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn a_term_with_the_wrong_sign_ends_at_its_bound() {
     let place = place("-");
     let said = one_line(&place.succeeds("diagnose a.csv --model m.toml"));
     assert!(
-        said.contains("s stays at its min of 0: the sign of its term may be wrong"),
+        said.contains("In the first fit s is at its min of 0: the sign of its term may be wrong"),
         "{said}"
     );
 }

@@ -131,8 +131,8 @@ fn add_factors<'a>(expression: &'a Expression, all: &mut Vec<&'a Expression>) {
 }
 
 impl ModelSpec {
-    /// The first variable that has a hard nonlinearity which acts: the branch changes from one of these points to another. Branches that depend on nothing
-    /// but time, parameters and inputs that are not among `driven` are none.
+    /// The first variable with a hard nonlinearity that acts: its branch changes from one of these points to another, or depends on the past.
+    /// Branches that depend on nothing but time, parameters and inputs that are not among `driven` do not count.
     ///
     /// # Panics
     /// Where there are not as many parameters, states or inputs as the model has.

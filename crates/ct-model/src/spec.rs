@@ -176,6 +176,13 @@ impl ModelSpec {
         settled
     }
 
+    /// Whether an equation is an explicit function of time.
+    #[must_use]
+    pub fn reads_time(&self) -> bool {
+        let mut expressions = self.expressions();
+        expressions.any(|of| of.any(&|part| *part == Expression::Time))
+    }
+
     /// All expressions that are evaluated over time: flows, then coefficients and right-hand sides of the states.
     pub fn expressions(&self) -> impl Iterator<Item = &Expression> {
         let flows = self.flows.iter().map(|flow| &flow.value);

@@ -38,7 +38,7 @@ pub enum Error {
         "the model is unstable: a deviation grows by a factor of e in {growth_time:.3} s, and from the measured inputs {output} does not follow the record (error {error:.3e} {unit}, the readings vary by {varies:.3e} {unit}); cut the record into files of at most {longest:.3} s, in each of which the states begin anew"
     )]
     Unstable {
-        /// The output whose simulation is worst.
+        /// The first output that does not follow.
         output: String,
         /// Unit of the output.
         unit: String,

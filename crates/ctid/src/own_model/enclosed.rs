@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use ct_model::Expression;
 use effect_search::{ControlLoop, NotSimulated, Thresholds, enclose};
 use greybox::{Fit, FitOptions, ModelSetup, SimulatedLoop};
 
@@ -25,8 +24,7 @@ pub(super) fn in_loop(
     (options, simulate): (&FitOptions, bool),
 ) -> Result<InLoop, Error> {
     let controllers = file.loop_controllers(records)?;
-    let mut expressions = setup.model().spec().expressions();
-    let timed = expressions.any(|of| of.any(&|part| *part == Expression::Time));
+    let timed = setup.model().spec().reads_time();
     // The loop is fitted with the output weights of the given fit.
     let scales = (setup.outputs() > 1)
         .then(|| setup.output_noise(&fit.x))

@@ -10,7 +10,7 @@ use ct_model::effects::{
     Candidate, OwnCandidate, OwnError, Visited, candidates_keeping, level_shifts, own_candidates,
     shapes_keeping,
 };
-use ct_model::{Expression, Model, ModelSpec};
+use ct_model::{Model, ModelSpec};
 use ct_signals::Record;
 use estimation::{Fit, Noise, Residuals, within};
 use greybox::{FitOptions, ModelSetup, possible_reading_steps};
@@ -169,10 +169,7 @@ impl<'a> Context<'a> {
         let Node { added, model, fit } = bare;
         let controllers = (&self.problem.controllers[..], options.simulate_loop);
         let (fit, simulated, control_loop) = {
-            let timed = model
-                .spec()
-                .expressions()
-                .any(|of| of.any(&|part| *part == Expression::Time));
+            let timed = model.spec().reads_time();
             let setup = self.setup(&model)?;
             let enclosed = enclose(setup, fit, controllers, !timed, (FINE, &self.thresholds))?;
             let simulated = enclosed.setup.simulated_loop().cloned();
@@ -218,17 +215,17 @@ const GROWS: f64 = 23.0;
 /// The same, for which a simulation follows well.
 const FOLLOWS: f64 = 7.0;
 
-/// A simulation runs away if it leaves the readings by this multiple of their range.
-const AWAY: f64 = 100.0;
+/// A simulation diverges if it leaves the range of the readings by this multiple of it.
+const FAR: f64 = 100.0;
 
-/// Refuses a model that is unstable at its start values and runs away from the records there, if the fit describes an output no better than
-/// its mean does. A model that grows to a limit does not run away.
+/// Refuses a model that is unstable at its start values and diverges from the records there, if the error of the fit at an output is above the
+/// standard deviation of its readings. A model that grows to a limit does not diverge.
 fn require_stable(setup: &ModelSetup, fit: &Fit) -> Result<(), Error> {
     let Some(growth_time) = setup.growth_time(setup.start()) else {
         return Ok(());
     };
     let longest = setup.records().iter().map(Record::duration);
-    if longest.fold(0.0, f64::max) < GROWS * growth_time || !runs_away(setup) {
+    if longest.fold(0.0, f64::max) < GROWS * growth_time || !diverges(setup) {
         return Ok(());
     }
     let outputs = &setup.records()[0].outputs;
@@ -250,17 +247,17 @@ fn require_stable(setup: &ModelSetup, fit: &Fit) -> Result<(), Error> {
 }
 
 /// Whether the simulation with the start values leaves the range of the readings by far, or cannot go on.
-fn runs_away(setup: &ModelSetup) -> bool {
+fn diverges(setup: &ModelSetup) -> bool {
     let Some(simulated) = setup.simulate(setup.start()) else {
         return true;
     };
     let measured = setup.records().iter().flat_map(|record| &record.outputs);
     measured.zip(simulated).any(|(measured, simulated)| {
         let (low, high) = measured.range();
-        let away = AWAY * (high - low);
+        let far = FAR * (high - low);
         simulated
             .iter()
-            .any(|y| !(low - away..=high + away).contains(y))
+            .any(|y| !(low - far..=high + far).contains(y))
     })
 }
 

@@ -115,11 +115,11 @@ impl Context<'_> {
         ))
     }
 
-    /// What is known of the loop, after a test for feedback with the residual of a set: what a model lacks may depend on past inputs, and look
-    /// like noise that no controller feeds back. And a large error hides feedback. A set with a function of time has fitted the noise
-    /// too, and says nothing.
+    /// What is known of the loop, after a test for feedback with the residual of a set: the error of a model that
+    /// lacks an effect may depend on past inputs, as feedback does, or hide feedback. A function of time fits the noise too: such a set
+    /// cannot be tested.
     pub fn retested_feedback(&self, set: &Node) -> Result<Option<ControlLoop>, Error> {
-        if !self.problem.controllers.is_empty() || self.in_time(&set.added) > 0 {
+        if !self.problem.controllers.is_empty() || set.spec().reads_time() {
             return Ok(self.control_loop.clone());
         }
         let setup = self.setup(&set.model)?;

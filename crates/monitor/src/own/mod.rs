@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use ct_model::effects::Candidate;
-use ct_model::{Expression, Given, Model, Variable};
+use ct_model::{Given, Model, Variable};
 use ct_signals::Hold;
 use greybox::PriorValue;
 use missing_effect::GROUP_MARGIN;
@@ -136,8 +136,7 @@ impl From<OwnModel> for Watched {
 
 impl Believed for OwnModel {
     fn check(&self) -> Result<(), Error> {
-        let mut expressions = self.model.spec().expressions();
-        if expressions.any(|e| e.any(&|part| matches!(part, Expression::Time))) {
+        if self.model.spec().reads_time() {
             return Err(Error::Time);
         }
         if self.watched().is_empty() {

@@ -15,8 +15,8 @@ model evaporation
   constant Real balance(unit="balance") = 1;
   constant Real middle(unit="signal") = 0;
   constant Real zero(unit="signal") = 273.15 "zero of the unit above absolute zero";
-  constant Real pole(unit="signal") = 35.85 "of the vapour pressure, above absolute zero";
-  constant Real rise(unit="signal") = 4098 "of its logarithm, times the distances from the pole";
+  constant Real pole(unit="signal") = 35.85 "temperature in the Magnus form, above absolute zero";
+  constant Real rise(unit="signal") = 4098 "the vapour pressure rises by the share rise/(T - pole)^2 per degree";
   parameter Real flow_at_middle(unit="balance", min=0, max=10*balance) = 0 "loss to dry air where the temperature is in the middle of its range";
   parameter Real humidity(unit="1", min=0, max=1) = 0.5 "relative humidity of the air";
   Real at_middle = rise/(middle + zero - pole);

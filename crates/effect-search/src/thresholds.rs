@@ -158,6 +158,9 @@ pub struct Thresholds {
     /// Effects whose residual is not noise are reported as a part of the answer if they explain this share of the mean squared error above
     /// the noise level (0 to 1). Chosen.
     pub partial_share: f64,
+    /// Effects are a part of the answer if they explain less than this share of the mean squared error above the innovations (0 to 1): the rest
+    /// is correlated, and may be noise or unmodelled physics. Chosen.
+    pub whole_share: f64,
     /// As [`Self::partial_share`], for an effect that depends on time only, which can imitate any slow disturbance (0 to 1). Chosen.
     pub partial_share_of_time: f64,
     /// Number of sets of each size that are tested, those with the smallest criterion (1 or more). Chosen, for time.
@@ -267,6 +270,7 @@ impl Thresholds {
         many_effects: 3,
         functions_of_time: 1,
         partial_share: 0.38,
+        whole_share: 0.8,
         partial_share_of_time: 0.9,
         partial_tested: 6,
         partial_left: 0.5,

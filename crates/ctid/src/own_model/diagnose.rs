@@ -194,7 +194,7 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
         ));
     }
     let is_open = diagnosis.verdict == Verdict::Partial && diagnosis.not_noise.is_none();
-    if is_open && searched < many {
+    if is_open && !diagnosis.left_out.is_empty() && searched < many {
         all.push(
             "The search was cut short, so this noise may contain effects that were not tried."
                 .to_string(),
@@ -233,7 +233,9 @@ fn correlated(diagnosis: &Diagnosis) -> Option<String> {
             100.0 * predictable,
             noise.output
         );
-        (predictable >= CORRELATED).then_some(share)
+        let is_said =
+            predictable >= CORRELATED || diagnosis.verdict == Verdict::Partial && predictable > 0.0;
+        is_said.then_some(share)
     });
     let correlated: Vec<String> = correlated.collect();
     (!correlated.is_empty()).then(|| {

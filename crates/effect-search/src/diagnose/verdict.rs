@@ -21,6 +21,8 @@ pub(super) struct Graded {
     pub not_noise: Option<NotNoise>,
     /// The share of the error above the noise that the effects explain.
     pub share: Option<f64>,
+    /// The residual is correlated noise, or unmodelled physics that is as large beside what the effects explain.
+    pub rest_is_correlated: bool,
 }
 
 impl Context<'_> {
@@ -35,14 +37,19 @@ impl Context<'_> {
         // After a search that was cut short, the noise model describes what was not tried; the effects are then at most a part of the answer.
         let open = grown.cut_short && answer.own.noise.order() > 0;
         let whole = answer.not_noise.is_none() && !open;
+        let above = |floors: &[f64]| explained(&base.fit, &answer.set.fit, floors);
+        let above_innovations = above(&answer.own.noise.sigmas());
+        // Unmodelled physics that its own past predicts cannot be distinguished from correlated noise.
+        let rest_is_correlated = whole && above_innovations < self.thresholds.whole_share;
         // The noise level: the standard deviation of the whole residual if it is noise, otherwise that of its innovations.
-        let floors = if whole {
-            self.noise_levels(&answer.own)
-        } else {
-            answer.own.noise.sigmas()
-        };
-        let share = found.then(|| explained(&base.fit, &answer.set.fit, &floors));
-        let part = open || answer.reduced || answer.has_many(self, base);
+        let share = found.then(|| {
+            if whole && !rest_is_correlated {
+                above(&self.noise_levels(&answer.own))
+            } else {
+                above_innovations
+            }
+        });
+        let part = open || rest_is_correlated || answer.reduced || answer.has_many(self, base);
         let least = self.thresholds.partial_share;
         let mut verdict = match (share, &answer.not_noise) {
             (None, None) => Verdict::Adequate,
@@ -67,6 +74,7 @@ impl Context<'_> {
             groups,
             not_noise: answer.not_noise,
             share,
+            rest_is_correlated,
         })
     }
 
@@ -77,7 +85,9 @@ impl Context<'_> {
         base: &Node,
         max_effects: usize,
     ) -> Vec<usize> {
-        if matches!(graded.verdict, Verdict::Partial | Verdict::Unexplained) {
+        if matches!(graded.verdict, Verdict::Partial | Verdict::Unexplained)
+            && !graded.rest_is_correlated
+        {
             return Vec::new();
         }
         let before = graded.set.added.len();

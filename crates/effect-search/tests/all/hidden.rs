@@ -131,6 +131,26 @@ fn a_flow_between_two_states_is_named_beside_coloured_noise() {
     assert!(diagnosis.steps[0].rmse_per_output.len() == 2 && diagnosis.steps[0].rmse.is_none());
 }
 
+/// Correlated noise may be unmodelled physics: beside an effect that explains as much, it makes the answer a partial one.
+#[test]
+fn an_effect_beside_as_much_correlated_noise_is_a_part_of_the_answer() {
+    for (coupling, verdict) in [(0.2, Verdict::Effect), (0.01, Verdict::Partial)] {
+        let coupled = PAIR
+            .replace(
+                "k1*(T1 - 20)",
+                &format!("k1*(T1 - 20) - {coupling}*(T1 - T2)"),
+            )
+            .replace(
+                "k2*(T2 - 20)",
+                &format!("k2*(T2 - 20) + {coupling}*(T1 - T2)"),
+            );
+        let found = found(&problem(PAIR, record(&coupled, 0.8, 0.3, 5)));
+        assert!(names(&found, "coupling(T1,T2)"), "{:?}", found.groups);
+        assert_eq!(found.verdict, verdict, "{:?}", found.share);
+        assert_eq!(found.not_noise, None);
+    }
+}
+
 /// One output has twenty times the noise of the other one; the hidden effect raises the error of the quiet one by a third.
 #[test]
 fn an_effect_is_named_whatever_the_noise_of_the_other_output() {

@@ -148,10 +148,16 @@ pub(super) fn sentences(
 /// Share of the error that the effects explain, tests of the residual, and the loop of the records.
 pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<String> {
     let mut all = Vec::new();
+    let is_open = diagnosis.verdict == Verdict::Partial && diagnosis.not_noise.is_none();
     if let Some(share) = diagnosis.share {
         all.push(format!(
-            "The effects explain {:.0} % of the squared error above the noise.",
-            100.0 * share
+            "The effects explain {:.0} % of the squared error above the {}.",
+            100.0 * share,
+            if is_open {
+                "innovations of the noise, which nothing predicts"
+            } else {
+                "noise"
+            }
         ));
     }
     match (&diagnosis.not_noise, diagnosis.verdict) {
@@ -193,7 +199,6 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
             "{many} effects or more together may compensate for an effect that is not among the candidates: treat them as a description of the records until each is confirmed."
         ));
     }
-    let is_open = diagnosis.verdict == Verdict::Partial && diagnosis.not_noise.is_none();
     if is_open && !diagnosis.left_out.is_empty() && searched < many {
         all.push(
             "The search was cut short, so this noise may contain effects that were not tried."

@@ -71,6 +71,8 @@ pub fn diagnose(
         _ => (&graded.set, graded.own),
     };
     let unknown = match graded.verdict {
+        // A function of time would describe the correlated noise.
+        Verdict::Partial if graded.rest_is_correlated => None,
         Verdict::Unexplained | Verdict::Partial => {
             tell("the shape of what is missing");
             let context = Context {

@@ -91,6 +91,7 @@ pub(crate) fn heading(diagnosis: &Diagnosis) -> String {
             return "No candidate was fitted within the time limit".to_string();
         }
         Verdict::Unexplained => return "Nothing explains it".to_string(),
+        Verdict::Partial if diagnosis.share.is_some_and(|share| share < 0.5) => "In part",
         Verdict::Partial => "Mostly",
         Verdict::Effect | Verdict::Undecided => "Missing",
     };
@@ -148,16 +149,16 @@ pub(super) fn sentences(
 /// Share of the error that the effects explain, tests of the residual, and the loop of the records.
 pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<String> {
     let mut all = Vec::new();
-    let is_open = diagnosis.verdict == Verdict::Partial && diagnosis.not_noise.is_none();
+    let beside_noise = diagnosis.verdict == Verdict::Partial && diagnosis.not_noise.is_none();
     if let Some(share) = diagnosis.share {
+        let above = if beside_noise {
+            "what no earlier reading predicts"
+        } else {
+            "the noise"
+        };
         all.push(format!(
-            "The effects explain {:.0} % of the squared error above the {}.",
-            100.0 * share,
-            if is_open {
-                "innovations of the noise, which nothing predicts"
-            } else {
-                "noise"
-            }
+            "The effects explain {:.0} % of the squared error above {above}.",
+            100.0 * share
         ));
     }
     match (&diagnosis.not_noise, diagnosis.verdict) {
@@ -199,7 +200,7 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
             "{many} effects or more together may compensate for an effect that is not among the candidates: treat them as a description of the records until each is confirmed."
         ));
     }
-    if is_open && !diagnosis.left_out.is_empty() && searched < many {
+    if beside_noise && !diagnosis.left_out.is_empty() && searched < many {
         all.push(
             "The search was cut short, so this noise may contain effects that were not tried."
                 .to_string(),
@@ -238,9 +239,13 @@ fn correlated(diagnosis: &Diagnosis) -> Option<String> {
             100.0 * predictable,
             noise.output
         );
-        let is_said =
-            predictable >= CORRELATED || diagnosis.verdict == Verdict::Partial && predictable > 0.0;
-        is_said.then_some(share)
+        // Beside a partial explanation a smaller share may be what the effects leave.
+        let least = if diagnosis.verdict == Verdict::Partial {
+            f64::MIN_POSITIVE
+        } else {
+            CORRELATED
+        };
+        (predictable >= least).then_some(share)
     });
     let correlated: Vec<String> = correlated.collect();
     (!correlated.is_empty()).then(|| {

@@ -21,7 +21,7 @@ pub(super) struct Graded {
     pub not_noise: Option<NotNoise>,
     /// The share of the error above the noise that the effects explain.
     pub share: Option<f64>,
-    /// The residual is correlated noise, or unmodelled physics that is as large beside what the effects explain.
+    /// The residual looks like correlated noise, and is large beside what the effects explain: it may be unmodelled physics.
     pub rest_is_correlated: bool,
 }
 
@@ -36,20 +36,22 @@ impl Context<'_> {
         let found = answer.set.added.len() > grown.base.added.len();
         // After a search that was cut short, the noise model describes what was not tried; the effects are then at most a part of the answer.
         let open = grown.cut_short && answer.own.noise.order() > 0;
-        let whole = answer.not_noise.is_none() && !open;
         let above = |floors: &[f64]| explained(&base.fit, &answer.set.fit, floors);
         let above_innovations = above(&answer.own.noise.sigmas());
         // Unmodelled physics that its own past predicts cannot be distinguished from correlated noise.
-        let rest_is_correlated = whole && above_innovations < self.thresholds.whole_share;
-        // The noise level: the standard deviation of the whole residual if it is noise, otherwise that of its innovations.
+        let rest_is_correlated = found
+            && !open
+            && answer.not_noise.is_none()
+            && above_innovations < self.thresholds.whole_share;
+        let part = open || rest_is_correlated || answer.reduced || answer.has_many(self, base);
+        // The noise level: the standard deviation of the residual of a whole explanation, otherwise that of its innovations.
         let share = found.then(|| {
-            if whole && !rest_is_correlated {
-                above(&self.noise_levels(&answer.own))
-            } else {
+            if part || answer.not_noise.is_some() {
                 above_innovations
+            } else {
+                above(&self.noise_levels(&answer.own))
             }
         });
-        let part = open || rest_is_correlated || answer.reduced || answer.has_many(self, base);
         let least = self.thresholds.partial_share;
         let mut verdict = match (share, &answer.not_noise) {
             (None, None) => Verdict::Adequate,

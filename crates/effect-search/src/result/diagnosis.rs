@@ -131,7 +131,8 @@ pub struct Diagnosis {
     pub ranked: Vec<String>,
     /// The believed model, and every later model.
     pub steps: Vec<Step>,
-    /// The share of the squared error above the noise (of a partial explanation: above its innovations) that the effects explain; `None` without effects.
+    /// The share of the squared error above the noise (of a partial explanation: above the innovations of its noise model) that the effects
+    /// explain; `None` without effects.
     pub share: Option<f64>,
     /// Structure in the residual of the last model that is not noise.
     pub not_noise: Option<NotNoise>,

@@ -116,12 +116,16 @@ fn what_is_hidden_is_named() {
     }
 }
 
+/// The pair with a flow between its states.
+fn coupled(coupling: f64) -> String {
+    let flow = format!("{coupling}*(T1 - T2)");
+    PAIR.replace("k1*(T1 - 20)", &format!("k1*(T1 - 20) - {flow}"))
+        .replace("k2*(T2 - 20)", &format!("k2*(T2 - 20) + {flow}"))
+}
+
 #[test]
 fn a_flow_between_two_states_is_named_beside_coloured_noise() {
-    let coupled = PAIR
-        .replace("k1*(T1 - 20)", "k1*(T1 - 20) - 0.2*(T1 - T2)")
-        .replace("k2*(T2 - 20)", "k2*(T2 - 20) + 0.2*(T1 - T2)");
-    let diagnosis = found(&problem(PAIR, record(&coupled, 0.8, 0.3, 5)));
+    let diagnosis = found(&problem(PAIR, record(&coupled(0.2), 0.8, 0.3, 5)));
     assert!(
         names(&diagnosis, "coupling(T1,T2)"),
         "{:?}",
@@ -135,16 +139,7 @@ fn a_flow_between_two_states_is_named_beside_coloured_noise() {
 #[test]
 fn an_effect_beside_as_much_correlated_noise_is_a_part_of_the_answer() {
     for (coupling, verdict) in [(0.2, Verdict::Effect), (0.01, Verdict::Partial)] {
-        let coupled = PAIR
-            .replace(
-                "k1*(T1 - 20)",
-                &format!("k1*(T1 - 20) - {coupling}*(T1 - T2)"),
-            )
-            .replace(
-                "k2*(T2 - 20)",
-                &format!("k2*(T2 - 20) + {coupling}*(T1 - T2)"),
-            );
-        let found = found(&problem(PAIR, record(&coupled, 0.8, 0.3, 5)));
+        let found = found(&problem(PAIR, record(&coupled(coupling), 0.8, 0.3, 5)));
         assert!(names(&found, "coupling(T1,T2)"), "{:?}", found.groups);
         assert_eq!(found.verdict, verdict, "{:?}", found.share);
         assert_eq!(found.not_noise, None);
@@ -154,11 +149,8 @@ fn an_effect_beside_as_much_correlated_noise_is_a_part_of_the_answer() {
 /// One output has twenty times the noise of the other one; the hidden effect raises the error of the quiet one by a third.
 #[test]
 fn an_effect_is_named_whatever_the_noise_of_the_other_output() {
-    let coupled = PAIR
-        .replace("k1*(T1 - 20)", "k1*(T1 - 20) - 0.008*(T1 - T2)")
-        .replace("k2*(T2 - 20)", "k2*(T2 - 20) + 0.008*(T1 - T2)");
     for noisy in 0..2 {
-        let mut record = record(&coupled, 0.0, 0.1, 5);
+        let mut record = record(&coupled(0.008), 0.0, 0.1, 5);
         let more = noise::white(ROWS, 2.0, &mut ChaCha8Rng::seed_from_u64(8));
         let values = record.outputs[noisy].values.iter_mut();
         for (value, more) in values.zip(more) {

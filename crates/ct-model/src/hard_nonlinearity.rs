@@ -130,6 +130,21 @@ fn add_factors<'a>(expression: &'a Expression, all: &mut Vec<&'a Expression>) {
     }
 }
 
+impl Expression {
+    /// Whether a variable decides between branches: in a condition, `min`, `max`, `abs`, `sign`, backlash.
+    #[must_use]
+    pub fn branches_by(&self, variable: Variable) -> bool {
+        let mut all = Vec::new();
+        add_selectors(self, &[], &mut all);
+        all.iter().any(|selector| {
+            let mut is_read = false;
+            let choice = &selector.choice;
+            choice.each_variable(&mut |read| is_read |= read == variable);
+            is_read
+        })
+    }
+}
+
 impl ModelSpec {
     /// The first variable with a hard nonlinearity that acts: its branch changes from one of these points to another, or depends on the past.
     /// Branches that depend on nothing but time, parameters and inputs that are not among `driven` do not count.

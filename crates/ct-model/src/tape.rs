@@ -178,15 +178,47 @@ impl Tape {
         self.delays.iter().map(|&(what, _)| known[what]).collect()
     }
 
+    /// For each delay, whether outputs alone read it, and its signal, made of states, parameters and time, has no jumps.
+    pub fn delays_of_outputs(&self) -> Vec<bool> {
+        let stored = self.first_delayed..self.first_constant;
+        let inputs = self.input(0)..self.state(0);
+        let smooth =
+            self.made_of(|register| !stored.contains(&register) && !inputs.contains(&register));
+        let plays = self.plays.iter().flat_map(|play| [play.from, play.to]);
+        let inner = self.delays.iter().flat_map(|&(what, by)| [what, by]);
+        let read = self.derivatives.iter().chain(&self.read_by_guards).copied();
+        let read: Vec<Register> = read.chain(plays).chain(inner).collect();
+        let is_of_output = |(i, &(what, _)): (usize, &(Register, Register))| {
+            let delayed = self.delayed(i);
+            let without = self.made_of_any(|register| register != delayed);
+            smooth[what] && read.iter().all(|&register| without[register])
+        };
+        self.delays.iter().enumerate().map(is_of_output).collect()
+    }
+
     /// Registers that depend on these variables alone, for every choice of branches.
     fn made_of(&self, these: impl Fn(Register) -> bool) -> Vec<bool> {
+        let selects = |operation: &Operation| matches!(operation, Operation::Select(..));
+        self.made_without(these, selects)
+    }
+
+    /// Registers that depend on these variables alone; a choice between branches depends on all of them.
+    fn made_of_any(&self, these: impl Fn(Register) -> bool) -> Vec<bool> {
+        self.made_without(these, |_| false)
+    }
+
+    fn made_without(
+        &self,
+        these: impl Fn(Register) -> bool,
+        left_out: impl Fn(&Operation) -> bool,
+    ) -> Vec<bool> {
         let mut made: Vec<bool> = (0..self.first_operation + self.operations.len())
             .map(these)
             .collect();
         for (i, operation) in self.operations.iter().enumerate() {
             let reads = operation.reads().into_iter().flatten();
-            made[self.first_operation + i] = reads.into_iter().all(|register| made[register])
-                && !matches!(operation, Operation::Select(..));
+            made[self.first_operation + i] =
+                reads.into_iter().all(|register| made[register]) && !left_out(operation);
         }
         made
     }

@@ -94,12 +94,14 @@ impl Clock {
     pub fn span(&self, from: f64, to: f64) -> String {
         match &self.calendar {
             Some(_) => format!("from {} to {}", self.at(from), self.at(to)),
-            None => format!(
-                "from {} to {} {}",
-                self.number(from),
-                self.number(to),
-                self.unit
-            ),
+            None => {
+                // A short span needs more digits than the time axis has.
+                let digits = (self.decimals..self.decimals + MORE_DIGITS)
+                    .find(|&digits| self.digits(from, digits) != self.digits(to, digits));
+                let digits = digits.unwrap_or(self.decimals);
+                let [from, to] = [from, to].map(|time| self.digits(time, digits));
+                format!("from {from} to {to} {}", self.unit)
+            }
         }
     }
 
@@ -115,9 +117,16 @@ impl Clock {
     }
 
     fn number(&self, time: f64) -> String {
-        format!("{:.*}", self.decimals, time / self.seconds)
+        self.digits(time, self.decimals)
+    }
+
+    fn digits(&self, time: f64, decimals: usize) -> String {
+        format!("{:.*}", decimals, time / self.seconds)
     }
 }
+
+/// Largest number of additional digits of a short span of time.
+const MORE_DIGITS: usize = 6;
 
 /// The unit in which times of this length are read most easily, and the seconds in it: below two hours s, below two days h, above d.
 fn time_unit(seconds: f64) -> (&'static str, f64) {

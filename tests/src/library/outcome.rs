@@ -308,9 +308,10 @@ pub fn outcome(
     }
     hidden.truncate(2);
     let told = format!(
-        "{:?} {:?}, left {:?}, noise order {:?}, BIC over the truth's: found {:.0}, base {:.0}; {:.1} s{}{}",
+        "{:?} {:?}, share {:.2}, left {:?}, noise order {:?}, BIC over the truth's: found {:.0}, base {:.0}; {:.1} s{}{}",
         found.verdict,
         found.groups,
+        found.share.unwrap_or(f64::NAN),
         found.not_noise,
         found
             .noise

@@ -1,9 +1,12 @@
 //! Candidates of the model file: terms of the user's own, offered to the search like the catalogue's effects.
 
+mod sizes;
+
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use self::sizes::sizes;
 use super::candidate::{Candidate, EffectParameter};
 use super::effect::Role;
 use super::fragment::{Action, Counts, Fragment, Target};
@@ -204,11 +207,7 @@ pub fn own_candidate(
         return Err(error(&[], what.to_string()));
     }
     let mut used = vec![false; scope.parameters.len()];
-    let parts = states
-        .iter()
-        .flat_map(|state| state.coefficient.iter().chain([&state.right]))
-        .chain(terms.iter().map(|(_, term)| term));
-    for part in parts {
+    for part in parts(&states, &terms) {
         part.each_variable(&mut |variable| {
             if let Variable::Parameter(i) = variable {
                 used[i] = true;
@@ -243,19 +242,33 @@ pub fn own_candidate(
             "its bounds exclude zero, but the value zero has to switch the effect off: widen them";
         return Err(error(&["parameters", key], what.to_string()));
     }
+    let parts: Vec<&Expression> = parts(&states, &terms).collect();
     let mut parameters = scope.parameters[counts.parameters..].to_vec();
     let effect = parameters
         .iter_mut()
+        .enumerate()
         .zip(sizes)
-        .map(|(parameter, is_size)| {
+        .map(|((i, parameter), is_size)| {
             let start = parameter.value;
+            // Where the parameter decides between branches, its derivative at zero says little of other values.
+            let own = Variable::Parameter(counts.parameters + i);
+            let role = match is_size {
+                false => Role::Shape,
+                true if parts.iter().any(|part| part.branches_by(own)) => Role::Threshold,
+                true => Role::Size,
+            };
             let about = &parameter.about;
             if is_size {
                 parameter.value = 0.0;
             }
             let starts = if in_limit {
                 vec![start, start / DECADE, start * DECADE]
-            } else if !is_size {
+            } else if role == Role::Threshold && about.min < 0.0 {
+                [start, start / 4.0, start * 4.0]
+                    .into_iter()
+                    .flat_map(|start| [start, -start])
+                    .collect()
+            } else if role != Role::Size {
                 vec![start, start / 4.0, start * 4.0]
             } else if about.min < 0.0 {
                 vec![start, -start]
@@ -267,7 +280,7 @@ pub fn own_candidate(
                 short: about.name.clone(),
                 unit: about.unit.clone(),
                 description: String::new(),
-                role: if is_size { Role::Size } else { Role::Shape },
+                role,
                 absent: parameter.value,
                 bounds: (about.min, about.max),
                 starts: starts
@@ -293,6 +306,16 @@ pub fn own_candidate(
     };
     candidate.name_variables(spec);
     Ok(candidate)
+}
+
+/// All expressions of a candidate.
+fn parts<'a>(
+    states: &'a [State],
+    terms: &'a [(Target, Expression)],
+) -> impl Iterator<Item = &'a Expression> {
+    let of_states = states.iter();
+    let of_states = of_states.flat_map(|state| state.coefficient.iter().chain([&state.right]));
+    of_states.chain(terms.iter().map(|(_, term)| term))
 }
 
 fn about(name: &str, unit: &str, min: Option<f64>, max: Option<f64>) -> About {
@@ -325,73 +348,4 @@ fn target(spec: &ModelSpec, name: &str) -> Result<Target, String> {
             ))
         }
     }
-}
-
-/// Parameters that are zero when the effect is absent: one parameter that alone makes all terms vanish, else all parameters that do so
-/// together. The states of the candidate may stay at their start, if the terms vanish there too.
-fn sizes(
-    scope: &ModelSpec,
-    counts: Counts,
-    states: &[State],
-    terms: &[(Target, Expression)],
-) -> Option<Vec<bool>> {
-    let first = counts.parameters;
-    let count = scope.parameters.len() - first;
-    let value =
-        |expression: &Expression, trial: u32, at_rest: bool, zero: &dyn Fn(usize) -> bool| {
-            let of = |variable: Variable| {
-                let (kind, i) = match variable {
-                    Variable::Parameter(i) if i >= first && zero(i - first) => return 0.0,
-                    Variable::State(i) if at_rest && i >= counts.states => {
-                        return scope.states[i].start.value(0.0, &|_| f64::NAN);
-                    }
-                    Variable::Parameter(i) => (0, i),
-                    Variable::Input(i) => (1, i),
-                    Variable::State(i) => (2, i),
-                    Variable::Flow(i) => (3, i),
-                };
-                // Unrelated numbers of either sign.
-                let turn = 1.7 + f64::from(trial) * 2.39 + f64::from(kind) * 1.13 + i as f64 * 0.71;
-                let size = 1.5 + turn.sin();
-                if kind > 0 && trial.is_multiple_of(2) {
-                    -7.0 * size
-                } else {
-                    11.0 * size
-                }
-            };
-            expression.value(3.7 * f64::from(trial), &of)
-        };
-    let all_zero = |part: &Expression, at_rest: bool, zero: &dyn Fn(usize) -> bool| {
-        let values = (1..=6).map(|trial| value(part, trial, at_rest, zero));
-        let finite: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
-        !finite.is_empty() && finite.iter().all(|value| *value == 0.0)
-    };
-    let vanish = |zero: &dyn Fn(usize) -> bool| {
-        let terms = |at_rest| terms.iter().all(|(_, term)| all_zero(term, at_rest, zero));
-        let rests = || {
-            states
-                .iter()
-                .all(|state| all_zero(&state.right, true, zero))
-        };
-        terms(false) || (terms(true) && rests())
-    };
-    let alone: Vec<bool> = (0..count).map(|i| vanish(&|own| own == i)).collect();
-    if alone.iter().any(|is| *is) {
-        // One such parameter is enough; with several factors, the first one is used.
-        let first = alone.iter().position(|is| *is);
-        return Some((0..count).map(|i| Some(i) == first).collect());
-    }
-    if !vanish(&|_| true) {
-        return None;
-    }
-    // Start from all parameters, and drop each one that is not needed.
-    let mut zero = vec![true; count];
-    for i in 0..count {
-        zero[i] = false;
-        let kept = zero.clone();
-        if !vanish(&|own| kept[own]) {
-            zero[i] = true;
-        }
-    }
-    Some(zero)
 }

@@ -4,6 +4,7 @@
 
 use std::collections::VecDeque;
 
+use super::Method;
 use crate::scalar::Scalar;
 
 /// Number of equidistant points at which the values of a piece are stored.
@@ -53,6 +54,9 @@ pub(super) struct Delay<T> {
     pub by: T,
     /// The expression depends only on inputs and time, so its values in an interval are known at the beginning of the interval.
     pub known_ahead: bool,
+    /// The delay is only read by outputs, and its expression has no jumps ([`crate::tape::Tape::delays_of_outputs`]): no step has to end where a
+    /// value leaves it.
+    pub of_output: bool,
     /// The value before the record.
     before: T,
     pieces: VecDeque<Piece<T>>,
@@ -67,13 +71,16 @@ pub(super) struct Delay<T> {
 #[derive(Debug, Clone)]
 pub(super) struct Delays<T> {
     pub all: Vec<Delay<T>>,
+    /// Outputs are read: delays that outputs alone read have values only then.
+    pub for_outputs: bool,
 }
 
 impl<T: Scalar> Delay<T> {
-    pub fn new(by: T, known_ahead: bool) -> Self {
+    pub fn new(by: T, known_ahead: bool, of_output: bool) -> Self {
         Self {
             by,
             known_ahead,
+            of_output,
             before: T::constant(0.0),
             pieces: VecDeque::new(),
             jumps: VecDeque::new(),
@@ -90,8 +97,10 @@ impl<T: Scalar> Delay<T> {
 
     /// Notes a jump of the expression or of its slope at this time.
     pub fn jump(&mut self, time: T) {
-        self.jumps.push_back(time);
-        self.gone_in += 1;
+        if !self.of_output {
+            self.jumps.push_back(time);
+            self.gone_in += 1;
+        }
     }
 
     /// Stores the values of the expression over an interval.
@@ -130,7 +139,13 @@ impl<T: Scalar> Delay<T> {
 
     fn at(&self, time: T) -> T {
         let time = time - self.by;
-        if self.out == 0 {
+        let first_begin = self.pieces.front().map(|piece| piece.begin.value());
+        let is_before = if self.of_output {
+            first_begin.is_none_or(|begin| time.value() < begin)
+        } else {
+            self.out == 0
+        };
+        if is_before {
             return self.before;
         }
         let first = self.pieces.partition_point(|piece| piece.jumps < self.out);
@@ -148,7 +163,19 @@ impl<T: Scalar> Delay<T> {
 }
 
 impl<T: Scalar> Delays<T> {
-    pub fn at(&self, i: usize, time: T) -> T {
-        self.all[i].at(time)
+    /// The longest step, but at least `least`, in which no delayed value is needed that the step itself produces.
+    pub fn longest_step(&self, method: Method, least: f64) -> f64 {
+        // Within an implicit step the values are interpolated linearly.
+        let no_limit = |delay: &Delay<T>| delay.of_output && method != Method::Implicit;
+        let all = self.all.iter();
+        all.filter(|delay| !delay.known_ahead && !no_limit(delay))
+            .map(|delay| delay.by.value().max(least))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// The delayed value at a time; `None` for one that is not read now.
+    pub fn at(&self, i: usize, time: T) -> Option<T> {
+        let delay = &self.all[i];
+        (self.for_outputs || !delay.of_output).then(|| delay.at(time))
     }
 }

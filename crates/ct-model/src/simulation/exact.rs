@@ -8,6 +8,9 @@
 use crate::scalar::Scalar;
 use crate::tape::Tape;
 
+use super::SimulationState;
+use super::delays::{Delays, POINTS};
+use super::drive::{Drive, Interval};
 use super::step::Step;
 
 /// Terms of the Taylor series: for a norm of at most 1/2, the first omitted term is below the rounding error.
@@ -17,6 +20,11 @@ const KEPT: usize = 8;
 /// Two intervals whose lengths differ by less than this share use the same matrices; the remainder of the time is a step with constant
 /// slope.
 const SAME: f64 = 1e-6;
+
+/// Length of a piece in which values are interpolated, times the norm of A: an exponential is interpolated to about 1e-6 of its change.
+const LONGEST_PIECE: f64 = 0.5;
+/// Most pieces of an interval: faster modes have settled in the first of these.
+const MOST_PIECES: f64 = 40.0;
 
 #[derive(Debug, Clone)]
 pub(super) struct Exact<T> {
@@ -113,13 +121,105 @@ impl<T: Scalar> Exact<T> {
     }
 }
 
+impl<T: Scalar> SimulationState<T> {
+    /// Steps over an interval whose inputs rise from these.
+    pub(super) fn step_exactly(
+        &mut self,
+        tape: &Tape,
+        (from, rise): (&[f64], &[f64]),
+        h: f64,
+        delays: &Delays<T>,
+    ) {
+        let n = tape.states;
+        // Linear models do not depend on `time`. The slope for held inputs comes first, then the contribution of the inputs' slopes.
+        if !self.is_computed(from) {
+            let drive = Drive::held(from, &self.held, delays);
+            self.work.load(tape, &drive, self.time, &self.state);
+            // A branch may depend on an input.
+            tape.evaluate_with_guards(&mut self.work.registers);
+        }
+        self.work.keep_slope(tape, 0);
+        self.remember(tape);
+        self.begun = true;
+        if rise.iter().any(|rise| *rise != 0.0) {
+            let ends = self.last.iter_mut().zip(from).zip(rise);
+            for ((end, from), rise) in ends {
+                *end = from + rise * h;
+            }
+            let drive = Drive::held(&self.last, &self.held, delays);
+            self.work.load(tape, &drive, self.time, &self.state);
+            tape.evaluate(&mut self.work.registers);
+            self.work.keep_slope(tape, 1);
+            for (i, added) in self.added.iter_mut().enumerate() {
+                *added = (self.work.slopes[n + i] - self.work.slopes[i]) * (1.0 / h);
+            }
+        } else {
+            self.added.fill(T::constant(0.0));
+        }
+        if let Some(exact) = &mut self.exact {
+            exact.step(&mut self.state, &self.work.slopes[..n], &self.added, h);
+        }
+    }
+
+    /// An exact step in pieces, each short compared with the time constants, whose values at [`POINTS`] are stored for the delays of outputs.
+    pub(super) fn step_in_pieces(
+        &mut self,
+        tape: &Tape,
+        interval: Interval<'_>,
+        delays: &mut Delays<T>,
+    ) {
+        let norm = self.exact.as_ref().map_or(0.0, |exact| norm(&exact.a));
+        let pieces = (norm * interval.length / LONGEST_PIECE).ceil();
+        let pieces = pieces.clamp(1.0, MOST_PIECES);
+        let length = interval.length / pieces;
+        let part = length / (POINTS - 1) as f64;
+        let mut inputs = interval.from.to_vec();
+        let mut values = vec![[T::constant(0.0); POINTS]; delays.all.len()];
+        for piece in 0..pieces as usize {
+            let begin = interval.begin + piece as f64 * length;
+            for point in 0..POINTS {
+                self.time = T::constant(begin + part * point as f64);
+                let drive = Drive::held(&inputs, &self.held, delays);
+                self.work.load(tape, &drive, self.time, &self.state);
+                tape.evaluate_with_guards(&mut self.work.registers);
+                for (values, &(what, _)) in values.iter_mut().zip(&tape.delays) {
+                    values[point] = self.work.registers.values[what];
+                }
+                if !self.begun {
+                    for (delay, values) in delays.all.iter_mut().zip(&values) {
+                        delay.begin(self.time, values[0]);
+                    }
+                }
+                if point + 1 < POINTS {
+                    self.read.copy_from_slice(&inputs);
+                    self.computed = true;
+                    self.step_exactly(tape, (&inputs, interval.rise), part, delays);
+                    for (input, rise) in inputs.iter_mut().zip(interval.rise) {
+                        *input += rise * part;
+                    }
+                }
+            }
+            for (delay, values) in delays.all.iter_mut().zip(&values) {
+                delay.push(T::constant(begin), T::constant(length), *values);
+            }
+        }
+        for delay in &mut delays.all {
+            delay.forget(interval.begin);
+        }
+    }
+}
+
+/// The largest sum of the magnitudes in a row of a square matrix: no time constant is shorter than its reciprocal.
+fn norm<T: Scalar>(a: &[T]) -> f64 {
+    let rows = a.chunks_exact(a.len().isqrt().max(1));
+    let sums = rows.map(|row| row.iter().map(|v| v.value().abs()).sum());
+    sums.fold(0.0, f64::max)
+}
+
 /// `phi1(hA)` and `phi2(hA)`.
 fn phis<T: Scalar>(a: &[T], h: f64) -> (Vec<T>, Vec<T>) {
     let n = a.len().isqrt();
-    let norm = a
-        .chunks_exact(n.max(1))
-        .map(|row| row.iter().map(|v| (h * v.value()).abs()).sum());
-    let norm = norm.fold(0.0, f64::max);
+    let norm = h.abs() * norm(a);
     let mut doublings = 0;
     // A NaN norm ends the loop; the result is then NaN.
     while doublings < 1000 && norm > 0.5 * 2f64.powi(doublings) {

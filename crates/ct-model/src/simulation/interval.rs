@@ -202,10 +202,8 @@ impl<T: Scalar> SimulationState<T> {
             if taken == most {
                 return Err(NoSolution { time: now });
             }
-            let mut longest = self.length;
-            for delay in delays.all.iter().filter(|delay| !delay.known_ahead) {
-                longest = longest.min(delay.by.value().max(interval.length / 50.0));
-            }
+            let of_delays = delays.longest_step(self.method, interval.length / 50.0);
+            let longest = self.length.min(of_delays);
             let whole = limit.value() <= longest * STRETCH;
             let mut h = if whole { limit } else { T::constant(longest) };
             self.order_four = whole && self.may_take_order_four(tape);

@@ -1,7 +1,8 @@
 //! Simulation of a model, with exact derivatives by parameters and initial states.
 //!
-//! - Models without delays whose equations are linear in the states are integrated exactly from sample to sample: for held inputs in all
-//!   cases, for linearly interpolated inputs if the equations are linear in the inputs too.
+//! - Models whose equations are linear in the states and read no delay are integrated exactly from sample to sample: for held inputs in all
+//!   cases, for linearly interpolated inputs if the equations are linear in the inputs too. A delay of an output is interpolated between
+//!   the exact states at quarters of an interval.
 //! - All other models are integrated by an explicit method of order five with step-size control, or of order four where the tolerance is
 //!   large and the sampling interval short. Where its steps become far shorter than the error requires, the model is stiff, and an implicit
 //!   method of order four continues until accuracy alone limits the steps again ([`Method`]).
@@ -125,11 +126,13 @@ impl<T: Scalar> SimulationState<T> {
         // A function of inputs may have no value at inputs of zero, where the matrix is computed.
         let exact = exact.filter(Exact::is_finite);
         let zero = T::constant(0.0);
-        let delays = tape.delays.iter().zip(tape.known_ahead());
-        let delays = delays.map(|(&(_, by), ahead)| {
+        let kinds = tape.known_ahead().into_iter().zip(tape.delays_of_outputs());
+        let delays = tape.delays.iter().zip(kinds);
+        let delays = delays.map(|(&(_, by), (ahead, of_output))| {
             let by = work.registers.values[by];
             // A negative delay is replaced by zero.
-            Delay::new(if by.value() < 0.0 { zero } else { by }, ahead)
+            let by = if by.value() < 0.0 { zero } else { by };
+            Delay::new(by, ahead, of_output)
         });
         let plain: Vec<f64> = parameters.iter().map(|value| value.value()).collect();
         Self {
@@ -144,6 +147,7 @@ impl<T: Scalar> SimulationState<T> {
             exact,
             delays: Some(Delays {
                 all: delays.collect(),
+                for_outputs: false,
             }),
             changed: vec![f64::NEG_INFINITY; tape.guards.len()],
             tolerance: TOLERANCE,
@@ -171,9 +175,10 @@ impl<T: Scalar> SimulationState<T> {
     }
 
     fn read(&mut self, model: &Model, inputs: &[f64], outputs: &mut [T]) {
-        let Some(delays) = self.delays.take() else {
+        let Some(mut delays) = self.delays.take() else {
             return;
         };
+        delays.for_outputs = true;
         let drive = Drive::held(inputs, &self.held, &delays);
         let tape = &model.tape;
         if self.long_step.is_active() && inputs == self.last {
@@ -217,6 +222,7 @@ impl<T: Scalar> SimulationState<T> {
             } = &mut self.work;
             sliding.read(tape, registers, outputs);
         }
+        delays.for_outputs = false;
         self.delays = Some(delays);
     }
 
@@ -262,10 +268,16 @@ impl<T: Scalar> SimulationState<T> {
         if model.exact == ExactSteps::HeldInputs && rise.iter().any(|rise| *rise != 0.0) {
             self.go_on_in_steps(tape);
         }
-        let result = if self.exact.is_some() {
-            self.step_exactly(tape, from, &rise, length)
-        } else {
-            self.step_over(tape, interval, until, delays)
+        let result = match (&self.exact, delays.all.is_empty()) {
+            (None, _) => self.step_over(tape, interval, until, delays),
+            (Some(_), true) => {
+                self.step_exactly(tape, (from, &rise), length, delays);
+                Ok(())
+            }
+            (Some(_), false) => {
+                self.step_in_pieces(tape, interval, delays);
+                Ok(())
+            }
         };
         self.rise = rise;
         self.computed = false;
@@ -323,45 +335,5 @@ impl<T: Scalar> SimulationState<T> {
         self.jacobian = Some(Jacobian::new(tape, &plain));
         self.method = Method::Explicit;
         self.note_largest();
-    }
-
-    fn step_exactly(
-        &mut self,
-        tape: &Tape,
-        from: &[f64],
-        rise: &[f64],
-        h: f64,
-    ) -> Result<(), NoSolution> {
-        let n = tape.states;
-        let delays = Delays { all: Vec::new() };
-        // Linear models do not depend on `time`. The slope for held inputs comes first, then the contribution of the inputs' slopes.
-        if !self.is_computed(from) {
-            let drive = Drive::held(from, &self.held, &delays);
-            self.work.load(tape, &drive, self.time, &self.state);
-            // A branch may depend on an input.
-            tape.evaluate_with_guards(&mut self.work.registers);
-        }
-        self.work.keep_slope(tape, 0);
-        self.remember(tape);
-        self.begun = true;
-        if rise.iter().any(|rise| *rise != 0.0) {
-            let ends = self.last.iter_mut().zip(from).zip(rise);
-            for ((end, from), rise) in ends {
-                *end = from + rise * h;
-            }
-            let drive = Drive::held(&self.last, &self.held, &delays);
-            self.work.load(tape, &drive, self.time, &self.state);
-            tape.evaluate(&mut self.work.registers);
-            self.work.keep_slope(tape, 1);
-            for (i, added) in self.added.iter_mut().enumerate() {
-                *added = (self.work.slopes[n + i] - self.work.slopes[i]) * (1.0 / h);
-            }
-        } else {
-            self.added.fill(T::constant(0.0));
-        }
-        if let Some(exact) = &mut self.exact {
-            exact.step(&mut self.state, &self.work.slopes[..n], &self.added, h);
-        }
-        Ok(())
     }
 }

@@ -19,7 +19,10 @@ impl Model {
     #[must_use]
     pub fn new(spec: ModelSpec) -> Self {
         let tape = Tape::compile(&spec);
-        let exact = if tape.delays.is_empty() && !spec.states.is_empty() {
+        // A function with memory follows its argument from row to row, not in the parts of an interval.
+        let is_whole = tape.delays.is_empty() || tape.plays.is_empty();
+        let of_outputs = tape.delays_of_outputs().iter().all(|is| *is);
+        let exact = if of_outputs && is_whole && !spec.states.is_empty() {
             spec.exact_steps()
         } else {
             ExactSteps::No

@@ -188,7 +188,9 @@ impl<T: Scalar> Sliding<T> {
                 own.values[first + i] = at.values[first + i] + slope * by;
             }
             for i in 0..tape.delays.len() {
-                own.values[tape.delayed(i)] = drive.delays.at(i, at.values[0] + by);
+                if let Some(value) = drive.delays.at(i, at.values[0] + by) {
+                    own.values[tape.delayed(i)] = value;
+                }
             }
             tape.evaluate_slopes(own);
             tape.evaluate_guards(own);

@@ -73,7 +73,9 @@ impl<T: Scalar> Step<T> {
         let first = tape.state(0);
         values[first..first + x.len()].copy_from_slice(x);
         for i in 0..tape.delays.len() {
-            values[tape.delayed(i)] = drive.delays.at(i, time);
+            if let Some(value) = drive.delays.at(i, time) {
+                values[tape.delayed(i)] = value;
+            }
         }
     }
 

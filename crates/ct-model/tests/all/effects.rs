@@ -42,6 +42,7 @@ fn all_candidates_are_listed_with_their_ports() {
         "offset(y)",
         "drift(y)",
         "lag(y)",
+        "delay(y)",
         "nonlinearity(y)",
         "saturation(y)",
         "quantisation(y)",

@@ -1,6 +1,7 @@
 //! A single test program.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod delayed_outputs;
 mod effects;
 mod events;
 mod language;

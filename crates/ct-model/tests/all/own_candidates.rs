@@ -113,6 +113,25 @@ fn a_candidate_may_bring_a_state() {
     );
 }
 
+/// At zero two branches meet, and the derivative there is that of one of them.
+#[test]
+fn a_size_that_decides_between_branches_is_a_threshold_with_starts() {
+    let block = block();
+    let role = |candidate: OwnCandidate| {
+        let candidate = own_candidate(&block, "own", &candidate).unwrap();
+        let all = candidate.parameters.into_iter();
+        all.map(|p| (p.role, p.starts)).collect::<Vec<_>>()
+    };
+    let clamped = |term: &str| role(own(&[("gap", 8.0)], &[("loss", term)]));
+    for term in [
+        "-k*max(-gap, min(gap, T - Ta))",
+        "if T - Ta > gap then -k*gap else 0",
+    ] {
+        assert_eq!(clamped(term), [(Role::Threshold, vec![8.0, 2.0, 32.0])]);
+    }
+    assert_eq!(clamped("gap*max(T - Ta, 0)"), [(Role::Size, vec![8.0])]);
+}
+
 #[test]
 fn the_size_is_found_where_it_is_hidden() {
     let block = block();

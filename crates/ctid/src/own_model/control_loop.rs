@@ -1,7 +1,7 @@
 //! The loop of a user's own model: its controllers with the times of the records, their references, and what is said of it.
 
 use ct_signals::{Channel, Columns, Heading, ReadSummary, Record};
-use effect_search::ControlLoop;
+use effect_search::{ControlLoop, NotSimulated};
 use greybox::LoopController;
 
 use super::controller::OwnController;
@@ -92,7 +92,20 @@ impl OwnModelFile {
     pub fn loop_sentence(&self, known: &ControlLoop, names: &MessageNames) -> String {
         let driven = self.controllers.first().map(|controller| controller.input);
         let unit = driven.map_or("", |input| self.base.inputs[input].about.unit.as_str());
-        of_the_loop(known, unit, names)
+        let known = self.in_words_of_the_text(known);
+        of_the_loop(&known, unit, names)
+    }
+
+    /// With the output's name in place of the flow that an effect of the reading inserts.
+    fn in_words_of_the_text(&self, known: &ControlLoop) -> ControlLoop {
+        let mut known = known.clone();
+        if let Some(NotSimulated::HardNonlinearity { of }) = &mut known.not_simulated
+            && let Some(output) = of.strip_suffix("_true")
+            && self.base.find(of).is_none()
+        {
+            *of = output.to_string();
+        }
+        known
     }
 
     /// Warning of a command that does not simulate the loop although the file declares a controller; empty if it declares none.

@@ -108,6 +108,9 @@ fn is_untried(diagnosis: &Diagnosis) -> bool {
     diagnosis.singles.is_empty() && !diagnosis.left_out.is_empty()
 }
 
+/// Most alternatives of an effect that are told with their places.
+const MOST_PLACED: usize = 4;
+
 /// Findings in sentences.
 pub(super) fn sentences(
     file: &OwnModelFile,
@@ -128,7 +131,13 @@ pub(super) fn sentences(
             },
             words.physics(first)
         ));
-        if !others.is_empty() {
+        if others.len() > MOST_PLACED {
+            all.push(format!(
+                "Or it is one of {} others, which these records do not distinguish from it: {}.",
+                others.len(),
+                others.join(", ")
+            ));
+        } else if !others.is_empty() {
             let others: Vec<String> = others.iter().map(|id| words.placed(id)).collect();
             all.push(format!(
                 "Or it is {}: these records do not distinguish them.",

@@ -11,7 +11,7 @@ use missing_effect::{
 use serde::Serialize;
 
 use super::compare::Comparison;
-use super::diagnose::sentences;
+use super::diagnose::{heading, sentences};
 use super::file::{OwnModelFile, Records};
 use super::words::{EffectWords, Site, shown_unit};
 use crate::MessageNames;
@@ -63,6 +63,8 @@ pub struct Document {
     pub diagnosis: Diagnosis,
     /// The findings in sentences, with the names of the model; empty for a comparison.
     pub sentences: Vec<String>,
+    /// The verdict in a few words.
+    pub verdict: String,
     /// The unexplained error, as a function at a port.
     pub(crate) term: Option<MissingTerm>,
 }
@@ -71,7 +73,8 @@ impl Document {
     /// The report as a complete HTML file.
     #[must_use]
     pub fn html(&self) -> String {
-        report::html_with(&self.diagnosis, &self.sentences, self.term.as_ref())
+        let term = self.term.as_ref();
+        report::html_with(&self.diagnosis, &self.sentences, term, &self.verdict)
     }
 }
 
@@ -115,6 +118,7 @@ pub fn compared(file: &OwnModelFile, records: &Records, found: &Comparison) -> D
     shown.effort.clone_from(&found.effort);
     shown.seconds = found.seconds;
     Document {
+        verdict: report::verdict(&shown),
         diagnosis: shown,
         sentences: {
             let gaps = found.gaps.as_ref().and_then(of_gaps).into_iter();
@@ -160,6 +164,10 @@ pub fn diagnosed(
     shown.seconds = found.seconds;
     let unknown = found.unknown.as_ref();
     Document {
+        verdict: match found.verdict {
+            Verdict::Partial => heading(found),
+            _ => report::verdict(&shown),
+        },
         diagnosis: shown,
         sentences: sentences(file, found, &words),
         term: unknown.map(|unknown| missing_term(&words, unknown)),

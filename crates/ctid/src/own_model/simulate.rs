@@ -61,6 +61,7 @@ pub(crate) fn simulate(
     };
     let of = (model, fitted.as_ref(), time_unit);
     let mut found = simulated(of, (&read, name, inputs.first), LEVEL, options)?;
+    found.effects.clone_from(&file.effects.on);
     found.warnings.extend(file.other_time_unit(time_unit));
     if let Some(fitted) = &fitted {
         found.warnings.extend(fitted.warnings());
@@ -89,7 +90,9 @@ impl FittedModel {
         read.record = all.pop().unwrap_or_default();
         let whole = self.with_records(all);
         let of = (self.model(), Some(&whole), whole.records().time_unit);
-        simulated(of, (&read, &name, first), level, self.options())
+        let mut found = simulated(of, (&read, &name, first), level, self.options())?;
+        found.effects.clone_from(&self.given().effects.on);
+        Ok(found)
     }
 }
 
@@ -179,6 +182,7 @@ fn simulated(
     Ok(Simulated {
         schema: 1,
         model: spec.name.clone(),
+        effects: Vec::new(),
         inputs: record.name.clone(),
         fitted_to: fitted_to.into_iter().map(String::from).collect(),
         parameters: names

@@ -49,19 +49,21 @@ const SCRIPT: &str = concat!(
 
 /// The report of a diagnosis as a complete HTML file. A comparison is a diagnosis with one step and no scores; empty parts are omitted.
 pub fn html(diagnosis: &Diagnosis) -> String {
-    html_with(diagnosis, &sentences::of_diagnosis(diagnosis), None)
+    let sentences = sentences::of_diagnosis(diagnosis);
+    html_with(diagnosis, &sentences, None, &verdict(diagnosis))
 }
 
-/// The report of a diagnosis with other sentences, and with the unexplained error of a user's own model.
+/// The report of a diagnosis with other sentences, with the unexplained error of a user's own model, and with a verdict in words.
 pub(crate) fn html_with(
     diagnosis: &Diagnosis,
     sentences: &[String],
     term: Option<&MissingTerm>,
+    verdict: &str,
 ) -> String {
     let title = format!("ctid: {}", escape(&diagnosis.plant));
     let data = data::json_with(diagnosis, term);
     let body: String = [
-        headline(diagnosis, sentences),
+        headline(diagnosis, sentences, verdict),
         shown(diagnosis),
         "<main>".to_owned(),
         fit(diagnosis),
@@ -84,7 +86,7 @@ pub(crate) fn html_with(
 }
 
 /// The verdict, the fall of the error in large numbers, and the analysed data.
-fn headline(diagnosis: &Diagnosis, sentences: &[String]) -> String {
+fn headline(diagnosis: &Diagnosis, sentences: &[String], verdict: &str) -> String {
     let effort = findings::effort(&diagnosis.effort, Reader::Commands);
     let sentences: String = sentences
         .iter()
@@ -96,13 +98,14 @@ fn headline(diagnosis: &Diagnosis, sentences: &[String]) -> String {
          <div class=\"verdict\">\n{sentences}</div>\n{trail}{facts}\
          {NOTICES}</header>\n",
         plant = escape(&diagnosis.plant),
-        verdict = verdict(diagnosis),
+        verdict = escape(verdict),
         trail = trail(diagnosis),
         facts = tables::facts(diagnosis),
     )
 }
 
-fn verdict(diagnosis: &Diagnosis) -> String {
+/// The verdict of a diagnosis or a comparison in a few words.
+pub(crate) fn verdict(diagnosis: &Diagnosis) -> String {
     if findings::is_comparison(diagnosis) {
         return "Model against measurement".to_owned();
     }
@@ -120,7 +123,7 @@ fn verdict(diagnosis: &Diagnosis) -> String {
             return format!("{found}{rest}");
         }
         Verdict::Undecided => "Something is missing; more than one effect fits these data",
-        Verdict::Partial => return escape(&findings::partial_headline(diagnosis)),
+        Verdict::Partial => return findings::partial_headline(diagnosis),
         Verdict::Unexplained => {
             "The residual is not noise, and no effect of the catalogue explains it"
         }

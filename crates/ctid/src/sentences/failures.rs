@@ -52,13 +52,11 @@ impl FailureWords<'_> {
         let said: Vec<String> = worst.map(|failure| self.of_failure(failure)).collect();
         if said.is_empty() {
             let place = match self.input {
-                Some(_) => format!("in no window, {}, flow or direction", self.output),
-                None => {
-                    "in no window of time, at no value of a signal and in no direction".to_string()
-                }
+                Some(_) => format!("windows, {}s, flows and directions", self.output),
+                None => "windows of time, values of the signals and directions".to_string(),
             };
             return vec![format!(
-                "no region stands out: {place} does the error exceed the noise"
+                "no region stands out: the error is about as large in all {place}"
             )];
         }
         said

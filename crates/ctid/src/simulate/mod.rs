@@ -82,6 +82,9 @@ pub struct Simulated {
     pub schema: u32,
     /// The model.
     pub model: String,
+    /// The effects in a model as text.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<String>,
     /// The record of its inputs.
     pub inputs: String,
     /// The records of the fit; empty if the values come from the text.

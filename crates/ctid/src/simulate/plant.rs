@@ -111,6 +111,7 @@ pub fn of_plant(
     Ok(Simulated {
         schema: 1,
         model: name,
+        effects: Vec::new(),
         inputs: record.name.clone(),
         fitted_to: problem.records.iter().map(|r| r.name.clone()).collect(),
         parameters: found.parameters,

@@ -8,7 +8,9 @@ use crate::plot::{self, Axis};
 
 /// The whole of it.
 pub(crate) fn said(simulated: &Simulated, look: Look) -> String {
-    let title = format!("{} on the inputs of {}", simulated.model, simulated.inputs);
+    let model = [std::slice::from_ref(&simulated.model), &simulated.effects];
+    let model = model.concat().join(" + ");
+    let title = format!("{model} on the inputs of {}", simulated.inputs);
     let mut text = format!("{}\n", look.heading(&title));
     let values = match &simulated.fitted_to[..] {
         [] => "with the values of its text, which are taken as they are: no band without --fit"

@@ -1,9 +1,7 @@
 //! Acceptance test: backward elimination of effects that the noise may explain as well.
 
-use ct_model::effects::Role;
 use ct_signals::{ArModel, Record};
 use estimation::{Fit, Noise, coloured};
-use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::Error;
@@ -92,21 +90,10 @@ impl Context<'_> {
             ..self.clone()
         };
         loop {
-            let errors = node.fit.std_errors();
             let added = (base.added.len()..node.added.len()).filter_map(|position| {
-                let candidate = &self.candidates[node.added[position]];
-                // A term of the user's own may have no size.
-                let own = candidate.effect.map(|_| &candidate.parameters)?;
-                let sizes = own.iter().filter(|p| p.role == Role::Size);
-                let squares = sizes.map(|size| {
-                    let mut parameters = node.spec().parameters.iter();
-                    let at = parameters.position(|p| p.about.name == size.name)?;
-                    Some(((node.fit.x[at] - size.absent) / errors[at]?).powi(2))
-                });
-                let squares = squares.collect::<Option<Vec<f64>>>()?;
-                let gain = squares.iter().sum::<f64>() - squares.len() as f64 * self.samples().ln();
-                (!squares.is_empty() && gain <= self.thresholds.bic_margin)
-                    .then_some((position, gain))
+                let (statistic, sizes) = self.wald(&node, position)?;
+                let gain = statistic - sizes as f64 * self.samples().ln();
+                (gain <= self.thresholds.bic_margin).then_some((position, gain))
             });
             let Some((least, _)) = added.min_by(|a, b| a.1.total_cmp(&b.1)) else {
                 return Ok(node);
@@ -216,14 +203,6 @@ impl Context<'_> {
         let readings =
             of_each.flat_map(|(series, falls)| (0..rows(falls)).map(move |row| (series, row)));
         Some(readings.collect())
-    }
-
-    /// The set without each of the effects that the search added.
-    pub fn each_lacking(&self, node: &Node, base: &Node, noise: &Noise) -> Vec<Node> {
-        (base.added.len()..node.added.len())
-            .into_par_iter()
-            .filter_map(|position| self.without(node, position, noise, FINE).ok())
-            .collect()
     }
 
     /// The fit of a set with the noise model of its own residual.

@@ -62,7 +62,7 @@ impl Context<'_> {
         noise: &Noise,
         slowness: f64,
     ) -> Result<Vec<Node>, Error> {
-        let without = self.without(last, position, noise, FINE)?;
+        let without = self.lacking(last, position, noise)?;
         let fall = without.fit.deviance - last.fit.deviance;
         let trials = self.trials(&without, noise);
         let trials: Vec<_> = trials

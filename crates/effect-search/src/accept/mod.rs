@@ -2,6 +2,7 @@
 
 pub(crate) mod eliminate;
 pub(crate) mod groups;
+pub(crate) mod lacking;
 pub(crate) mod level_shift;
 pub(crate) mod noise_test;
 pub(crate) mod partial;

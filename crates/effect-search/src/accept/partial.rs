@@ -5,7 +5,7 @@
 //! are compared by their simulation error. A set is a partial explanation if
 //! - it explains a share of the mean squared error above the noise, what its past does not predict ([`Thresholds::partial_share`]); an
 //!   effect that depends on time only, which imitates any slow disturbance, nearly all of it ([`Thresholds::partial_share_of_time`]), and
-//!   alone, because several such effects fit any disturbance;
+//!   alone or beside effects that the acceptance test keeps with it; several such effects fit any disturbance, and are none;
 //! - several effects are each worth it, as in a larger set (below);
 //! - it predicts the next sample as well as the model without it, each with its own noise model;
 //! - what is fitted to three quarters of the records predicts the fourth (cross-validation);
@@ -47,8 +47,12 @@ struct Part {
 impl Context<'_> {
     /// The set that explains a large part of the error, fitted with white noise: of those with as many effects the one with the
     /// smallest error in the cross-validation. `None` if no set is a partial explanation. `sets`: fitted with any noise model; `base`: fitted
-    /// with white noise.
-    pub fn largest_part(&self, base: &Node, sets: &[Node]) -> Result<Option<Node>, Error> {
+    /// with white noise; `accepted`: the set of the acceptance test.
+    pub fn largest_part(
+        &self,
+        (base, accepted): (&Node, &Node),
+        sets: &[Node],
+    ) -> Result<Option<Node>, Error> {
         let white = Noise::white(self.problem.records[0].outputs.len());
         let own_base = self.in_limited_noise(base)?;
         let Some(base_left_out) = self.left_out_squares(base).ok().flatten() else {
@@ -60,11 +64,16 @@ impl Context<'_> {
             left_out: base_left_out,
             bic: own_base.bic(),
         };
-        let is_alone_or_timeless = |set: &&Node| {
+        let may_be_a_part = |set: &&Node| {
             let new = &set.added[base.added.len()..];
-            new.len() == 1 || self.in_time(new) == 0
+            let is_accepted = || new.iter().all(|i| accepted.added.contains(i));
+            match self.in_time(new) {
+                0 => true,
+                1 => new.len() == 1 || is_accepted(),
+                _ => false,
+            }
         };
-        let sets: Vec<&Node> = sets.iter().filter(is_alone_or_timeless).collect();
+        let sets: Vec<&Node> = sets.iter().filter(may_be_a_part).collect();
         let is_white = |set: &Node| set.fit.noise.order() == 0;
         let is_better = |set: &Node, known: &Node| {
             is_white(set) && (!is_white(known) || set.fit.cost < known.fit.cost)

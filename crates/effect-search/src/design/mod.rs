@@ -189,7 +189,16 @@ impl Context<'_> {
             let trial = self.trial(base, i, &white)?.ok_or_else(no_fit)?;
             let mut added = base.added.clone();
             added.push(i);
-            self.fitted(added, trial.model, trial.starts, &white, FINE)
+            let fit =
+                |starts| self.fitted(added.clone(), trial.model.clone(), starts, &white, FINE);
+            // The model without the effect may have its minimum elsewhere.
+            let found = fit(trial.starts.clone())?;
+            let own = self.own_minimum(&trial.model).and_then(|x| fit(vec![x]));
+            let lower = match own {
+                Ok(own) if own.fit.cost < found.fit.cost => own,
+                _ => found,
+            };
+            Ok(self.in_lowest_minimum(lower, base.added.len(), &white))
         };
         let rough = [fitted(between[0])?, fitted(between[1])?];
         let better = usize::from(rough[1].fit.bic() < rough[0].fit.bic());

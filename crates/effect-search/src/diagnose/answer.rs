@@ -130,7 +130,7 @@ impl Context<'_> {
         // The noise model describes unmodelled physics as noise, and if that physics is slow, simulations of prewhitened fits drift.
         // The sets are therefore compared by their simulation error.
         sets.extend(timeless);
-        let part = self.largest_part(&base, &sets)?;
+        let part = self.largest_part((&base, &answer.set), &sets)?;
         let part = part.and_then(|part| self.without_small_effects(part, &base));
         let part = part.filter(|part| flexible || !self.contains_part(&answer, part, &base));
         if let Some(part) = part {

@@ -98,6 +98,10 @@ fn what_is_hidden_is_named() {
         ),
         ("periodic(T)", block("g*u - k*(T - Ta) + 2*sin(0.021*time)")),
         ("delay(u)", block("g*delay(u, 11) - k*(T - Ta)")),
+        (
+            "delay(y)",
+            block("g*u - k*(T - Ta)").replace("= T;", "= delay(T, 11);"),
+        ),
     ] {
         let diagnosis = found(&problem(BLOCK, record(&text, 0.0, 0.2, 3)));
         assert!(

@@ -13,6 +13,7 @@ mod gaps;
 mod heat;
 mod hidden;
 mod level_shift;
+mod own;
 mod partial;
 mod quantisation;
 mod records;

@@ -43,6 +43,25 @@ fn an_initial_state_that_is_soon_forgotten_does_not_decide_the_cross_validation(
     assert!(unknown.share_left_out.unwrap() > 0.9);
 }
 
+/// A sensor of second order, which no candidate is, while the losses rise: the drift may stand beside an effect that is a part of the sensor.
+#[test]
+fn one_function_of_time_may_be_a_part_of_the_answer_beside_another_effect() {
+    let hidden = block("g*u - k*(1 + 0.3*time/2500)*(T - Ta)")
+        .replace("= T;", "= s2;\n  Real s1(start=20);\n  Real s2(start=20);")
+        .replace(
+            "end Block",
+            "  20*der(s1) = T - s1;\n  20*der(s2) = s1 - s2;\nend Block",
+        );
+    let diagnosis = found(&problem(BLOCK, record(&hidden, 0.0, 0.05, 3)));
+    println!(
+        "{:?} {:?} {:?}",
+        diagnosis.verdict, diagnosis.groups, diagnosis.share
+    );
+    assert_eq!(diagnosis.verdict, Verdict::Partial);
+    assert_eq!(in_time(&diagnosis), ["drift(k)"]);
+    assert!(diagnosis.effects.len() > 1);
+}
+
 /// The room's temperature, which is believed constant, wanders: functions of time fit that, whatever it does.
 #[test]
 fn several_functions_of_time_are_no_answer() {

@@ -2,7 +2,7 @@
 
 mod backlash;
 mod dead_zone;
-mod delay;
+pub(super) mod delay;
 mod gain_drift;
 pub(super) mod lag;
 pub(super) mod nonlinearity;

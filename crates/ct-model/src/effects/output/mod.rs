@@ -1,5 +1,6 @@
 //! Effects between what is measured and the reading, in the order of the chain.
 
+mod delay;
 mod drift;
 mod hysteresis;
 mod lag;
@@ -11,8 +12,9 @@ mod saturation;
 use super::Effect;
 
 /// A converter rounds last.
-pub(super) const EFFECTS: [Effect; 7] = [
+pub(super) const EFFECTS: [Effect; 8] = [
     lag::EFFECT,
+    delay::EFFECT,
     nonlinearity::EFFECT,
     saturation::EFFECT,
     hysteresis::EFFECT,

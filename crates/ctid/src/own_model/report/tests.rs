@@ -49,10 +49,12 @@ fn what_nothing_explains_is_shown_with_its_port_and_units() {
     let document = Document {
         diagnosis: crate::report::sample::two_tanks(),
         sentences: Vec::new(),
+        verdict: "Mostly: lag(y)".to_string(),
         term: Some(term),
     };
     let html = document.html();
     for part in [
+        "<h1>Mostly: lag(y)</h1>",
         "The unexplained error",
         "id=\"plot-unknown-shape\"",
         "added to the equation of T, in W",

@@ -178,12 +178,13 @@ impl Tape {
         self.delays.iter().map(|&(what, _)| known[what]).collect()
     }
 
-    /// For each delay, whether outputs alone read it, and its signal, made of states, parameters and time, has no jumps.
+    /// For each delay, whether outputs alone read it, and its signal, made of states, parameters and time, does not jump with an input. Where a
+    /// branch changes, a step ends, and so does the piece of the signal's past.
     pub fn delays_of_outputs(&self) -> Vec<bool> {
         let stored = self.first_delayed..self.first_constant;
         let inputs = self.input(0)..self.state(0);
         let smooth =
-            self.made_of(|register| !stored.contains(&register) && !inputs.contains(&register));
+            self.made_of_any(|register| !stored.contains(&register) && !inputs.contains(&register));
         let plays = self.plays.iter().flat_map(|play| [play.from, play.to]);
         let inner = self.delays.iter().flat_map(|&(what, by)| [what, by]);
         let read = self.derivatives.iter().chain(&self.read_by_guards).copied();

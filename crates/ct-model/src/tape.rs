@@ -178,13 +178,25 @@ impl Tape {
         self.delays.iter().map(|&(what, _)| known[what]).collect()
     }
 
-    /// For each delay, whether outputs alone read it, and its signal, made of states, parameters and time, does not jump with an input. Where a
-    /// branch changes, a step ends, and so does the piece of the signal's past.
+    /// For each delay, whether outputs alone read it, and its signal is smooth between the rows: made of states, parameters and time, with
+    /// branches that parameters alone decide.
     pub fn delays_of_outputs(&self) -> Vec<bool> {
         let stored = self.first_delayed..self.first_constant;
         let inputs = self.input(0)..self.state(0);
-        let smooth =
-            self.made_of_any(|register| !stored.contains(&register) && !inputs.contains(&register));
+        let by_parameters = |&branch: &usize| {
+            let mut all = true;
+            self.branches[branch].each_guard(&mut |guard| {
+                let register = self.guards[guard].difference;
+                let once = self.first_operation + self.once;
+                all &= (1..=self.parameters).contains(&register)
+                    || (self.first_constant..once).contains(&register);
+            });
+            all
+        };
+        let smooth = self.made_without(
+            |register| !stored.contains(&register) && !inputs.contains(&register),
+            |operation| matches!(operation, Operation::Select(branch, ..) if !by_parameters(branch)),
+        );
         let plays = self.plays.iter().flat_map(|play| [play.from, play.to]);
         let inner = self.delays.iter().flat_map(|&(what, by)| [what, by]);
         let read = self.derivatives.iter().chain(&self.read_by_guards).copied();
@@ -203,7 +215,7 @@ impl Tape {
         self.made_without(these, selects)
     }
 
-    /// Registers that depend on these variables alone; a choice between branches depends on all of them.
+    /// Registers that depend on these variables alone, conditions aside.
     fn made_of_any(&self, these: impl Fn(Register) -> bool) -> Vec<bool> {
         self.made_without(these, |_| false)
     }

@@ -9,7 +9,7 @@ const TOGETHER: f64 = 0.999;
 const DETERMINED: f64 = 0.1;
 
 /// Names of the fitted entries that the records do not determine: one alone that has no effect on the readings, those of a combination that
-/// has none, and pairs of which only a combination is determined well.
+/// has none, and pairs of which only a combination is determined well, unless both standard errors are small beside the estimates.
 #[must_use]
 pub fn not_determined(setup: &ModelSetup, fit: &Fit) -> Vec<Vec<String>> {
     let (names, free) = (setup.names(), setup.free());
@@ -23,8 +23,9 @@ pub fn not_determined(setup: &ModelSetup, fit: &Fit) -> Vec<Vec<String>> {
     let is_open = |i: usize| errors[i].is_none_or(|error| error > DETERMINED * fit.x[i].abs());
     if let Some((entries, matrix)) = fit.correlations() {
         for (i, row) in matrix.iter().enumerate() {
-            let together = (0..i)
-                .filter(|&j| row[j].abs() > TOGETHER && is_open(entries[i]) && is_open(entries[j]));
+            let together = (0..i).filter(|&j| {
+                row[j].abs() > TOGETHER && (is_open(entries[i]) || is_open(entries[j]))
+            });
             found.extend(
                 together.map(|j| vec![names[entries[j]].clone(), names[entries[i]].clone()]),
             );

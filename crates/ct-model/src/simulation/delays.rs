@@ -54,8 +54,8 @@ pub(super) struct Delay<T> {
     pub by: T,
     /// The expression depends only on inputs and time, so its values in an interval are known at the beginning of the interval.
     pub known_ahead: bool,
-    /// The delay is only read by outputs, and its expression does not jump with an input ([`crate::tape::Tape::delays_of_outputs`]): no step has to end where a
-    /// value leaves it.
+    /// Outputs alone read the delay, and its expression has no jumps ([`crate::tape::Tape::delays_of_outputs`]): no step has to end where a value
+    /// leaves it.
     pub of_output: bool,
     /// The value before the record.
     before: T,

@@ -23,8 +23,8 @@ const SAME: f64 = 1e-6;
 
 /// Length of a piece in which values are interpolated, times the norm of A: an exponential is interpolated to about 1e-6 of its change.
 const LONGEST_PIECE: f64 = 0.5;
-/// Most pieces of an interval: faster modes have settled in the first of these.
-const MOST_PIECES: f64 = 40.0;
+/// Most pieces of an interval. Modes that are faster than these are interpolated coarsely while they last.
+const MOST_PIECES: f64 = 8.0;
 
 #[derive(Debug, Clone)]
 pub(super) struct Exact<T> {

@@ -53,7 +53,8 @@ impl<T: Scalar> SimulationState<T> {
     /// Evaluates the outputs; an expression with a delay of zero takes its present value.
     pub(super) fn let_through(&mut self, tape: &Tape, delays: &Delays<T>) {
         tape.evaluate_with_guards(&mut self.work.registers);
-        let at_once = |delay: &Delay<T>| delay.by.value() == 0.0;
+        // A delay of an output has the present value already, with the derivative by the delay.
+        let at_once = |delay: &Delay<T>| delay.by.value() == 0.0 && !delay.of_output;
         for _ in 0..delays.all.iter().filter(|delay| at_once(delay)).count() {
             let values = &mut self.work.registers.values;
             for (i, &(what, _)) in tape.delays.iter().enumerate() {

@@ -1,8 +1,8 @@
 //! Simulation of a model, with exact derivatives by parameters and initial states.
 //!
-//! - Models whose equations are linear in the states and read no delay are integrated exactly from sample to sample: for held inputs in all
-//!   cases, for linearly interpolated inputs if the equations are linear in the inputs too. A delay of an output is interpolated between
-//!   the exact states at quarters of an interval.
+//! - Models whose equations are linear in the states are integrated exactly from sample to sample: for held inputs in all cases, for
+//!   linearly interpolated inputs if the equations are linear in the inputs too. A delay that outputs alone read is interpolated between exact
+//!   states; with a delay elsewhere the model is integrated in steps.
 //! - All other models are integrated by an explicit method of order five with step-size control, or of order four where the tolerance is
 //!   large and the sampling interval short. Where its steps become far shorter than the error requires, the model is stiff, and an implicit
 //!   method of order four continues until accuracy alone limits the steps again ([`Method`]).

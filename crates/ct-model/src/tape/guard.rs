@@ -51,6 +51,19 @@ pub(super) enum Branch {
 }
 
 impl Branch {
+    /// Calls `each` for every guard.
+    pub(super) fn each_guard(&self, each: &mut impl FnMut(usize)) {
+        match self {
+            Self::Constant(_) => {}
+            Self::Guard(guard) => each(*guard),
+            Self::Not(a) => a.each_guard(each),
+            Self::And(a, b) | Self::Or(a, b) => {
+                a.each_guard(each);
+                b.each_guard(each);
+            }
+        }
+    }
+
     pub(super) fn holds(&self, answers: &[bool]) -> bool {
         match self {
             Self::Constant(value) => *value,

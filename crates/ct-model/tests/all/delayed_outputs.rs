@@ -1,6 +1,6 @@
 //! Delays that outputs alone read: a sensor with a dead time.
 
-use ct_model::{Dual, Model, ModelSpec, Scalar, Simulation};
+use ct_model::{Dual, Method, Model, ModelSpec, Scalar, Simulation};
 
 const ROWS: usize = 60;
 
@@ -79,5 +79,62 @@ fn a_late_reading_between_rows_is_exact() {
             let error = (late.re - 0.5 * (-since / 4.0).exp()).abs();
             assert!(error < 1e-7, "{d} {k}: {error}");
         }
+    }
+}
+
+/// Linear models are integrated exactly, also with several pieces in an interval and inputs in straight lines; with a branch in the delayed
+/// signal, which bends within an interval, the steps end there.
+#[test]
+fn a_linear_model_with_a_late_reading_is_simulated_exactly() {
+    let read = |text: &str, by: f64, rows: usize| {
+        let model = Model::new(ModelSpec::parse(text).unwrap());
+        let parameters = [0.7, by];
+        let starts = model.starts(&parameters);
+        let mut simulation = Simulation::<f64>::new(&model, &parameters, &starts, 0.0);
+        let every = 0.7 / 3.0 * (60.0 / rows as f64);
+        let input = |k: usize| (0.3 * k as f64 * every).sin();
+        let mut all = Vec::new();
+        for k in 0..rows {
+            let mut y = [0.0];
+            let (from, to) = ([input(k)], [input(k + 1)]);
+            simulation.read(&from, &mut y);
+            all.push(y[0]);
+            simulation
+                .advance(&from, &to, every * (k + 1) as f64)
+                .unwrap();
+        }
+        (all, simulation.method())
+    };
+    let bent = text("u - x").replace("delay(x, d)", "delay(max(x - 0.4, 0), d)");
+    for (text, method) in [(text("u - x"), Method::Exact), (bent, Method::Explicit)] {
+        for by in [0.1, 1.3] {
+            // The input of the finer rows is another one between those of the coarse ones: a smooth input differs little.
+            let (fine, _) = read(&text, by, 6000);
+            let (coarse, found) = read(&text, by, 600);
+            assert_eq!(found, method);
+            for (k, y) in coarse.iter().enumerate() {
+                let error = (y - fine[10 * k]).abs();
+                assert!(error < 1e-5, "{text} {by} {k}: {error}");
+            }
+        }
+    }
+    let text = text("u - x");
+    let (few, method) = read(&text, 0.5, 20);
+    assert_eq!(method, Method::Exact);
+    assert!(few.iter().all(|y| y.abs() < 2.0), "{few:?}");
+}
+
+/// A delay of zero has the derivative of a small one.
+#[test]
+fn the_derivative_by_a_delay_of_zero_is_one_sided() {
+    let none = outputs(&text("u - x"), [4.0, 0.0]);
+    let some = outputs(&text("u - x"), [4.0, 1e-6]);
+    for (k, (none, some)) in none.iter().zip(&some).enumerate().skip(1) {
+        let slope = (some.re - none.re) / 1e-6;
+        assert!(
+            (none.eps[1] - slope).abs() < 1e-4,
+            "{k}: {} {slope}",
+            none.eps[1]
+        );
     }
 }

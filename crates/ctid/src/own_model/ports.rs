@@ -129,7 +129,7 @@ fn sheet(file: &OwnModelFile, here: &[&Candidate], words: &EffectWords, look: Lo
         let declared = declared.iter().find(|known| known.name == own.short);
         let absent = match declared {
             Some(declared) => declared.absent.to_string(),
-            None if own.role == Role::Size => "0".to_string(),
+            None if matches!(own.role, Role::Size | Role::Threshold) => "0".to_string(),
             None => String::new(),
         };
         [

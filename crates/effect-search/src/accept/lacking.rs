@@ -2,8 +2,8 @@
 //!
 //! Near an unstable equilibrium, or over many turns of a shaft, the least change of a torque moves the simulation far away: without even a
 //! small effect, a fit that begins at the other estimates may end in another minimum, and the effect seems necessary. To first order the rise
-//! of the deviance is the Wald statistic of the effect's sizes. Where it is far more, the sizes become smaller step by step, and all other
-//! parameters follow.
+//! of the deviance is the Wald statistic of the effect's sizes. Where it is far more, the sizes become smaller step by step, and the
+//! parameters of the model and of the other effects follow.
 
 use ct_model::effects::Role;
 use estimation::{Noise, Residuals, fit_from, linearise, within};
@@ -48,8 +48,13 @@ impl Context<'_> {
         })
     }
 
-    /// The Wald statistic of the sizes of a set's effect, and their number: `None` without a size, or without a standard error of one.
+    /// The Wald statistic of the sizes of a set's effect, as if these were uncorrelated, and their number: `None` without a size, without a
+    /// standard error of one, and for an effect with a threshold, which acts without them.
     pub fn wald(&self, node: &Node, position: usize) -> Option<(f64, usize)> {
+        let mut own = self.candidates[node.added[position]].parameters.iter();
+        if own.any(|parameter| parameter.role == Role::Threshold) {
+            return None;
+        }
         let errors = node.fit.std_errors();
         let sizes = self.sizes_of(node, position);
         let squares = sizes.iter().map(|&(at, absent)| {
@@ -89,7 +94,9 @@ impl Context<'_> {
         for share in SHARES {
             let to = |at: usize, absent: f64| absent + share * (node.fit.x[at] - absent);
             // To first order, where the others are then: the other parameters of the effect stay.
-            if let Some(mut triangle) = linearise(&setup, &x, noise) {
+            if let Some(triangle) = linearise(&setup, &x, noise) {
+                // Its outputs keep their weights: the additional rows belong to none.
+                let mut triangle = triangle.damped(&vec![1.0; free.len()], 0.0);
                 for &(at, absent) in &sizes {
                     let Some(column) = free.iter().position(|&free| free == at) else {
                         continue;
@@ -141,6 +148,7 @@ mod tests {
       parameter Real p = 1;
       input Real u;
       output Real y = sin(phase) + 0*u;
+      output Real z = cos(phase);
       Real phase = p*time;
     end Oscillation;";
 
@@ -150,12 +158,20 @@ mod tests {
         let time: Vec<f64> = (0..500).map(|k| 0.05 * f64::from(k)).collect();
         let u: Vec<f64> = (0..500).map(|k| f64::from(k / 20 * 7 % 13)).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let noise = noise::ar1(500, 0.1, 0.0, &mut rng);
-        let rows = time.iter().zip(&u).zip(noise);
-        let y = rows.map(|((t, u), e)| ((1.0 + 0.9 * (1.0 + 1e-4 * u)) * t).sin() + e);
+        let mut noise = || noise::ar1(500, 0.1, 0.0, &mut rng);
+        let phases = time.iter().zip(&u);
+        let phases = phases.map(|(t, u)| (1.0 + 0.9 * (1.0 + 1e-4 * u)) * t);
+        let y = phases
+            .clone()
+            .zip(noise())
+            .map(|(phase, e)| phase.sin() + e);
+        let z = phases.zip(noise()).map(|(phase, e)| phase.cos() + e);
         let record = Record {
             name: "record".to_string(),
-            outputs: vec![Channel::new("y", "", y.collect())],
+            outputs: vec![
+                Channel::new("y", "", y.collect()),
+                Channel::new("z", "", z.collect()),
+            ],
             inputs: vec![Channel::new("u", "", u)],
             time,
             ..Record::default()
@@ -176,7 +192,7 @@ mod tests {
         let (context, _) = begin(&problem, &options, Limit::new(&options)).unwrap();
         let added = context.candidates.iter().position(|c| c.id == "more");
         let model = Arc::new(context.model(&[added.unwrap()]).unwrap());
-        let white = Noise::white(1);
+        let white = Noise::white(2);
         let starts = vec![vec![1.0, 0.9]];
         let set = context.fitted(vec![added.unwrap()], model, starts, &white, FINE);
         let set = set.unwrap();

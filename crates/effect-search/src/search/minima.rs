@@ -4,8 +4,7 @@
 //! set grows, an effect explains a part of the error together with others that are replaced later, and its fit may stay in a minimum that is
 //! not the lowest in combination with the final ones.
 //!
-//! Tried are the effects that the search added. Those of the model file are fitted from their own starts only, and terms of the user's own have
-//! no thresholds.
+//! Tried are the effects that the search added. Those of the model file are fitted from their own starts only.
 
 use ct_model::effects::{Candidate, Role};
 use estimation::{Noise, Residuals, linearise, within};

@@ -318,7 +318,7 @@ impl Search<'_> {
         };
         // For a candidate of the user's own, the parameter that is zero if the effect is absent, if there is one.
         let is_size = |(_, p): &&(usize, &ct_model::effects::EffectParameter)| {
-            candidate.effect.is_none() && p.role == Role::Size
+            candidate.effect.is_none() && matches!(p.role, Role::Size | Role::Threshold)
         };
         let mut sized = own.iter().filter(leading);
         let (at, parameter) = sized.find(is_size).or_else(|| own.iter().find(leading))?;

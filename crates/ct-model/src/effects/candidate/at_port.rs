@@ -136,7 +136,8 @@ pub(super) fn candidate(
             .map_or((Role::Size, Starts::Values(&[])), |(_, role, starts)| {
                 (*role, *starts)
             });
-        // Even the smallest delay of a direct feedthrough shifts the reading by one row.
+        // Even the smallest delay of a direct feedthrough shifts the reading by one row. A reading is always read directly: its delay has a
+        // grid of starts too.
         let jumps = effect.id == "delay" && spec.is_read_directly(signal);
         let role = if jumps { Role::Threshold } else { role };
         EffectParameter {

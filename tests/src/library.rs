@@ -84,6 +84,33 @@ impl Job {
             self.number
         )
     }
+    /// The record of a name, whichever others a study makes; `None` if the name is not that of a record of this kind.
+    #[must_use]
+    pub fn of_name(kind: &'static str, name: &str, models: &[DrivenModel]) -> Option<Self> {
+        let (model, rest) = name.split_once(": ")?;
+        let parts: Vec<&str> = rest.rsplitn(5, ", ").collect();
+        let &[number, drive, noise, ratio, hidden] = &parts[..] else {
+            return None;
+        };
+        let job = Self {
+            model: models.iter().position(|of| of.name == model)?,
+            kind,
+            hidden: match kind {
+                "clean" => Hidden::Nothing,
+                "outside" => Hidden::Outside(
+                    outside::KINDS
+                        .iter()
+                        .position(|of| of.to_string() == hidden)?,
+                ),
+                _ => Hidden::Effects(hidden.split(" and ").map(String::from).collect()),
+            },
+            ratio: ratio.strip_suffix('x')?.parse().ok()?,
+            coloured: noise == "coloured",
+            closed: drive == "closed",
+            number: number.parse().ok()?,
+        };
+        (job.name(models) == name).then_some(job)
+    }
 }
 
 /// Diagnosis of a record.

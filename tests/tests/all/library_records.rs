@@ -3,17 +3,13 @@
 #![allow(clippy::unwrap_used)]
 
 use ctid_examples::model_records::driven_models;
-use ctid_tests::library::{Outcome, jobs, outcome};
+use ctid_tests::library::{Job, Outcome, outcome};
 use effect_search::{Options, Verdict};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
-fn of_record(kind: &str, name: &str, seed: u64) -> Outcome {
+fn of_record(kind: &'static str, name: &str, seed: u64) -> Outcome {
     let models = driven_models().unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut all = jobs(&models, &[], &[1.0, 3.0], 1, &mut rng).into_iter();
-    let job = all.find(|job| job.kind == kind && job.name(&models) == name);
-    let found = outcome(&job.unwrap(), &models, seed, &Options::default(), false).unwrap();
+    let job = Job::of_name(kind, name, &models).unwrap();
+    let found = outcome(&job, &models, seed, &Options::default(), false).unwrap();
     println!("{name}: {}", found.told);
     found
 }

@@ -91,7 +91,7 @@ fn it_says_what_can_act_where() {
     let said = text.split_whitespace().collect::<Vec<_>>().join(" ");
     for part in [
         "inputs u, Ta: delay, nonlinearity, dead_zone, saturation, gain_drift, backlash, lag",
-        "outputs y: lag, nonlinearity, saturation, hysteresis, drift, offset, quantisation",
+        "outputs y: lag, delay, nonlinearity, saturation, hysteresis, drift, offset, quantisation",
         "balances T: constant, loss, step, periodic, hidden_state, limit",
         "parameters C, k, g: drift, step, varies_with(p,x)",
     ] {

@@ -131,7 +131,8 @@ fn an_effect_without_a_derivative_where_it_is_absent_has_none() {
             "quantisation",
         ]
         .iter()
-        .any(|name| one.effect.starts_with(&format!("{name}(")));
+        .any(|name| one.effect.starts_with(&format!("{name}(")))
+            || one.effect == "delay(y)";
         assert_eq!(one.visibility.is_none(), is_threshold, "{}", one.effect);
         assert!(one.smallest_visible.is_none_or(|size| size > 0.0));
     }

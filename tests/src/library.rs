@@ -84,6 +84,7 @@ impl Job {
             self.number
         )
     }
+
     /// The record of a name, whichever others a study makes; `None` if the name is not that of a record of this kind.
     #[must_use]
     pub fn of_name(kind: &'static str, name: &str, models: &[DrivenModel]) -> Option<Self> {

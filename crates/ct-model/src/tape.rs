@@ -181,6 +181,10 @@ impl Tape {
     /// For each delay, whether outputs alone read it, and its signal is smooth between the rows: made of states, parameters and time, with
     /// branches that parameters alone decide.
     pub fn delays_of_outputs(&self) -> Vec<bool> {
+        // Every simulation asks, and few models delay anything.
+        if self.delays.is_empty() {
+            return Vec::new();
+        }
         let stored = self.first_delayed..self.first_constant;
         let inputs = self.input(0)..self.state(0);
         let by_parameters = |&branch: &usize| {
@@ -203,7 +207,8 @@ impl Tape {
         let read: Vec<Register> = read.chain(plays).chain(inner).collect();
         let is_of_output = |(i, &(what, _)): (usize, &(Register, Register))| {
             let delayed = self.delayed(i);
-            let without = self.made_of_any(|register| register != delayed);
+            // Whichever branches are taken.
+            let without = self.made_without(|register| register != delayed, |_| false);
             smooth[what] && read.iter().all(|&register| without[register])
         };
         self.delays.iter().enumerate().map(is_of_output).collect()
@@ -215,11 +220,7 @@ impl Tape {
         self.made_without(these, selects)
     }
 
-    /// Registers that depend on these variables alone, conditions aside.
-    fn made_of_any(&self, these: impl Fn(Register) -> bool) -> Vec<bool> {
-        self.made_without(these, |_| false)
-    }
-
+    /// Registers that depend on these variables alone, conditions aside, and on no operation that is left out.
     fn made_without(
         &self,
         these: impl Fn(Register) -> bool,

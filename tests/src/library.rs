@@ -98,11 +98,7 @@ impl Job {
             kind,
             hidden: match kind {
                 "clean" => Hidden::Nothing,
-                "outside" => Hidden::Outside(
-                    outside::KINDS
-                        .iter()
-                        .position(|of| of.to_string() == hidden)?,
-                ),
+                "outside" => Hidden::Outside(outside::KINDS.iter().position(|&of| of == hidden)?),
                 _ => Hidden::Effects(hidden.split(" and ").map(String::from).collect()),
             },
             ratio: ratio.strip_suffix('x')?.parse().ok()?,

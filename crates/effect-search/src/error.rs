@@ -21,9 +21,9 @@ pub enum Error {
     /// Effects that exclude each other.
     #[error(transparent)]
     Apply(#[from] ct_model::effects::ApplyError),
-    /// The simulation of the fitted model.
-    #[error(transparent)]
-    Simulation(#[from] ct_model::NoSolution),
+    /// The simulation of the fitted model cannot go on.
+    #[error("the simulation of the fitted model cannot go on")]
+    NoSimulation,
     /// An experiment that cannot be proposed.
     #[error(transparent)]
     Design(#[from] crate::design::NoExperiment),
@@ -77,7 +77,7 @@ impl Error {
             Self::Estimation(error) => error.worded(&names.records, names.known),
             Self::Own(_)
             | Self::Apply(_)
-            | Self::Simulation(_)
+            | Self::NoSimulation
             | Self::Design(_)
             | Self::TimeUnit { .. }
             | Self::Unstable { .. }

@@ -18,7 +18,7 @@ mod search;
 mod thresholds;
 
 pub use accept::quantisation::Quantisation;
-pub use base::control_loop::{ControlLoop, Enclosed, NotSimulated, enclose, widened};
+pub use base::control_loop::{ControlLoop, Enclosed, NotSimulated, enclose, needed_loop, widened};
 pub use base::gaps::{FIRST_HOLD, LONGEST_HOLD, MendedGaps, PriorKnowledge, Whole, mend};
 pub use base::problem::{Kept, Options, Problem};
 pub use base::problem_builder::ProblemBuilder;

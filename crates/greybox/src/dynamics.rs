@@ -140,8 +140,8 @@ impl Entries<'_> {
                 let model = instant.read[output].value();
                 let measured = record.outputs[output].values[k];
                 row[columns - 1] = measured - model;
-                if let Some((response, _)) = &response {
-                    response.add_to(output, &mut row);
+                if let Some((response, _)) = &mut response {
+                    response.add_to(output, &mut row, measured.is_nan());
                 }
                 let sample = Sample {
                     output,

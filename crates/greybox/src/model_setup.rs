@@ -75,7 +75,8 @@ impl<'a> ModelSetup<'a> {
         Ok(self)
     }
 
-    /// The model and clock with other records, every parameter fixed at its value in a fitted vector: only initial states are fitted.
+    /// The model and clock with other records, every parameter fixed at its value in a fitted vector: only initial states are fitted. A model
+    /// that needs its loop runs in the loop of these records.
     ///
     /// # Errors
     /// As [`ModelSetup::new`].
@@ -88,7 +89,11 @@ impl<'a> ModelSetup<'a> {
         let known: BTreeMap<String, f64> = known.zip(x.iter().copied()).collect();
         let mut setup = ModelSetup::new(self.model, records, &known, self.time_unit)?;
         setup.clock = self.clock.with_records(records);
-        Ok(setup.with_tolerance(self.tolerance).limited_as(self))
+        let setup = setup.with_tolerance(self.tolerance).limited_as(self);
+        Ok(match &self.simulated_loop {
+            Some(of) if of.is_needed() => setup.in_loop(Arc::new(of.with_records(records)?)),
+            _ => setup,
+        })
     }
 
     /// The model, clock and fitted parameters with other records, without priors.

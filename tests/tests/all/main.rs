@@ -19,3 +19,4 @@ mod stabilized_oe;
 mod three_tank;
 mod traps;
 mod unknown;
+mod unstable_in_loop;

@@ -200,9 +200,7 @@ impl Visited {
         time_unit: &str,
     ) -> Result<Self, NoSolution> {
         let mut shown = spec.clone();
-        let states = (0..spec.states.len()).map(Variable::State);
-        let flows = (0..spec.flows.len()).map(Variable::Flow);
-        let all: Vec<Variable> = states.chain(flows).collect();
+        let all = Self::simulated(spec);
         let outputs = all.iter().map(|&variable| Output { variable });
         shown.outputs = outputs.collect();
         let model = Model::new(shown);
@@ -219,11 +217,35 @@ impl Visited {
                 simulation.advance(now, now, time[k + 1])?;
             }
         }
-        let by_rows = |i: usize| inputs.iter().map(|row| row[i]).collect::<Vec<f64>>();
-        let of_inputs = (0..spec.inputs.len()).map(|i| (Variable::Input(i), by_rows(i)));
-        let spans = of_inputs.chain(all.into_iter().zip(values));
+        let by_rows = |i: usize| inputs.iter().map(|row| row[i]).collect();
+        let inputs = (0..spec.inputs.len()).map(by_rows).collect();
+        let series = all.into_iter().zip(values).collect();
+        Ok(Self::of_series(series, inputs, time, time_unit))
+    }
+
+    /// The variables of a simulation whose ranges are needed: states, then flows.
+    #[must_use]
+    pub fn simulated(spec: &ModelSpec) -> Vec<Variable> {
+        let states = (0..spec.states.len()).map(Variable::State);
+        let flows = (0..spec.flows.len()).map(Variable::Flow);
+        states.chain(flows).collect()
+    }
+
+    /// Ranges of the series of a record: simulated variables, and inputs in their order. `time` \[the model's unit\] of the rows;
+    /// `time_unit`: its name.
+    #[must_use]
+    pub fn of_series(
+        series: Vec<(Variable, Vec<f64>)>,
+        inputs: Vec<Vec<f64>>,
+        time: &[f64],
+        time_unit: &str,
+    ) -> Self {
+        let inputs = inputs.into_iter().enumerate();
+        let spans = inputs.map(|(i, values)| (Variable::Input(i), values));
+        let spans = spans.chain(series);
+        let begin = time.first().copied().unwrap_or(0.0);
         let duration = time.last().copied().unwrap_or(begin) - begin;
-        Ok(Self {
+        Self {
             spans: spans
                 .filter_map(|(variable, values)| Some((variable, Span::of(&values)?)))
                 .collect(),
@@ -235,7 +257,7 @@ impl Visited {
                 1.0
             },
             time_unit: time_unit.to_string(),
-        })
+        }
     }
 
     /// Joins the range of another record to this one.

@@ -227,7 +227,7 @@ pub(crate) fn remaining(file: &OwnModelFile, diagnosis: &Diagnosis) -> Vec<Strin
     let known = diagnosis.control_loop.iter();
     all.extend(known.map(|known| file.loop_sentence(known, &MessageNames::PROGRAM)));
     let mut known = diagnosis.control_loop.iter();
-    if known.any(|known| known.simulated) && diagnosis.not_noise.is_some() {
+    if known.any(|known| known.simulated && !known.needed) && diagnosis.not_noise.is_some() {
         all.push("The errors and estimates of the models are those of fits on the measured inputs; the effects were found in the simulated loop.".to_string());
     }
     if !diagnosis.left_out.is_empty() {

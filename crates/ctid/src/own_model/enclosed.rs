@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use effect_search::{ControlLoop, NotSimulated, Thresholds, enclose};
+use effect_search::{ControlLoop, NotSimulated, Thresholds, enclose, needed_loop};
 use greybox::{Fit, FitOptions, ModelSetup, SimulatedLoop};
 
 use super::blame::blame_search;
@@ -15,6 +15,21 @@ const SAME_ERROR: f64 = 0.005;
 
 /// A fit in the loop of its records, if that can be simulated; the loop, and what is known of it.
 pub(super) type InLoop = (Fit, Option<Arc<SimulatedLoop>>, Option<ControlLoop>);
+
+/// A setup in the loop of its records, if the model does not follow them on the measured inputs.
+pub(super) fn in_needed_loop<'a>(
+    file: &OwnModelFile,
+    records: &Records,
+    setup: ModelSetup<'a>,
+) -> Result<ModelSetup<'a>, Error> {
+    let controllers = file.loop_controllers(records)?;
+    Ok(
+        match needed_loop(&setup, &controllers, &Thresholds::DEFAULT) {
+            Some(needed) => setup.in_loop(needed),
+            None => setup,
+        },
+    )
+}
 
 /// Closes the loop around a fitted model, if that can be simulated.
 pub(super) fn in_loop(
@@ -37,7 +52,8 @@ pub(super) fn in_loop(
     let how = (options.stopping, &Thresholds::DEFAULT);
     let enclosed = enclose(setup, fit.clone(), of_loop, !timed, how);
     let enclosed = enclosed.map_err(|error| blame_search(&records.records, error))?;
-    if let Some((change, output)) = enclosed.change_of_error(&fit)
+    if !enclosed.setup.is_run_in_loop()
+        && let Some((change, output)) = enclosed.change_of_error(&fit)
         && change.abs() > SAME_ERROR
         && enclosed.depends_on_external_signals()
     {

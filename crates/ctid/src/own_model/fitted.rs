@@ -14,7 +14,7 @@ use greybox::{
 use missing_effect::Effort;
 
 use super::blame::{blame, blame_search};
-use super::enclosed::in_loop;
+use super::enclosed::{in_loop, in_needed_loop};
 use super::file::{OwnModelFile, Records};
 use crate::findings::{self, Reader};
 use crate::{Error, MessageNames};
@@ -102,6 +102,10 @@ impl FittedModel {
             time.leave_out("steps of the fits of the effects");
         }
         let setup = setup.with_time_limit(time.clone(), limit.interrupt);
+        let setup = match simulate_loop {
+            true => in_needed_loop(file, &records, setup)?,
+            false => setup,
+        };
         let fit = setup.fit(options);
         let fit = fit.map_err(|error| blame(&records.records, error))?;
         let (fit, simulated_loop, control_loop) =
@@ -148,6 +152,7 @@ impl FittedModel {
                 file.base.name
             )));
         }
+        let setup = in_needed_loop(file, &records, setup)?;
         let (_, simulated_loop, control_loop) =
             in_loop(file, &records, (setup, fit.clone()), (options, true))?;
         Ok(Self {

@@ -11,6 +11,11 @@ const MEASURED: &str = "The model runs on the measured command, which contains f
 pub fn of_the_loop(known: &ControlLoop, input_unit: &str, names: &MessageNames) -> String {
     let said = |error: &greybox::Error| error.worded(&names.fit);
     let mismatch = known.mismatch.unwrap_or(f64::NAN);
+    if known.simulated && known.needed {
+        return format!(
+            "The model is unstable without its controller and does not follow the record on the measured command. All simulations run in the loop, from its reference. The measured command differs from that of the controller by {mismatch:.4} {input_unit} rms."
+        );
+    }
     if known.simulated {
         return format!(
             "The loop is simulated from its reference, so noise that is fed back through the command does not enter the model. The measured command differs from that of the controller by {mismatch:.4} {input_unit} rms."
@@ -68,7 +73,7 @@ pub fn of_the_loop(known: &ControlLoop, input_unit: &str, names: &MessageNames) 
             names.diagnose
         ),
         NotSimulated::OtherController { share } => format!(
-            "the measured command disagrees with {}, R/S (r - y), by {mismatch:.3} {input_unit} rms, {:.0} % of its variation: check gain, integral_time (s), u_min and u_max, the sign, and that u is the command as it was recorded",
+            "the measured command disagrees with {}, R/S (r - y), by {mismatch:.3} {input_unit} rms, {:.0} % of its variation: check gain, integral_time and its unit, u_min and u_max, the sign, and that u is the command as it was recorded",
             names.controller,
             100.0 * share
         ),
@@ -124,6 +129,7 @@ mod tests {
         ] {
             let known = ControlLoop {
                 simulated: false,
+                needed: false,
                 feedback_p: None,
                 mismatch: None,
                 not_simulated: Some(why),

@@ -124,6 +124,7 @@ fn the_order_of_remarks_does_not_depend_on_that_of_the_values() {
     }
     found.control_loop = Some(ControlLoop {
         simulated: true,
+        needed: false,
         feedback_p: None,
         mismatch: Some(0.0123),
         not_simulated: None,
@@ -155,6 +156,7 @@ fn a_loop_without_a_reason_is_not_called_simulated() {
     let mut found = sample::comparison();
     found.control_loop = Some(ControlLoop {
         simulated: false,
+        needed: false,
         feedback_p: None,
         mismatch: None,
         not_simulated: None,
@@ -169,6 +171,7 @@ fn a_loop_that_is_not_simulated_says_why() {
     let mut last = |why: NotSimulated, mismatch: Option<f64>| {
         found.control_loop = Some(ControlLoop {
             simulated: false,
+            needed: false,
             feedback_p: None,
             mismatch,
             not_simulated: Some(why),

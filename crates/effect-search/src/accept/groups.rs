@@ -93,8 +93,9 @@ impl Context<'_> {
         let mut others = best_first(fine.collect());
         let of_users = others.iter().any(|node| self.ends_in_own(node));
         let own_last = of_users.then(|| self.in_limited_noise(last)).transpose()?;
+        let of_last = self.own_deviance(last);
         others.retain(|node| {
-            let deviance = (node.fit.deviance - last.fit.deviance) / slowness;
+            let deviance = (self.own_deviance(node) - of_last) / slowness;
             let further = node.fit.parameters as f64 - last.fit.parameters as f64;
             let bic = deviance + further * (self.samples() / slowness).ln();
             // With as many parameters or fewer, the deviances are compared; additional parameters have to lower the criterion.

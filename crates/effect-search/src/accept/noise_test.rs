@@ -15,12 +15,20 @@ use crate::residual_tests::{InputDependence, NotNoise};
 impl Context<'_> {
     /// The first property of a set's residual that noise does not have, `None` if the residual is noise; `own` is the set's fit with the noise
     /// model of its own residual. In a simulated loop the residual on the measured inputs must not be noise either: a linearised plant takes
-    /// out the noise that controllers feed back, and of a nonlinear plant a part remains.
+    /// out the noise that controllers feed back, and of a nonlinear plant a part remains. For a model that needs its loop it is the residual
+    /// with the gain that suits this set.
     pub fn not_noise(&self, node: &Node, own: &Fit) -> Result<Option<NotNoise>, Error> {
         let found = self.property_unlike_noise(node, own)?;
-        if let (Some(_), Some(measured)) = (&found, self.on_measured_inputs()) {
-            let own = measured.in_own_noise(node)?;
-            if measured.property_unlike_noise(node, &own)?.is_none() {
+        if found.is_none() {
+            return Ok(None);
+        }
+        let other = match self.needs_loop() {
+            true => self.following_anew(node)?.map(|(search, _)| search),
+            false => self.on_measured_inputs(),
+        };
+        if let Some(other) = other {
+            let own = other.in_own_noise(node)?;
+            if other.property_unlike_noise(node, &own)?.is_none() {
                 return Ok(None);
             }
         }

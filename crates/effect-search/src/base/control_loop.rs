@@ -23,6 +23,9 @@ const STEP_RESPONSE: usize = 50;
 pub struct ControlLoop {
     /// The loop was simulated from its reference; otherwise the model ran on the measured command.
     pub simulated: bool,
+    /// The model does not follow the records on its measured inputs: all its simulations run in the loop.
+    #[serde(default)]
+    pub needed: bool,
     /// p-value of the hypothesis that the command does not depend on the noise; `None` if a controller is known.
     pub feedback_p: Option<f64>,
     /// Measured command minus the controller's output for the measured reading, root mean square, in the input's unit; `None` if not
@@ -130,6 +133,7 @@ impl ControlLoop {
     pub fn measured(why: NotSimulated) -> Self {
         Self {
             simulated: false,
+            needed: false,
             feedback_p: None,
             mismatch: None,
             not_simulated: Some(why),
@@ -141,6 +145,7 @@ impl ControlLoop {
     pub fn simulated(mismatch: f64) -> Self {
         Self {
             simulated: true,
+            needed: false,
             feedback_p: None,
             mismatch: Some(mismatch),
             not_simulated: None,
@@ -232,7 +237,28 @@ pub struct Enclosed<'a> {
     pub control_loop: Option<ControlLoop>,
 }
 
-/// Closes the loop around a fitted model if possible, and tests for feedback if no controller is known.
+/// The loop of a model that does not follow its records on the measured inputs at its start values, where the loop can be simulated: the first
+/// fit takes place in it.
+#[must_use]
+pub fn needed_loop(
+    setup: &ModelSetup,
+    controllers: &[LoopController],
+    thresholds: &Thresholds,
+) -> Option<Arc<SimulatedLoop>> {
+    let start = setup.start();
+    if controllers.is_empty()
+        || setup.follows_inputs(start)
+        || lacking(setup.records(), controllers, thresholds.lacking_readings).is_some()
+    {
+        return None;
+    }
+    let found = SimulatedLoop::needed(setup, start, controllers).ok()?;
+    ControlLoop::mismatch_of(found.replays().iter().flatten(), thresholds).ok()?;
+    Some(Arc::new(found))
+}
+
+/// Closes the loop around a fitted model if possible, and tests for feedback if no controller is known. A model that was fitted in its loop
+/// ([`needed_loop`]) is fitted again with the loop's linear response at the fitted values.
 ///
 /// - `controllers`: those that drove the inputs; `simulate`: whether their loop is simulated.
 /// - `may_test`: the feedback test can be used. A function of time that was fitted to the records has also fitted their noise, with future
@@ -264,7 +290,8 @@ pub fn enclose<'a>(
     if !simulate {
         return measured(setup, fit, why(NotSimulated::AsRequested));
     }
-    if let Some(hard) = hard_nonlinearity(&setup, &fit.x, controllers) {
+    let is_needed = setup.is_run_in_loop();
+    if !is_needed && let Some(hard) = hard_nonlinearity(&setup, &fit.x, controllers) {
         return measured(setup, fit, why(hard));
     }
     if let Some(record) = lacking(setup.records(), controllers, thresholds.lacking_readings) {
@@ -283,7 +310,8 @@ pub fn enclose<'a>(
         Err(other) => return measured(setup, fit, Some(other)),
     };
     let rows = setup.records().iter().map(Record::len).max().unwrap_or(0);
-    if let Some((radius, alone)) = simulated.radius()
+    if !is_needed
+        && let Some((radius, alone)) = simulated.radius()
         && (radius.ln() - alone.ln().max(0.0)) * rows as f64 > thresholds.loop_growth
     {
         let radius = Some(radius);
@@ -292,10 +320,14 @@ pub fn enclose<'a>(
     let closed = setup.clone().in_loop(Arc::new(simulated));
     match fit_from(&closed, vec![fit.x.clone().into()], &fit.noise, stopping) {
         Ok(again) => {
-            let again = closed.with_measured_errors(again.continuing(&fit));
-            measured(closed, again, Some(ControlLoop::simulated(mismatch)))
+            let again = closed.with_simulation_errors(again.continuing(&fit));
+            let known = ControlLoop {
+                needed: is_needed,
+                ..ControlLoop::simulated(mismatch)
+            };
+            measured(closed, again, Some(known))
         }
-        Err(estimation::Error::NoFiniteStart { .. }) => {
+        Err(estimation::Error::NoFiniteStart { .. }) if !is_needed => {
             measured(setup, fit, why(NotSimulated::Unstable { radius: None }))
         }
         Err(error) => Err(error.into()),

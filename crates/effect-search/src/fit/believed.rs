@@ -18,7 +18,7 @@ use greybox::{FitOptions, ModelSetup, possible_reading_steps};
 use statrs::statistics::Statistics;
 
 use crate::Error;
-use crate::base::control_loop::enclose;
+use crate::base::control_loop::{enclose, needed_loop};
 use crate::base::problem::{Kept, Limit, Options, Problem};
 use crate::fit::node::{Context, FINE, Node};
 
@@ -110,6 +110,14 @@ pub(crate) fn begin<'a>(
         ..FitOptions::default()
     };
     let model = Arc::new(Model::new(problem.spec.clone()));
+    if options.simulate_loop {
+        let needed = needed_loop(
+            &context.setup(&model)?,
+            &problem.controllers,
+            &options.thresholds,
+        );
+        context.simulated_loop = needed;
+    }
     // The model is compared with sets of effects and needs their criterion, in which every output has a variance of its own: `fit` weights the
     // outputs by their noise.
     let fit = context.setup(&model)?.fit(&fit_options)?;
@@ -123,7 +131,9 @@ pub(crate) fn begin<'a>(
         bare = context.refitted(&bare, &white, FINE)?;
     }
     bare = context.enclosed(bare, options)?;
-    require_stable(&context.setup(&model)?, &bare.fit)?;
+    if !context.needs_loop() {
+        require_stable(&context.setup(&model)?, &bare.fit)?;
+    }
     let (visited, tolerance) = {
         let (setup, fit) = (context.setup(&bare.model)?, &bare.fit);
         let visited = visited(problem, &setup, fit)?;
@@ -212,8 +222,6 @@ impl<'a> Context<'a> {
 
 /// Growth of a deviation over a record, as a power of e, beyond which no initial state is known well enough for a simulation.
 const GROWS: f64 = 23.0;
-/// The same, for which a simulation follows well.
-const FOLLOWS: f64 = 7.0;
 
 /// A simulation diverges if it leaves the range of the readings by this multiple of it.
 const FAR: f64 = 100.0;
@@ -239,7 +247,7 @@ fn require_stable(setup: &ModelSetup, fit: &Fit) -> Result<(), Error> {
                 error: *error,
                 varies,
                 growth_time,
-                longest: FOLLOWS * growth_time,
+                longest: ModelSetup::longest_followed(growth_time),
             });
         }
     }
@@ -263,21 +271,19 @@ fn diverges(setup: &ModelSetup) -> bool {
 
 /// Ranges that the fitted model visits in all records.
 fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
-    let (count, states) = (setup.parameter_count(), problem.spec.states.len());
     let mut all: Option<Visited> = None;
+    let variables = Visited::simulated(&problem.spec);
+    let series = setup.simulate_variables(&fit.x, &variables);
+    let mut series = series.ok_or(Error::NoSimulation)?.into_iter();
     for (r, record) in problem.records.iter().enumerate() {
-        let time = setup.model_time(r);
-        let inputs: Vec<Vec<f64>> = (0..record.len())
-            .map(|k| record.inputs.iter().map(|input| input.values[k]).collect())
-            .collect();
-        let initial = &fit.x[count + r * states..count + (r + 1) * states];
-        let own = Visited::of_simulation(
-            &problem.spec,
-            (&fit.x[..count], initial),
-            &time,
-            &inputs,
+        let inputs = record.inputs.iter().map(|input| input.values.clone());
+        let series = variables.iter().copied().zip(series.by_ref());
+        let own = Visited::of_series(
+            series.collect(),
+            inputs.collect(),
+            &setup.model_time(r),
             &problem.time_unit_name,
-        )?;
+        );
         match &mut all {
             None => all = Some(own),
             Some(all) => all.join(&own),

@@ -94,17 +94,46 @@ impl Context<'_> {
         Ok(Model::new(apply(&self.problem.spec, &effects)?))
     }
 
-    /// The same search with the measured inputs; `None` if no loop is simulated.
+    /// Whether the model does not follow its records on the measured inputs, so that all simulations run in the loop.
+    pub fn needs_loop(&self) -> bool {
+        self.simulated_loop
+            .as_ref()
+            .is_some_and(|of| of.is_needed())
+    }
+
+    /// The same search with the measured inputs; `None` if no loop is simulated, or the model needs it.
     pub fn on_measured_inputs(&self) -> Option<Self> {
-        self.simulated_loop.as_ref()?;
+        self.simulated_loop.as_ref().filter(|of| !of.is_needed())?;
         let mut measured = self.clone();
         measured.simulated_loop = None;
         Some(measured)
     }
 
-    /// Why a set is not simulated in the loop of this search: a hard nonlinearity.
+    /// The same search with the response of the loop that suits the residual of a set ([`SimulatedLoop::following_anew`]), and the fall of the
+    /// deviance of the set; `None` if the model does not need its loop, or the present response suits the set.
+    pub fn following_anew(&self, set: &Node) -> Result<Option<(Self, f64)>, Error> {
+        let setup = self.setup(&set.model)?;
+        let anew = self.simulated_loop.as_ref().filter(|of| of.is_needed());
+        let anew = anew.and_then(|of| of.following_anew(&setup, &set.fit.x));
+        let with = |(anew, fall)| {
+            let search = Self {
+                simulated_loop: Some(Arc::new(anew)),
+                ..self.clone()
+            };
+            (search, fall)
+        };
+        Ok(anew.map(with))
+    }
+
+    /// Deviance of a set, of a model that needs its loop with the response that suits the set: that of the search suits the believed model.
+    pub fn own_deviance(&self, set: &Node) -> f64 {
+        let anew = self.following_anew(set).ok().flatten();
+        set.fit.deviance - anew.map_or(0.0, |(_, fall)| fall)
+    }
+
+    /// Why a set is not simulated in the loop of this search: a hard nonlinearity. A model that needs its loop is simulated in any case.
     pub fn hard_nonlinearity(&self, set: &Node) -> Result<Option<NotSimulated>, Error> {
-        let Some(simulated) = &self.simulated_loop else {
+        let Some(simulated) = self.simulated_loop.as_ref().filter(|of| !of.is_needed()) else {
             return Ok(None);
         };
         let setup = self.setup(&set.model)?;
@@ -171,7 +200,7 @@ impl Context<'_> {
         let setup = self.setup(&model)?;
         let starts = starts.into_iter().map(Start::from).collect();
         let fit = fit_from(&setup, starts, noise, stopping)?;
-        let fit = setup.with_measured_errors(fit);
+        let fit = setup.with_simulation_errors(fit);
         Ok(Node { added, model, fit })
     }
 

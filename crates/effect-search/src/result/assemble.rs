@@ -59,15 +59,19 @@ pub(crate) fn assemble(
     let outputs = &problem.records[0].outputs;
     let floors = context.noise_levels(own);
     // All models of the error ladder are fitted on the measured inputs with white noise, each output scaled by its noise, so that their
-    // errors are comparable. The last model is fitted again in its loop, with its own noise model, if its residual is noise.
+    // errors are comparable. The last model is fitted again in its loop, with its own noise model, if its residual is noise. A model that needs
+    // its loop runs in it always.
     let white = Noise::white(outputs.len());
-    let measured = Context {
-        simulated_loop: None,
-        control_loop: context
-            .control_loop
-            .as_ref()
-            .map(|_| ControlLoop::measured(NotSimulated::AsRequested)),
-        ..context.clone()
+    let measured = match context.needs_loop() {
+        true => context.clone(),
+        false => Context {
+            simulated_loop: None,
+            control_loop: context
+                .control_loop
+                .as_ref()
+                .map(|_| ControlLoop::measured(NotSimulated::AsRequested)),
+            ..context.clone()
+        },
     };
     let weighted = Context {
         scales: (outputs.len() > 1).then(|| floors.clone()),

@@ -13,6 +13,9 @@
 //! and contain no noise, so the estimate is an instrumental-variable estimate: unbiased for any spectrum of `v` and any `P0`, which affects
 //! the variance only. The determinant of the map from `y` to `v` is one, so likelihoods can be compared.
 //!
+//! The response of an unstable `P0` would grow. It follows the residual with a gain, as a Kalman filter does: the residual is then the
+//! innovation, `v` through an all-pass filter with the unstable eigenvalues and their inverses. What was said above holds for it too.
+//!
 //! **Assumptions**: `y[k]` is read before `u[k]` acts; the command is held; the reference is not constant; `r` is independent of
 //! `v`.
 //!
@@ -99,6 +102,7 @@ impl LinearPlant {
                 .collect(),
             a: self.a,
             b: vec![self.b],
+            gain: Vec::new(),
         }
     }
 }

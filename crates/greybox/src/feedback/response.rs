@@ -14,7 +14,15 @@ pub(crate) struct LinearResponse {
     pub b: Vec<Vec<f64>>,
     /// For each output the states that it contains, and their coefficients.
     pub outputs: Vec<Vec<(usize, f64)>>,
+    /// Gain from each output to each state, row by row, with which the response of an unstable plant follows the residual
+    /// ([`LinearResponse::following`]); empty for others.
+    pub gain: Vec<Vec<f64>>,
 }
+
+/// Largest number of steps of the Riccati equation.
+const STEPS: usize = 20_000;
+/// Relative change of its solution in one step, below which it has converged.
+const CONVERGED: f64 = 1e-10;
 
 /// Largest magnitude of the eigenvalues of a matrix.
 #[must_use]
@@ -25,6 +33,67 @@ pub fn spectral_radius(matrix: &DMatrix<f64>) -> f64 {
 }
 
 impl LinearResponse {
+    /// That of a model without any.
+    pub(crate) fn none(outputs: usize) -> Self {
+        Self {
+            a: Vec::new(),
+            b: Vec::new(),
+            outputs: vec![Vec::new(); outputs],
+            gain: Vec::new(),
+        }
+    }
+
+    /// Growth of a deviation in one sampling interval, as a power of e: not above zero for a stable plant.
+    pub(crate) fn growth(&self) -> f64 {
+        let n = self.a.len();
+        spectral_radius(&DMatrix::from_fn(n, n, |i, j| self.a[i][j])).ln()
+    }
+
+    /// The response of an unstable plant with a gain that makes it stable: that of a Kalman filter for noise of these standard deviations at
+    /// the driven inputs and the outputs. Without noise at the inputs it moves the unstable eigenvalues to their inverses and leaves all
+    /// others. `None` if no such gain is found: no output shows what grows.
+    ///
+    /// **Reference**: B. D. O. Anderson, J. B. Moore, Optimal Filtering (1979), section 4.4.
+    pub(crate) fn following(&self, inputs: &[f64], outputs: &[f64]) -> Option<Self> {
+        let n = self.a.len();
+        let a = DMatrix::from_fn(n, n, |i, j| self.a[i][j]);
+        let b = DMatrix::from_fn(n, self.b.len(), |i, d| self.b[d][i] * inputs[d]);
+        let mut c = DMatrix::<f64>::zeros(outputs.len(), n);
+        for (o, of) in self.outputs.iter().enumerate() {
+            for &(state, coefficient) in of {
+                c[(o, state)] = coefficient;
+            }
+        }
+        let of_states = &b * b.transpose();
+        let of_outputs = DMatrix::from_fn(outputs.len(), outputs.len(), |i, j| match i == j {
+            true => outputs[i].powi(2),
+            false => 0.0,
+        });
+        let mut p = DMatrix::<f64>::identity(n, n);
+        let mut gain = DMatrix::zeros(n, outputs.len());
+        for _ in 0..STEPS {
+            let moved = &c * &p * a.transpose();
+            let innovation = &c * &p * c.transpose() + &of_outputs;
+            gain = innovation.cholesky()?.solve(&moved).transpose();
+            let next = &a * &p * a.transpose() - &gain * &moved + &of_states;
+            let next = 0.5 * (&next + next.transpose());
+            let change = (&next - &p).amax();
+            p = next;
+            if change <= CONVERGED * p.amax() {
+                break;
+            }
+        }
+        let radius = spectral_radius(&(&a - &gain * &c));
+        if !gain.iter().all(|value| value.is_finite()) || radius > 1.0 + CONVERGED.sqrt() {
+            return None;
+        }
+        let gain = gain.row_iter().map(|row| row.iter().copied().collect());
+        Some(Self {
+            gain: gain.collect(),
+            ..self.clone()
+        })
+    }
+
     /// The matrix of the linear loop over one sampling interval, without limits and dead times: of the plant and a controller for each driven
     /// input, in their order, or of the plant alone.
     pub(crate) fn in_loop<'c>(
@@ -81,13 +150,20 @@ pub(crate) struct Response {
     columns: usize,
     states: Vec<f64>,
     next: Vec<f64>,
+    /// The present rows of the outputs, those that the states follow; empty without a gain.
+    followed: Vec<f64>,
 }
 
 impl Response {
     pub(crate) fn new(plant: Arc<LinearResponse>, columns: usize) -> Self {
         let states = vec![0.0; columns * plant.a.len()];
+        let followed = match plant.gain.is_empty() {
+            true => Vec::new(),
+            false => vec![0.0; columns * plant.outputs.len()],
+        };
         Self {
             next: states.clone(),
+            followed,
             plant,
             columns,
             states,
@@ -99,13 +175,19 @@ impl Response {
         self.states.fill(0.0);
     }
 
-    /// Adds the effect of earlier commands to a row of an output.
-    pub(crate) fn add_to(&self, output: usize, row: &mut [f64]) {
+    /// Adds the effect of earlier commands to a row of an output; `missing`: it has no reading, and the states do not follow it.
+    pub(crate) fn add_to(&mut self, output: usize, row: &mut [f64], missing: bool) {
         for &(state, coefficient) in &self.plant.outputs[output] {
             let state = &self.states[state * self.columns..];
             for (value, state) in row.iter_mut().zip(state) {
                 *value += coefficient * state;
             }
+        }
+        let mut followed = self.followed.chunks_exact_mut(self.columns);
+        match followed.nth(output) {
+            Some(followed) if missing => followed.fill(0.0),
+            Some(followed) => followed.copy_from_slice(row),
+            None => {}
         }
     }
 
@@ -120,6 +202,12 @@ impl Response {
             for (column, &coefficient) in states.chain(commands) {
                 for (next, value) in next.iter_mut().zip(column) {
                     *next += coefficient * value;
+                }
+            }
+            let gains = self.plant.gain.get(i).into_iter().flatten();
+            for (row, &gain) in self.followed.chunks_exact(n).zip(gains) {
+                for (next, value) in next.iter_mut().zip(row) {
+                    *next -= gain * value;
                 }
             }
         }

@@ -7,26 +7,29 @@ use ct_signals::Record;
 use nalgebra::DMatrix;
 
 use super::ModelSetup;
-use crate::feedback::{LinearResponse, Response, spectral_radius};
+use crate::feedback::{LinearResponse, Response};
 
-/// Limit of the growth rate times the duration of the longest record: a model that grows faster has no linear response.
+/// Growth of a deviation over the longest record, as a power of e, above which a linear response grows too far.
 const GROWTH: f64 = 3.0;
+/// ... and above which a model does not follow a record on its measured inputs: no initial state is known well enough.
+const FOLLOWS: f64 = 7.0;
 
 impl ModelSetup<'_> {
     /// The linear response of the model to some inputs at the mean of its simulated states and measured inputs. Delays are left out, and so
-    /// is a direct term: the response affects the variance of estimates only. A model that grows, or has no finite simulation, has none.
-    pub(super) fn response(&self, x: &[f64], driven: &[usize]) -> LinearResponse {
+    /// is a direct term: the response affects the variance of estimates only. A model without a finite simulation has none. `needs_loop`: the model does not follow the records on the measured inputs; it is linearised at its initial
+    /// states.
+    pub(super) fn response(&self, x: &[f64], driven: &[usize], needs_loop: bool) -> LinearResponse {
         let spec = self.model.spec();
-        let none = || LinearResponse {
-            a: Vec::new(),
-            b: Vec::new(),
-            outputs: vec![Vec::new(); spec.outputs.len()],
-        };
+        let none = || LinearResponse::none(spec.outputs.len());
         let n = spec.states.len();
         if n == 0 {
             return none();
         }
-        let Some(form) = self.linearised(x) else {
+        let form = match needs_loop && !self.is_run_in_loop() {
+            true => self.linear_at_start(x),
+            false => self.linearised(x),
+        };
+        let Some(form) = form else {
             return none();
         };
         let interval = self.sample_interval() / self.time_unit;
@@ -46,10 +49,6 @@ impl ModelSetup<'_> {
         if !phi.iter().all(|value| value.is_finite()) {
             return none();
         }
-        let longest = self.records.iter().map(Record::len).max().unwrap_or(0);
-        if spectral_radius(&phi).ln() * longest as f64 > GROWTH {
-            return none();
-        }
         let row = |c: &Vec<f64>| {
             let all = c.iter().copied().enumerate();
             all.filter(|(_, coefficient)| *coefficient != 0.0).collect()
@@ -62,7 +61,14 @@ impl ModelSetup<'_> {
                 .collect(),
             b: (n..n + m).map(column).collect(),
             outputs: form.c.iter().map(row).collect(),
+            gain: Vec::new(),
         }
+    }
+
+    /// Whether a linear response grows too far over the longest record.
+    pub(super) fn grows(&self, response: &LinearResponse) -> bool {
+        let longest = self.records.iter().map(Record::len).max().unwrap_or(0);
+        !response.a.is_empty() && response.growth() * longest as f64 > GROWTH
     }
 
     /// The linear form of the model without its dead times at the mean of its simulated states and measured inputs, in the middle of the first
@@ -106,10 +112,8 @@ impl ModelSetup<'_> {
         Some(self.time_unit / fastest)
     }
 
-    /// Time in which a deviation of the states grows by a factor of e \[s\], by the linear form of the model at the initial states of the first
-    /// record and its mean inputs; `None` for a model that is not unstable there.
-    #[must_use]
-    pub fn growth_time(&self, x: &[f64]) -> Option<f64> {
+    /// The same at the initial states of the first record and its mean inputs.
+    fn linear_at_start(&self, x: &[f64]) -> Option<LinearForm> {
         let (n, count) = (self.model.spec().states.len(), self.parameter_count());
         let record = self.records.first()?;
         let inputs = record.inputs.iter();
@@ -117,9 +121,32 @@ impl ModelSetup<'_> {
             .map(|input| input.values.iter().sum::<f64>() / record.len() as f64)
             .collect();
         let states = x.get(count..count + n)?;
-        let form = self
-            .model
-            .linear_undelayed(&x[..count], states, &inputs, 0.0)?;
+        self.model
+            .linear_undelayed(&x[..count], states, &inputs, 0.0)
+    }
+
+    /// Whether a model follows its records on the measured inputs: it does not if it is unstable at the initial states of the first record, and
+    /// a deviation grows by far more than it is known. Such a model follows a record only in the control loop that the record comes from.
+    #[must_use]
+    pub fn follows_inputs(&self, x: &[f64]) -> bool {
+        let longest = self.records.iter().map(Record::duration);
+        let longest = longest.fold(0.0, f64::max);
+        self.growth_time(x)
+            .is_none_or(|growth_time| longest <= FOLLOWS * growth_time)
+    }
+
+    /// The longest record that a model with this growth time follows \[s\].
+    #[must_use]
+    pub fn longest_followed(growth_time: f64) -> f64 {
+        FOLLOWS * growth_time
+    }
+
+    /// Time in which a deviation of the states grows by a factor of e \[s\], by the linear form of the model at the initial states of the first
+    /// record and its mean inputs; `None` for a model that is not unstable there.
+    #[must_use]
+    pub fn growth_time(&self, x: &[f64]) -> Option<f64> {
+        let n = self.model.spec().states.len();
+        let form = self.linear_at_start(x)?;
         let a = DMatrix::from_fn(n, n, |i, j| form.a[i][j]);
         if n == 0 || !a.iter().all(|value| value.is_finite()) {
             return None;
@@ -130,11 +157,15 @@ impl ModelSetup<'_> {
     }
 
     /// The change of each output that a step of each input has caused after `steps` sampling intervals, by input and output, of the linear
-    /// response at a fitted vector; zero for a model that has none.
+    /// response at a fitted vector; zero for a model that has none, or grows.
     #[must_use]
     pub fn step_gains(&self, x: &[f64], steps: usize) -> Vec<Vec<f64>> {
         let inputs: Vec<usize> = (0..self.model.spec().inputs.len()).collect();
-        let plant = Arc::new(self.response(x, &inputs));
+        let plant = self.response(x, &inputs, false);
+        if self.grows(&plant) {
+            return vec![vec![0.0; self.outputs()]; inputs.len()];
+        }
+        let plant = Arc::new(plant);
         let gains = |i: usize| {
             let mut response = Response::new(plant.clone(), 1);
             let mut commands = vec![0.0; inputs.len()];
@@ -142,7 +173,7 @@ impl ModelSetup<'_> {
             (0..steps).for_each(|_| response.advance(&commands));
             let of_output = |o: usize| {
                 let mut row = [0.0];
-                response.add_to(o, &mut row);
+                response.add_to(o, &mut row, false);
                 row[0]
             };
             (0..self.outputs()).map(of_output).collect()

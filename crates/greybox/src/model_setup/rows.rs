@@ -13,6 +13,9 @@ impl<'a> ModelSetup<'a> {
     /// The outputs that the model gives, a series for each record and output; `None` where the simulation cannot go on.
     #[must_use]
     pub fn simulate(&self, x: &[f64]) -> Option<Vec<Vec<f64>>> {
+        if self.is_run_in_loop() {
+            return self.outputs_at(x);
+        }
         if self.simulated_loop.is_some() {
             return self.on_measured_inputs().simulate(x);
         }
@@ -28,6 +31,11 @@ impl<'a> ModelSetup<'a> {
                 simulated.map(|(y, r)| y.values.iter().zip(r).map(|(y, r)| y - r).collect());
             return Some(model.collect());
         }
+        self.outputs_at(x)
+    }
+
+    /// The outputs of a simulation of this setup, a series for each record and output.
+    fn outputs_at(&self, x: &[f64]) -> Option<Vec<Vec<f64>>> {
         let mut all = vec![Vec::new(); self.records.len() * self.samples.len()];
         let begin =
             |r: usize, theta: &[f64], states: &[f64]| Some(self.simulation(r, theta, states));
@@ -68,31 +76,39 @@ impl<'a> ModelSetup<'a> {
     /// The states that the model gives, a series for each record and state; `None` where the simulation cannot go on.
     #[must_use]
     pub fn simulate_states(&self, x: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let states = 0..self.model.spec().states.len();
+        self.simulate_variables(x, &states.map(Variable::State).collect::<Vec<_>>())
+    }
+
+    /// Variables of the model, a series for each record and variable; `None` where the simulation cannot go on.
+    #[must_use]
+    pub fn simulate_variables(&self, x: &[f64], variables: &[Variable]) -> Option<Vec<Vec<f64>>> {
         let mut spec = self.model.spec().clone();
-        let states = spec.states.len();
-        let read = (0..states).map(|x| Output {
-            variable: Variable::State(x),
-        });
-        spec.outputs = read.collect();
+        let shown = match self.is_run_in_loop() {
+            true => self.clone(),
+            false => self.on_measured_inputs(),
+        };
+        // The controllers of a loop read the outputs.
+        let outputs = match &shown.simulated_loop {
+            Some(_) => spec.outputs.len(),
+            None => 0,
+        };
+        spec.outputs.truncate(outputs);
+        let variables = variables.iter().map(|&variable| Output { variable });
+        spec.outputs.extend(variables);
+        let all = spec.outputs.len();
         let model = Model::new(spec);
         let shown = ModelSetup {
             model: &model,
-            samples: vec![0; states],
-            ..self.on_measured_inputs()
+            samples: vec![0; all],
+            ..shown
         };
-        let mut all = vec![Vec::new(); self.records.len() * states];
-        if states > 0 {
-            let begin =
-                |r: usize, theta: &[f64], states: &[f64]| Some(shown.simulation(r, theta, states));
-            let entries = shown.entries(x, &[]);
-            entries.each_instant(begin, |Instant { record, read, .. }| {
-                for (i, value) in read.iter().enumerate() {
-                    all[record * states + i].push(*value);
-                }
-                Some(())
-            })?;
+        if all == outputs {
+            return Some(Vec::new());
         }
-        Some(all)
+        let simulated = shown.outputs_at(x)?.into_iter().enumerate();
+        let simulated = simulated.filter(|(i, _)| i % all >= outputs);
+        Some(simulated.map(|(_, series)| series).collect())
     }
 
     /// The setup without its loop.

@@ -4,14 +4,19 @@
 use std::sync::Arc;
 
 use ct_model::{ModelSpec, Scalar, Variable};
-use ct_signals::{Channel, Record};
+use ct_signals::{ArModel, Channel, Record};
 use plants::controller::{Controller, Regulator};
+use statrs::statistics::Statistics;
 
 use super::ModelSetup;
 use crate::Error;
 use crate::feedback::{
     LinearResponse, Replay, Response, fitting, replay_of, spectral_radius, step,
 };
+
+/// Standard deviations of disturbances at the inputs that an unstable model is taken to have, over those of the commands; those of noise at
+/// the outputs, over those of the readings, are one.
+const DISTURBANCES: [f64; 6] = [0.0, 0.01, 0.1, 1.0, 10.0, 100.0];
 
 /// A controller that drives an input of a model; it reads the output [`Controller::output`].
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +38,8 @@ pub struct SimulatedLoop {
     response: Arc<LinearResponse>,
     /// Sampling interval \[s\].
     interval: f64,
+    /// The model does not follow its records on the measured inputs ([`ModelSetup::follows_inputs`]): all its simulations run in the loop.
+    is_needed: bool,
 }
 
 impl SimulatedLoop {
@@ -46,6 +53,28 @@ impl SimulatedLoop {
         setup: &ModelSetup,
         x: &[f64],
         controllers: &[LoopController],
+    ) -> Result<Self, Error> {
+        Self::around(setup, x, controllers, setup.is_run_in_loop())
+    }
+
+    /// The loop of a model that does not follow its records on the measured inputs ([`ModelSetup::follows_inputs`]): all its simulations run in
+    /// the loop. Its linear response is that at the initial states of the vector.
+    ///
+    /// # Errors
+    /// As [`SimulatedLoop::new`].
+    pub fn needed(
+        setup: &ModelSetup,
+        x: &[f64],
+        controllers: &[LoopController],
+    ) -> Result<Self, Error> {
+        Self::around(setup, x, controllers, true)
+    }
+
+    fn around(
+        setup: &ModelSetup,
+        x: &[f64],
+        controllers: &[LoopController],
+        is_needed: bool,
     ) -> Result<Self, Error> {
         let spec = setup.model.spec();
         for of in controllers {
@@ -70,28 +99,114 @@ impl SimulatedLoop {
             }
         }
         require_excitation(setup.records, controllers)?;
-        let mut fitted = Vec::new();
-        let mut replays = vec![Vec::new(); setup.records.len()];
-        for of in controllers {
-            let (controller, own) = fitting(&of.controller, |controller| {
-                let replay = |r: &Record| replay_of(controller, r, of.input, of.reference);
-                setup.records.iter().map(replay).collect()
-            })?;
-            fitted.push(LoopController {
-                controller,
-                ..of.clone()
-            });
-            for (of_record, own) in replays.iter_mut().zip(own) {
-                of_record.push(own);
-            }
-        }
+        let (fitted, replays) = replayed(controllers, setup.records)?;
         let inputs: Vec<usize> = controllers.iter().map(|of| of.input).collect();
-        Ok(Self {
+        let response = setup.response(x, &inputs, is_needed);
+        let grows = setup.grows(&response);
+        let found = Self {
             replays,
-            response: Arc::new(setup.response(x, &inputs)),
+            response: Arc::new(response),
             interval: setup.sample_interval(),
             controllers: fitted,
+            is_needed,
+        };
+        Ok(match grows {
+            true => found.following(setup, x),
+            false => found,
         })
+    }
+
+    /// The same with the response of an unstable model that follows the residual ([`LinearResponse::following`]), with the gain that makes the
+    /// deviance least: the smallest one would do for the true model, and one that lacks an effect behaves as if its inputs were disturbed.
+    /// Without a response if no gain makes it stable.
+    fn following(self, setup: &ModelSetup, x: &[f64]) -> Self {
+        let records = setup.records;
+        let spread = |values: &mut dyn Iterator<Item = f64>| {
+            let deviation = values.filter(|value| !value.is_nan()).population_std_dev();
+            deviation.max(f64::MIN_POSITIVE)
+        };
+        let outputs: Vec<f64> = (0..setup.outputs())
+            .map(|o| {
+                let readings = records.iter().map(|record| &record.outputs[o].values);
+                spread(&mut readings.flatten().copied())
+            })
+            .collect();
+        let inputs: Vec<f64> = (self.controllers.iter())
+            .map(|of| {
+                let commands = records.iter().map(|record| &record.inputs[of.input].values);
+                spread(&mut commands.flatten().copied())
+            })
+            .collect();
+        let followed = DISTURBANCES.iter().filter_map(|share| {
+            let inputs: Vec<f64> = inputs.iter().map(|spread| share * spread).collect();
+            let found = self.with_response(self.response.following(&inputs, &outputs)?);
+            let deviance = found.deviance(setup, x)?;
+            Some((deviance, found))
+        });
+        let smallest = followed.min_by(|a, b| a.0.total_cmp(&b.0));
+        smallest.map_or_else(
+            || self.with_response(LinearResponse::none(setup.outputs())),
+            |(_, found)| found,
+        )
+    }
+
+    /// Deviance of the residual, with noise of first order at each output.
+    fn deviance(&self, setup: &ModelSetup, x: &[f64]) -> Option<f64> {
+        let setup = setup.clone().in_loop(Arc::new(self.clone()));
+        let residuals = estimation::residuals(&setup, x)?;
+        let of_output = |o: usize| {
+            let series = residuals.iter().skip(o).step_by(setup.outputs());
+            let series: Vec<&[f64]> = series.map(Vec::as_slice).collect();
+            let noise = ArModel::fit(&series, 1).ok()?;
+            Some(2.0 * setup.samples[o] as f64 * noise.sigma().ln())
+        };
+        let all = (0..setup.outputs()).map(of_output).sum::<Option<f64>>();
+        all.filter(|deviance| deviance.is_finite())
+    }
+
+    /// The same loop with the response and the gain that make the deviance of a setup least, if its response follows the residual: its own
+    /// response, or that of the setup, which may not describe a hard nonlinearity. With the fall of the deviance; `None` if it does not fall.
+    #[must_use]
+    pub fn following_anew(&self, setup: &ModelSetup, x: &[f64]) -> Option<(Self, f64)> {
+        if self.response.gain.is_empty() {
+            return None;
+        }
+        let present = self.deviance(setup, x)?;
+        let inputs: Vec<usize> = self.controllers.iter().map(|of| of.input).collect();
+        let responses = [(*self.response).clone(), setup.response(x, &inputs, true)];
+        let following = responses.into_iter().filter_map(|response| {
+            let found = self.with_response(response).following(setup, x);
+            Some((found.deviance(setup, x)?, found))
+        });
+        let smallest = following.min_by(|a, b| a.0.total_cmp(&b.0));
+        let (deviance, found) = smallest.filter(|(deviance, _)| *deviance < present)?;
+        Some((found, present - deviance))
+    }
+
+    fn with_response(&self, response: LinearResponse) -> Self {
+        Self {
+            response: Arc::new(response),
+            ..self.clone()
+        }
+    }
+
+    /// The same loop with other records.
+    ///
+    /// # Errors
+    /// If a record lacks a reference, or a command is not held.
+    pub(super) fn with_records(&self, records: &[Record]) -> Result<Self, Error> {
+        let (controllers, replays) = replayed(&self.controllers, records)?;
+        Ok(Self {
+            controllers,
+            replays,
+            ..self.clone()
+        })
+    }
+
+    /// Whether the model does not follow its records on the measured inputs, so that all its simulations run in the loop.
+    #[must_use]
+    pub fn is_needed(&self) -> bool {
+        self.is_needed
     }
 
     /// The controllers.
@@ -131,6 +246,29 @@ impl SimulatedLoop {
     pub(super) fn response(&self, columns: usize) -> Response {
         Response::new(self.response.clone(), columns)
     }
+}
+
+/// The controllers, each in the order of its updates that agrees with the records, and their simulations, by record and controller.
+fn replayed(
+    controllers: &[LoopController],
+    records: &[Record],
+) -> Result<(Vec<LoopController>, Vec<Vec<Replay>>), Error> {
+    let mut fitted = Vec::new();
+    let mut replays = vec![Vec::new(); records.len()];
+    for of in controllers {
+        let (controller, own) = fitting(&of.controller, |controller| {
+            let replay = |r: &Record| replay_of(controller, r, of.input, of.reference);
+            records.iter().map(replay).collect()
+        })?;
+        fitted.push(LoopController {
+            controller,
+            ..of.clone()
+        });
+        for (of_record, own) in replays.iter_mut().zip(own) {
+            of_record.push(own);
+        }
+    }
+    Ok((fitted, replays))
 }
 
 /// Checks that something from outside moves the loop: a reference, or an input that no controller drives.
@@ -203,7 +341,8 @@ impl<'a, T: Scalar> Regulators<'a, T> {
 impl<'a> ModelSetup<'a> {
     /// The same fit in closed loop: rows and residuals of fits ([`estimation::Residuals`]) are those of the loop, simulated from its
     /// references and filtered such that the residual is the disturbance at the outputs. [`ModelSetup::simulate`] still runs on the measured
-    /// inputs, so that simulation errors are comparable. The loop is that of the records of this setup.
+    /// inputs, so that simulation errors are comparable, unless the model needs the loop ([`SimulatedLoop::is_needed`]). The loop is that of the
+    /// records of this setup.
     #[must_use]
     pub fn in_loop(self, simulated: Arc<SimulatedLoop>) -> Self {
         Self {
@@ -213,7 +352,7 @@ impl<'a> ModelSetup<'a> {
         }
     }
 
-    /// Root mean square of the difference from the measurements in a simulation on the measured inputs, for each output \[its unit\], without
+    /// Root mean square of the difference from the measurements in a simulation ([`ModelSetup::simulate`]), for each output \[its unit\], without
     /// missing samples; `None` where the simulation cannot go on.
     fn rmse(&self, x: &[f64]) -> Option<Vec<f64>> {
         let simulated = self.simulate(x)?;
@@ -251,9 +390,15 @@ impl<'a> ModelSetup<'a> {
         external.collect()
     }
 
-    /// A fit of this setup with the errors of a simulation on the measured inputs: the fit in a loop does not compute them.
+    /// Whether all simulations of this setup run in a loop, because the model needs it.
     #[must_use]
-    pub fn with_measured_errors(&self, mut fit: estimation::Fit) -> estimation::Fit {
+    pub fn is_run_in_loop(&self) -> bool {
+        self.simulated_loop.as_ref().is_some_and(|of| of.is_needed)
+    }
+
+    /// A fit of this setup with the errors of a simulation ([`ModelSetup::simulate`]): the fit in a loop does not compute them.
+    #[must_use]
+    pub fn with_simulation_errors(&self, mut fit: estimation::Fit) -> estimation::Fit {
         if self.simulated_loop.is_some()
             && let Some(rmse) = self.rmse(&fit.x)
         {

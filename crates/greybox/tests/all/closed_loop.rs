@@ -2,6 +2,7 @@
 
 mod disturbance;
 mod models;
+mod unstable;
 
 use crate::support::Rig;
 use ct_signals::{Channel, Record, excitation, noise};

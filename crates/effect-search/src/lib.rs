@@ -18,8 +18,9 @@ mod search;
 mod thresholds;
 
 pub use accept::quantisation::Quantisation;
-pub use base::control_loop::{ControlLoop, Enclosed, NotSimulated, enclose, needed_loop, widened};
+pub use base::control_loop::{Enclosed, enclose, needed_loop, widened};
 pub use base::gaps::{FIRST_HOLD, LONGEST_HOLD, MendedGaps, PriorKnowledge, Whole, mend};
+pub use base::loop_state::{ControlLoop, NotSimulated};
 pub use base::problem::{Kept, Options, Problem};
 pub use base::problem_builder::ProblemBuilder;
 pub use diagnose::{Progress, diagnose};

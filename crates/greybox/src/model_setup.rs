@@ -6,6 +6,7 @@
 
 mod build;
 mod fit;
+mod following;
 mod linear_response;
 mod rows;
 mod simulated_loop;

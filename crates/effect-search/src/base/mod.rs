@@ -2,5 +2,6 @@
 
 pub(crate) mod control_loop;
 pub(crate) mod gaps;
+pub(crate) mod loop_state;
 pub(crate) mod problem;
 pub(crate) mod problem_builder;

@@ -9,7 +9,8 @@ use estimation::{Fit, Noise, Start, Stopping, fit_from};
 use greybox::{FitOptions, ModelSetup, SimulatedLoop};
 
 use crate::Error;
-use crate::base::control_loop::{ControlLoop, NotSimulated, detected_feedback, hard_nonlinearity};
+use crate::base::control_loop::{detected_feedback, hard_nonlinearity};
+use crate::base::loop_state::{ControlLoop, NotSimulated};
 use crate::base::problem::{Limit, Phase, Problem};
 use crate::fit::relations::{Absorbed, Tie};
 use crate::thresholds::Thresholds;

@@ -7,7 +7,8 @@ use estimation::{Fit, Noise, moved_by_weighting};
 use greybox::{Robust, not_determined, weighted_rms};
 
 use crate::accept::quantisation::quantisation;
-use crate::base::control_loop::{ControlLoop, NotSimulated, widened};
+use crate::base::control_loop::widened;
+use crate::base::loop_state::{ControlLoop, NotSimulated};
 use crate::diagnostics::detectable::leading;
 use crate::fit::estimate::{Estimate, sizes};
 use crate::fit::node::{Context, FINE, Node};

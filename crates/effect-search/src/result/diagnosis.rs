@@ -6,8 +6,8 @@ use ct_signals::ArModel;
 use serde::{Deserialize, Serialize};
 
 use crate::accept::quantisation::Quantisation;
-use crate::base::control_loop::ControlLoop;
 use crate::base::gaps::MendedGaps;
+use crate::base::loop_state::ControlLoop;
 use crate::diagnostics::unknown::Unknown;
 use crate::fit::estimate::Estimate;
 use crate::fit::relations::Absorbed;

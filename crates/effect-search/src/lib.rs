@@ -18,7 +18,7 @@ mod search;
 mod thresholds;
 
 pub use accept::quantisation::Quantisation;
-pub use base::control_loop::{Enclosed, enclose, needed_loop, widened};
+pub use base::control_loop::{Enclosed, enclose, first_fit, in_needed_loop, widened};
 pub use base::gaps::{FIRST_HOLD, LONGEST_HOLD, MendedGaps, PriorKnowledge, Whole, mend};
 pub use base::loop_state::{ControlLoop, NotSimulated};
 pub use base::problem::{Kept, Options, Problem};

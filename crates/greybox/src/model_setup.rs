@@ -80,7 +80,7 @@ impl<'a> ModelSetup<'a> {
     /// that needs its loop runs in the loop of these records.
     ///
     /// # Errors
-    /// As [`ModelSetup::new`].
+    /// As [`ModelSetup::new`]; if the model needs its loop, and a record lacks a reference or its command is not held.
     pub fn held_out<'b>(&self, records: &'b [Record], x: &[f64]) -> Result<ModelSetup<'b>, Error>
     where
         'a: 'b,
@@ -97,7 +97,7 @@ impl<'a> ModelSetup<'a> {
         })
     }
 
-    /// The model, clock and fitted parameters with other records, without priors.
+    /// The model, clock and fitted parameters with other records, without priors, on their measured inputs.
     ///
     /// # Errors
     /// As [`ModelSetup::new`].

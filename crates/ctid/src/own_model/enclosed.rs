@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use effect_search::{ControlLoop, NotSimulated, Thresholds, enclose, needed_loop};
+use effect_search::{ControlLoop, NotSimulated, Thresholds, enclose, first_fit};
 use greybox::{Fit, FitOptions, ModelSetup, SimulatedLoop};
 
 use super::blame::blame_search;
@@ -16,19 +16,19 @@ const SAME_ERROR: f64 = 0.005;
 /// A fit in the loop of its records, if that can be simulated; the loop, and what is known of it.
 pub(super) type InLoop = (Fit, Option<Arc<SimulatedLoop>>, Option<ControlLoop>);
 
-/// A setup in the loop of its records, if the model does not follow them on the measured inputs.
-pub(super) fn in_needed_loop<'a>(
+/// The first fit of a model, in the loop of its records if the model does not follow them on the measured inputs.
+pub(super) fn first_fit_of<'a>(
     file: &OwnModelFile,
     records: &Records,
     setup: ModelSetup<'a>,
-) -> Result<ModelSetup<'a>, Error> {
-    let controllers = file.loop_controllers(records)?;
-    Ok(
-        match needed_loop(&setup, &controllers, &Thresholds::DEFAULT) {
-            Some(needed) => setup.in_loop(needed),
-            None => setup,
-        },
-    )
+    (options, simulate): (&FitOptions, bool),
+) -> Result<(ModelSetup<'a>, Fit), Error> {
+    let controllers = match simulate {
+        true => file.loop_controllers(records)?,
+        false => Vec::new(),
+    };
+    let found = first_fit(setup, &controllers, options, &Thresholds::DEFAULT);
+    found.map_err(|error| blame_search(&records.records, error))
 }
 
 /// Closes the loop around a fitted model, if that can be simulated.

@@ -218,15 +218,12 @@ impl OwnModelFile {
             reading.summary.file.clone_from(&reading.record.name);
             Ok(reading)
         };
-        let fitted = files.data.iter().map(|path| {
+        let all = files.data.iter().chain(&files.test).map(|path| {
             if self.controllers.is_empty() {
                 return read(path, &self.columns);
             }
             read(path, &self.columns_of_fit(&headings(path)?))
         });
-        // Held-out records are simulated on their measured inputs.
-        let held_out = files.test.iter().map(|path| read(path, &self.columns));
-        let all = fitted.chain(held_out);
         let all = all.collect::<Result<Vec<Reading>, Error>>()?;
         self.gathered(all, files.data.len(), self.time_unit(&files.data[0])?)
     }
@@ -250,7 +247,13 @@ impl OwnModelFile {
             .unzip();
         crate::input::on_one_clock(&mut all);
         crate::input::check_clocks(&all[..fitted], &summaries)?;
-        let test = all.split_off(fitted);
+        let mut test = all.split_off(fitted);
+        // Only a model that needs its loop runs in that of a held-out record: a gap in a reference does not cut the record.
+        for record in &mut test {
+            if record.references.iter().any(|r| r.missing() > 0) {
+                record.references.clear();
+            }
+        }
         let prior = PriorKnowledge {
             model: &self.model,
             known: &self.known,

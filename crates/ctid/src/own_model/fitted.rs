@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use ct_signals::Record;
 use effect_search::residual_tests::InputDependence;
-use effect_search::{ControlLoop, Options, Thresholds, held_out, widened};
+use effect_search::{ControlLoop, Options, Thresholds, held_out, in_needed_loop, widened};
 use greybox::{
     Fit, FitOptions, FitUncertainty, ModelSetup, Robust, SimulatedLoop, TimeLimit,
     moved_by_weighting,
@@ -14,7 +14,7 @@ use greybox::{
 use missing_effect::Effort;
 
 use super::blame::{blame, blame_search};
-use super::enclosed::{in_loop, in_needed_loop};
+use super::enclosed::{first_fit_of, in_loop};
 use super::file::{OwnModelFile, Records};
 use crate::findings::{self, Reader};
 use crate::{Error, MessageNames};
@@ -102,12 +102,7 @@ impl FittedModel {
             time.leave_out("steps of the fits of the effects");
         }
         let setup = setup.with_time_limit(time.clone(), limit.interrupt);
-        let setup = match simulate_loop {
-            true => in_needed_loop(file, &records, setup)?,
-            false => setup,
-        };
-        let fit = setup.fit(options);
-        let fit = fit.map_err(|error| blame(&records.records, error))?;
+        let (setup, fit) = first_fit_of(file, &records, setup, (options, simulate_loop))?;
         let (fit, simulated_loop, control_loop) =
             in_loop(file, &records, (setup, fit), (options, simulate_loop))?;
         if time.passed() {
@@ -152,7 +147,8 @@ impl FittedModel {
                 file.base.name
             )));
         }
-        let setup = in_needed_loop(file, &records, setup)?;
+        let controllers = file.loop_controllers(&records)?;
+        let setup = in_needed_loop(setup, &fit.x, &controllers, &Thresholds::DEFAULT);
         let (_, simulated_loop, control_loop) =
             in_loop(file, &records, (setup, fit.clone()), (options, true))?;
         Ok(Self {
@@ -240,7 +236,9 @@ impl FittedModel {
         };
         // In a simulated loop a part of the fed-back noise remains in the residual of a nonlinear plant.
         let found = match (&self.simulated_loop, dependence(&setup)) {
-            (Some(_), Some(_)) => dependence(&setup_of(&self.model, &self.records)?),
+            (Some(of), Some(_)) if !of.is_needed() => {
+                dependence(&setup_of(&self.model, &self.records)?)
+            }
             (_, found) => found,
         };
         Ok(found.map(|found| {

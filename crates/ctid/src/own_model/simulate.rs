@@ -128,6 +128,11 @@ fn simulated(
     let known = match &fit {
         None => None,
         Some((fitted, setup)) => {
+            if fitted.control_loop().is_some_and(|known| known.needed) {
+                warnings.push(
+                    "the model is unstable without its controllers, and this simulation runs without them: the smallest error grows".to_string(),
+                );
+            }
             let known = fitted.uncertainty(setup)?;
             if known.is_none() {
                 warnings.push(

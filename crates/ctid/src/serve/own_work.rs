@@ -76,12 +76,7 @@ impl Work {
         let (mut fitted, mut held_out): (Vec<Reading>, Vec<Reading>) = Default::default();
         let mut time_unit = None;
         for upload in &mut session.records {
-            // Held-out records are simulated on their measured inputs.
-            let columns = if upload.held_out {
-                model.columns.clone()
-            } else {
-                model.columns_of_fit(&upload.headings)
-            };
+            let columns = model.columns_of_fit(&upload.headings);
             let reading = upload.reading(&columns, &options);
             let reading = reading.map_err(Refusal::input)?;
             if upload.held_out {

@@ -23,7 +23,7 @@ impl Context<'_> {
             return Ok(None);
         }
         let other = match self.needs_loop() {
-            true => self.following_anew(node)?.map(|(search, _)| search),
+            true => self.following_anew(node)?,
             false => self.on_measured_inputs(),
         };
         if let Some(other) = other {

@@ -6,7 +6,8 @@
 
 use ct_signals::Record;
 use estimation::{Fit, Stopping, fit_from};
-use greybox::{LoopController, ModelSetup, SimulatedLoop};
+use greybox::{FitOptions, LoopController, ModelSetup, SimulatedLoop};
+use statrs::statistics::Statistics;
 use std::sync::Arc;
 
 use crate::Error;
@@ -67,10 +68,51 @@ pub struct Enclosed<'a> {
     pub control_loop: Option<ControlLoop>,
 }
 
-/// The loop of a model that does not follow its records on the measured inputs at its start values, where the loop can be simulated: the first
-/// fit takes place in it.
+/// The first fit of a model, from many starts: in its loop if that can be simulated and the model does not follow the records on the measured
+/// inputs, neither at its start values nor where the fit in the loop describes the readings.
+///
+/// # Errors
+/// Where no start gives a finite simulation.
+pub fn first_fit<'a>(
+    setup: ModelSetup<'a>,
+    controllers: &[LoopController],
+    options: &FitOptions,
+    thresholds: &Thresholds,
+) -> Result<(ModelSetup<'a>, Fit), Error> {
+    if let Some(needed) = needed_loop(&setup, controllers, thresholds) {
+        let closed = setup.clone().in_loop(needed);
+        let fit = closed.fit(options)?;
+        if needs_loop(&closed, &fit.x) {
+            let fit = closed.with_simulation_errors(fit);
+            return Ok((closed, fit));
+        }
+    }
+    let fit = setup.fit(options)?;
+    Ok((setup, fit))
+}
+
+/// The setup of a known fit: in the loop, if [`first_fit`] would have kept it.
 #[must_use]
-pub fn needed_loop(
+pub fn in_needed_loop<'a>(
+    setup: ModelSetup<'a>,
+    x: &[f64],
+    controllers: &[LoopController],
+    thresholds: &Thresholds,
+) -> ModelSetup<'a> {
+    let needed = needed_loop(&setup, controllers, thresholds);
+    let closed = needed.map(|needed| setup.clone().in_loop(needed));
+    closed
+        .filter(|closed| needs_loop(closed, x))
+        .unwrap_or(setup)
+}
+
+/// Whether the model of a fit in its loop does not follow its inputs. A fit that misses the readings says nothing of this.
+fn needs_loop(closed: &ModelSetup, x: &[f64]) -> bool {
+    !closed.follows_inputs(x) || misses(closed, x)
+}
+
+/// The loop of a model that leaves its records on the measured inputs at its start values, where the loop can be simulated.
+fn needed_loop(
     setup: &ModelSetup,
     controllers: &[LoopController],
     thresholds: &Thresholds,
@@ -78,6 +120,7 @@ pub fn needed_loop(
     let start = setup.start();
     if controllers.is_empty()
         || setup.follows_inputs(start)
+        || !misses(setup, start)
         || lacking(setup.records(), controllers, thresholds.lacking_readings).is_some()
     {
         return None;
@@ -87,8 +130,30 @@ pub fn needed_loop(
     Some(Arc::new(found))
 }
 
+/// Whether the error of a simulation is above the standard deviation of the readings at an output.
+fn misses(setup: &ModelSetup, x: &[f64]) -> bool {
+    let Some(simulated) = setup.simulate(x) else {
+        return true;
+    };
+    let outputs = setup.outputs();
+    (0..outputs).any(|o| {
+        let readings = setup
+            .records()
+            .iter()
+            .map(|record| &record.outputs[o].values);
+        let series = simulated.iter().skip(o).step_by(outputs);
+        let pairs = readings.zip(series).flat_map(|(y, m)| y.iter().zip(m));
+        let pairs: Vec<(f64, f64)> = pairs
+            .filter(|(y, _)| !y.is_nan())
+            .map(|(y, m)| (*y, y - m))
+            .collect();
+        let error = pairs.iter().map(|(_, e)| e * e).mean().sqrt();
+        error.is_nan() || error > pairs.iter().map(|(y, _)| y).population_std_dev()
+    })
+}
+
 /// Closes the loop around a fitted model if possible, and tests for feedback if no controller is known. A model that was fitted in its loop
-/// ([`needed_loop`]) is fitted again with the loop's linear response at the fitted values.
+/// ([`first_fit`]) is fitted again with the loop's linear response at the fitted values.
 ///
 /// - `controllers`: those that drove the inputs; `simulate`: whether their loop is simulated.
 /// - `may_test`: the feedback test can be used. A function of time that was fitted to the records has also fitted their noise, with future

@@ -54,6 +54,11 @@ pub enum NoExperiment {
         /// The effect.
         effect: String,
     },
+    /// The model is unstable without its controllers.
+    #[error(
+        "the model is unstable without its controllers, and an experiment would run without them: move the reference of the loop instead"
+    )]
+    NeedsLoop,
     /// A model without inputs.
     #[error("the model has no input that an experiment could move")]
     NoInput,

@@ -75,6 +75,9 @@ pub fn design(
     let limit = Limit::new(options);
     limit.begin(Phase::Believed);
     let (context, base) = begin(problem, options, limit)?;
+    if context.needs_loop() {
+        return Err(NoExperiment::NeedsLoop.into());
+    }
     tell("fitting both effects");
     context.limit.begin(Phase::White);
     let (base, nodes, noise) = context.alternatives(&base, between)?;

@@ -18,7 +18,7 @@ use greybox::{FitOptions, ModelSetup, possible_reading_steps};
 use statrs::statistics::Statistics;
 
 use crate::Error;
-use crate::base::control_loop::{enclose, needed_loop};
+use crate::base::control_loop::{enclose, first_fit};
 use crate::base::problem::{Kept, Limit, Options, Problem};
 use crate::fit::node::{Context, FINE, Node};
 
@@ -110,17 +110,18 @@ pub(crate) fn begin<'a>(
         ..FitOptions::default()
     };
     let model = Arc::new(Model::new(problem.spec.clone()));
-    if options.simulate_loop {
-        let needed = needed_loop(
-            &context.setup(&model)?,
-            &problem.controllers,
-            &options.thresholds,
-        );
-        context.simulated_loop = needed;
-    }
+    let controllers = match options.simulate_loop {
+        true => &problem.controllers[..],
+        false => &[],
+    };
     // The model is compared with sets of effects and needs their criterion, in which every output has a variance of its own: `fit` weights the
     // outputs by their noise.
-    let fit = context.setup(&model)?.fit(&fit_options)?;
+    let (fit, needed) = {
+        let setup = context.setup(&model)?;
+        let (setup, fit) = first_fit(setup, controllers, &fit_options, &options.thresholds)?;
+        (fit, setup.simulated_loop().cloned())
+    };
+    context.simulated_loop = needed;
     let mut bare = Node {
         added: Vec::new(),
         model: model.clone(),
@@ -273,6 +274,7 @@ fn diverges(setup: &ModelSetup) -> bool {
 fn visited(problem: &Problem, setup: &ModelSetup, fit: &Fit) -> Result<Visited, Error> {
     let mut all: Option<Visited> = None;
     let variables = Visited::simulated(&problem.spec);
+    let setup = setup.clone().with_tolerance(ct_model::TOLERANCE);
     let series = setup.simulate_variables(&fit.x, &variables);
     let mut series = series.ok_or(Error::NoSimulation)?.into_iter();
     for (r, record) in problem.records.iter().enumerate() {

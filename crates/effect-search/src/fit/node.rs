@@ -110,26 +110,28 @@ impl Context<'_> {
         Some(measured)
     }
 
-    /// The same search with the response of the loop that suits the residual of a set ([`SimulatedLoop::following_anew`]), and the fall of the
-    /// deviance of the set; `None` if the model does not need its loop, or the present response suits the set.
-    pub fn following_anew(&self, set: &Node) -> Result<Option<(Self, f64)>, Error> {
+    /// The same search with the response of the loop that suits the residual of a set ([`SimulatedLoop::following_anew`]); `None` if the model
+    /// does not need its loop, or the present response suits the set.
+    pub fn following_anew(&self, set: &Node) -> Result<Option<Self>, Error> {
         let setup = self.setup(&set.model)?;
         let anew = self.simulated_loop.as_ref().filter(|of| of.is_needed());
         let anew = anew.and_then(|of| of.following_anew(&setup, &set.fit.x));
-        let with = |(anew, fall)| {
-            let search = Self {
-                simulated_loop: Some(Arc::new(anew)),
-                ..self.clone()
-            };
-            (search, fall)
-        };
-        Ok(anew.map(with))
+        Ok(anew.map(|anew| Self {
+            simulated_loop: Some(Arc::new(anew)),
+            ..self.clone()
+        }))
     }
 
-    /// Deviance of a set, of a model that needs its loop with the response that suits the set: that of the search suits the believed model.
+    /// Deviance of a set. Of a model that needs its loop with the response that suits the set, if it is less: that of the search suits the
+    /// believed model.
     pub fn own_deviance(&self, set: &Node) -> f64 {
+        let present = set.fit.deviance;
+        if !self.needs_loop() || self.limit.passed() {
+            return present;
+        }
         let anew = self.following_anew(set).ok().flatten();
-        set.fit.deviance - anew.map_or(0.0, |(_, fall)| fall)
+        let anew = anew.and_then(|anew| anew.refitted(set, &set.fit.noise, ROUGH).ok());
+        anew.map_or(present, |anew| present.min(anew.fit.deviance))
     }
 
     /// Why a set is not simulated in the loop of this search: a hard nonlinearity. A model that needs its loop is simulated in any case.

@@ -86,12 +86,17 @@ pub fn output_steps(
         unit: &spec.states[x].about.unit,
     });
     let signals: Vec<Signal> = inputs.chain(of_states).collect();
-    let residuals: Vec<Vec<f64>> = records
-        .iter()
-        .flat_map(|record| &record.outputs)
-        .zip(simulated)
-        .map(|(y, model)| y.values.iter().zip(model).map(|(y, m)| y - m).collect())
-        .collect();
+    // In a loop that the model needs, the controllers answer the difference from the readings: the disturbance is what noise would be.
+    let disturbances = setup.is_run_in_loop().then_some(());
+    let disturbances = disturbances.and_then(|()| estimation::residuals(setup, &fit.x));
+    let residuals: Vec<Vec<f64>> = disturbances.unwrap_or_else(|| {
+        records
+            .iter()
+            .flat_map(|record| &record.outputs)
+            .zip(simulated)
+            .map(|(y, model)| y.values.iter().zip(model).map(|(y, m)| y - m).collect())
+            .collect()
+    });
     let of_parts = parts::records_of_parts(records);
     let of_output = |o: usize| {
         let series: Vec<Series> = records

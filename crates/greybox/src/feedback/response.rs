@@ -19,10 +19,12 @@ pub(crate) struct LinearResponse {
     pub gain: Vec<Vec<f64>>,
 }
 
-/// Largest number of steps of the Riccati equation.
-const STEPS: usize = 20_000;
-/// Relative change of its solution in one step, below which it has converged.
-const CONVERGED: f64 = 1e-10;
+/// Growth of the states, as a power of e, over which the Riccati equation is followed: then the first covariance is forgotten.
+const FORGOTTEN: f64 = 30.0;
+/// Largest number of its steps.
+const MOST_STEPS: f64 = 20_000.0;
+/// Relative change of each state's gain in one step, below which it has converged; and what an eigenvalue may be above one.
+const CONVERGED: f64 = 1e-7;
 
 /// Largest magnitude of the eigenvalues of a matrix.
 #[must_use]
@@ -56,38 +58,52 @@ impl LinearResponse {
     /// **Reference**: B. D. O. Anderson, J. B. Moore, Optimal Filtering (1979), section 4.4.
     pub(crate) fn following(&self, inputs: &[f64], outputs: &[f64]) -> Option<Self> {
         let n = self.a.len();
+        if n == 0 {
+            return None;
+        }
         let a = DMatrix::from_fn(n, n, |i, j| self.a[i][j]);
         let b = DMatrix::from_fn(n, self.b.len(), |i, d| self.b[d][i] * inputs[d]);
         let mut c = DMatrix::<f64>::zeros(outputs.len(), n);
         for (o, of) in self.outputs.iter().enumerate() {
             for &(state, coefficient) in of {
-                c[(o, state)] = coefficient;
+                // In standard deviations of the output's noise.
+                c[(o, state)] = coefficient / outputs[o];
             }
         }
         let of_states = &b * b.transpose();
-        let of_outputs = DMatrix::from_fn(outputs.len(), outputs.len(), |i, j| match i == j {
-            true => outputs[i].powi(2),
-            false => 0.0,
-        });
+        let one = DMatrix::identity(n, n);
         let mut p = DMatrix::<f64>::identity(n, n);
         let mut gain = DMatrix::zeros(n, outputs.len());
-        for _ in 0..STEPS {
-            let moved = &c * &p * a.transpose();
-            let innovation = &c * &p * c.transpose() + &of_outputs;
-            gain = innovation.cholesky()?.solve(&moved).transpose();
-            let next = &a * &p * a.transpose() - &gain * &moved + &of_states;
-            let next = 0.5 * (&next + next.transpose());
-            let change = (&next - &p).amax();
-            p = next;
-            if change <= CONVERGED * p.amax() {
+        // What grows forgets the first covariance, in whatever units.
+        let steps = (FORGOTTEN / self.growth()).ceil().clamp(1.0, MOST_STEPS) as usize;
+        for _ in 0..steps {
+            let innovation =
+                &c * &p * c.transpose() + DMatrix::identity(outputs.len(), outputs.len());
+            let filter = innovation.cholesky()?.solve(&(&c * &p)).transpose();
+            // Joseph's form: the covariance of the corrected states stays positive.
+            let rest = &one - &filter * &c;
+            let corrected = &rest * &p * rest.transpose() + &filter * filter.transpose();
+            p = &a * corrected * a.transpose() + &of_states;
+            let next = &a * filter;
+            let is_settled = next
+                .row_iter()
+                .zip(gain.row_iter())
+                .all(|(next, gain): (_, _)| (next - gain).amax() <= CONVERGED * next.amax());
+            gain = next;
+            if is_settled {
                 break;
             }
         }
         let radius = spectral_radius(&(&a - &gain * &c));
-        if !gain.iter().all(|value| value.is_finite()) || radius > 1.0 + CONVERGED.sqrt() {
+        if !gain.iter().all(|value| value.is_finite()) || radius > 1.0 + CONVERGED {
             return None;
         }
-        let gain = gain.row_iter().map(|row| row.iter().copied().collect());
+        let gain = gain.row_iter().map(|row| {
+            let of_outputs = row.iter().zip(outputs);
+            of_outputs
+                .map(|(gain, deviation)| gain / deviation)
+                .collect()
+        });
         Some(Self {
             gain: gain.collect(),
             ..self.clone()
@@ -212,5 +228,80 @@ impl Response {
             }
         }
         std::mem::swap(&mut self.states, &mut self.next);
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// A pendulum, its speed and a state that nothing reads or moves; the position in another unit.
+    fn pendulum(unit: f64) -> LinearResponse {
+        LinearResponse {
+            a: vec![
+                vec![1.001, 0.01 / unit, 0.0],
+                vec![0.4 * unit, 0.994, 0.0],
+                vec![0.0, 0.0, 1.0],
+            ],
+            b: vec![vec![0.0007 / unit, 0.13, 0.0]],
+            outputs: vec![vec![(0, 1.0)]],
+            gain: Vec::new(),
+        }
+    }
+
+    fn eigenvalues(of: &LinearResponse) -> Vec<f64> {
+        let n = of.a.len();
+        let closed = DMatrix::from_fn(n, n, |i, j| {
+            of.a[i][j] - if j == 0 { of.gain[i][0] } else { 0.0 }
+        });
+        let mut found: Vec<f64> = closed.complex_eigenvalues().iter().map(|e| e.re).collect();
+        found.sort_by(f64::total_cmp);
+        found
+    }
+
+    /// Without noise at the inputs the unstable eigenvalue becomes its inverse, whatever the units are.
+    #[test]
+    fn the_gain_mirrors_the_unstable_eigenvalue() {
+        let unstable = pendulum(1.0).growth().exp();
+        // The product of the two is the determinant.
+        let stable = (1.001 * 0.994 - 0.01 * 0.4) / unstable;
+        for unit in [1.0, 1e-3, 1e-6, 1e4] {
+            let found = pendulum(unit).following(&[0.0], &[0.1 / unit]).unwrap();
+            let mut expected = [1.0 / unstable, stable, 1.0];
+            expected.sort_by(f64::total_cmp);
+            for (found, expected) in eigenvalues(&found).iter().zip(expected) {
+                assert!(
+                    (found - expected).abs() < 1e-4,
+                    "{unit}: {found} {expected}"
+                );
+            }
+        }
+    }
+
+    /// With noise at the inputs too.
+    #[test]
+    fn the_gain_does_not_depend_on_units() {
+        let of = |unit: f64| {
+            let found = pendulum(unit).following(&[2.0], &[0.1 / unit]).unwrap();
+            [found.gain[0][0], found.gain[1][0] / unit]
+        };
+        let expected = of(1.0);
+        for unit in [1e-6, 1e4] {
+            for (found, expected) in of(unit).iter().zip(expected) {
+                assert!(
+                    (found / expected - 1.0).abs() < 1e-4,
+                    "{unit}: {found} {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_no_output_shows_has_no_gain() {
+        let mut hidden = pendulum(1.0);
+        hidden.outputs = vec![vec![(2, 1.0)]];
+        assert!(hidden.following(&[0.0], &[0.1]).is_none());
+        assert!(LinearResponse::none(1).following(&[0.0], &[0.1]).is_none());
     }
 }

@@ -81,8 +81,9 @@ pub fn first_fit<'a>(
 ) -> Result<(ModelSetup<'a>, Fit), Error> {
     if let Some(needed) = needed_loop(&setup, controllers, thresholds) {
         let closed = setup.clone().in_loop(needed);
-        let fit = closed.fit(options)?;
-        if needs_loop(&closed, &fit.x) {
+        if let Ok(fit) = closed.fit(options)
+            && needs_loop(&closed, &fit.x)
+        {
             let fit = closed.with_simulation_errors(fit);
             return Ok((closed, fit));
         }
@@ -148,7 +149,8 @@ fn misses(setup: &ModelSetup, x: &[f64]) -> bool {
             .map(|(y, m)| (*y, y - m))
             .collect();
         let error = pairs.iter().map(|(_, e)| e * e).mean().sqrt();
-        error.is_nan() || error > pairs.iter().map(|(y, _)| y).population_std_dev()
+        let varies = pairs.iter().map(|(y, _)| y).population_std_dev();
+        !pairs.is_empty() && (error.is_nan() || error > varies)
     })
 }
 

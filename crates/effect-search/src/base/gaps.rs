@@ -159,10 +159,6 @@ fn first_fit(records: &[Record], prior: PriorKnowledge) -> Option<f64> {
     let first: Vec<Record> = first.collect();
     let setup = ModelSetup::new(prior.model, &first, &known, prior.time_unit).ok()?;
     let setup = setup.with_priors(&priors).ok()?;
-    // A fit of a model that does not follow its inputs would end anywhere.
-    if !setup.follows_inputs(setup.start()) {
-        return setup.fastest_time_constant(setup.start());
-    }
     let fit = setup.fit(&FIRST_FIT).ok()?;
     setup.fastest_time_constant(&fit.x)
 }

@@ -95,18 +95,14 @@ impl ModelSetup<'_> {
     }
 
     /// The fastest time constant of the model at a fitted vector, by its linear form at the mean of its states and inputs \[s\]: infinite if
-    /// it only integrates, 0 without states; `None` without a finite simulation. Dead times are left out. Of a model that does not follow its
-    /// inputs at the initial states.
+    /// it only integrates, 0 without states; `None` without a finite simulation. Dead times are left out.
     #[must_use]
     pub fn fastest_time_constant(&self, x: &[f64]) -> Option<f64> {
         let n = self.model.spec().states.len();
         if n == 0 {
             return Some(0.0);
         }
-        let form = match self.follows_inputs(x) {
-            true => self.linearised(x),
-            false => self.linear_at_start(x),
-        }?;
+        let form = self.linearised(x)?;
         let a = DMatrix::from_fn(n, n, |i, j| form.a[i][j]);
         if !a.iter().all(|value| value.is_finite()) {
             return None;

@@ -165,7 +165,7 @@ class Fit:
         return self._native.scores
 
     def _score_of(self, test: Records) -> list[tuple[str, float, float]]:
-        frames = to_frames(test, "test", self._wanted)
+        frames = to_frames(test, "test", self._wanted, self._native.model.references)
         return self._native.score(frames) if frames else []
 
     @property
@@ -270,7 +270,8 @@ class Fit:
 
         Raises `DataError` and `ModelError`.
         """
-        frames = to_frames(test, "test", self._wanted) if test is not None else []
+        others = self._native.model.references
+        frames = to_frames(test, "test", self._wanted, others) if test is not None else []
         with phases(progress, _ctid.time_limit(effort, time_limit)) as on_phase:
             found = self._native.diagnose(
                 frames,

@@ -129,8 +129,9 @@ def _time_key(columns: Iterable[str], wanted: Sequence[str]) -> str | None:
     return found[0] if found else None
 
 
-def to_frame(data: Data, name: str, wanted: Sequence[str]) -> Frame:
-    """A record for the native part. Row 1 in messages is the header, as in a file. `wanted`: the columns that the model reads."""
+def to_frame(data: Data, name: str, wanted: Sequence[str], others: Sequence[str] = ()) -> Frame:
+    """A record for the native part. Row 1 in messages is the header, as in a file. `wanted`: the columns that the model reads; `others`: those that a
+    record may have."""
     columns: dict[str, Any]
     if is_frame(data):
         table = cast("pd.DataFrame", data)
@@ -168,8 +169,7 @@ def to_frame(data: Data, name: str, wanted: Sequence[str]) -> Frame:
     for column, cells in columns.items():
         if column == header:
             continue
-        needed = column in wanted or column.split(" [")[0] in wanted
-        if needed:
+        if any(name in columns for columns in (wanted, others) for name in (column, column.split(" [")[0])):
             headers.append(column)
             values.append(_numbers(name, column, cells))
     for column in wanted:
@@ -179,13 +179,13 @@ def to_frame(data: Data, name: str, wanted: Sequence[str]) -> Frame:
     return Frame(name, header, time, headers, values)
 
 
-def to_frames(data: Records | None, name: str, wanted: Sequence[str]) -> list[Frame]:
+def to_frames(data: Records | None, name: str, wanted: Sequence[str], others: Sequence[str] = ()) -> list[Frame]:
     """Records for the native part."""
     records = as_list(data, name)
     frames = []
     # No comprehension: of some versions of Python it is a further frame on the stack, from which warnings name the caller.
     for k, record in enumerate(records):
-        frames.append(to_frame(record, name if len(records) == 1 else f"{name} {k + 1}", wanted))
+        frames.append(to_frame(record, name if len(records) == 1 else f"{name} {k + 1}", wanted, others))
     return frames
 
 

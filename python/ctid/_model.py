@@ -146,6 +146,7 @@ class Model:
         `inputs`, `outputs`: the columns of the signals: names of the model, or columns in the order of the model, or `{signal: column}`; without
         them the columns have the model's names. A column in another unit (`u [mV]`) is converted.
         `known`: parameters that are not fitted, in the units of the text.
+        A controller of the model file needs the column of its reference: then the loop is simulated, as the program does.
         `priors`: what is known of parameters beside the records, `{name: (value, standard error)}`.
         `hold`: what the inputs do between rows, `"zero"` or `"first"`; without it as the model file says, else `"zero"`.
         `starts`, from 1, and `seed`: of the random starts. `noise_order`: the largest order of the noise model that standard errors allow for, 0 (white
@@ -163,7 +164,7 @@ class Model:
         )
         wanted = [column for _, column in native.inputs + native.outputs]
         records = as_list(data)
-        frames = to_frames(records, "data", wanted)
+        frames = to_frames(records, "data", wanted, native.references)
         with phases(progress) as on_phase:
             fitted = _ctid.Fit.of_model(
                 native,

@@ -62,6 +62,29 @@ def test_several_outputs_and_the_mended_model(program, tmp_path):
     assert own(fit.to_dict()) == results(program, tmp_path, "compare", csv, "--model", toml)
 
 
+def test_a_loop_of_a_model_file(program, tmp_path):
+    mo = "model Plant\n  parameter Real K = 1;\n  parameter Real tau(unit=\"s\", min=0) = 40;\n  input Real u;\n  output Real y = x;\n"
+    (tmp_path / "plant.mo").write_text(mo + "  Real x(start=0);\nequation\n  tau*der(x) = K*u - x;\nend Plant;\n")
+    toml = '[controller.u]\ntype = "PI"\noutput = "y"\nreference = "r"\ngain = 0.8\nintegral_time = 60.0\n'
+    (tmp_path / "m.toml").write_text('model = "plant.mo"\n\n[columns]\ntime = "t [s]"\nu = "u"\ny = "y"\n\n' + toml)
+    draw = np.random.default_rng(3)
+    x = integral = 0.0
+    rows = []
+    for k in range(800):
+        r = float((k // 45) * 7 % 5) - 2.0
+        y = x + 0.05 * draw.standard_normal()
+        u = 0.8 * (r - y + integral / 60.0)
+        rows.append((float(k), r, u, y))
+        integral += r - y
+        x += (2.0 * u - x) * (1.0 - np.exp(-1.0 / 60.0))
+    frame = pd.DataFrame(rows, columns=["t [s]", "r", "u", "y"]).set_index("t [s]")
+    frame.to_csv(tmp_path / "loop.csv")
+    fit = ctid.Model.from_file(tmp_path / "m.toml").fit(read(tmp_path / "loop.csv", "t [s]"))
+    found = own(fit.to_dict())
+    assert found == results(program, tmp_path, "compare", "loop.csv", "--model", "m.toml")
+    assert found["control_loop"]["simulated"]
+
+
 def test_an_effect_is_added_as_the_program_adds_it(program, tmp_path):
     toml, csv = MODELS / "heated-block.toml", MODELS / "heated-block.csv"
     for name in (toml, csv, MODELS / "heated-block.mo"):

@@ -21,6 +21,8 @@ pub struct Content {
     pub name: String,
     /// Header of the column of the time.
     pub time: String,
+    /// Headers of the columns of the signals.
+    pub headers: Vec<String>,
     pub csv: Vec<u8>,
 }
 
@@ -85,6 +87,7 @@ impl Frame {
         Ok(Self(Content {
             name,
             time: time_header,
+            headers,
             csv: csv.into_bytes(),
         }))
     }

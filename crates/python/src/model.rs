@@ -137,6 +137,12 @@ impl Model {
         names.zip(self.0.file.columns.inputs.clone()).collect()
     }
 
+    /// Columns of the references of its controllers.
+    #[getter]
+    fn references(&self) -> Vec<String> {
+        self.0.file.references().cloned().collect()
+    }
+
     /// Names and units of the outputs.
     #[getter]
     fn outputs(&self) -> Vec<(String, String)> {

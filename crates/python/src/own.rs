@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use ct_model::ModelSpec;
-use ct_signals::{Columns, ReadOptions, Reading};
+use ct_signals::{Columns, Heading, ReadOptions, Reading};
 use ctid::own_model::{OwnModelFile, OwnSettings, Records};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -75,7 +75,10 @@ pub fn records(
     fitted: usize,
 ) -> Result<Records, ctid::Error> {
     let options = ReadOptions::from(file.hold);
-    let read = |frame: &Content| frame.record(&file.columns, &options);
+    let read = |frame: &Content| {
+        let headings: Vec<Heading> = frame.headers.iter().map(|h| Heading::of(h)).collect();
+        frame.record(&file.columns_of_fit(&headings), &options)
+    };
     let all = frames.iter().map(read);
     let all = all.collect::<Result<Vec<Reading>, _>>()?;
     let unit = file.time_unit.unwrap_or_else(|| time_unit(frames));

@@ -2,6 +2,7 @@
 
 use ct_signals::quoted;
 use plants::controller::Controller;
+use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::{
@@ -11,7 +12,7 @@ use super::{
 use crate::Error;
 
 /// Control law, with `e = r - y`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ControllerLaw {
     /// `u = u_op + gain (e + (1/integral_time) int e dt)`.
     Pi {
@@ -37,7 +38,7 @@ pub enum ControllerLaw {
 }
 
 /// The settings of a controller; those of a PI were accepted by [`Controller::pi`].
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ControllerSettings {
     /// The control law.
     pub law: ControllerLaw,

@@ -11,6 +11,12 @@ use crate::sentences::of_the_loop;
 use crate::{Error, MessageNames};
 
 impl OwnModelFile {
+    /// The columns of the controllers' references.
+    pub fn references(&self) -> impl Iterator<Item = &String> {
+        let controllers = self.controllers.iter();
+        controllers.filter_map(|own| own.reference.as_ref())
+    }
+
     /// Columns of a record that is fitted, with the references of the controllers: those that the record has and that are no signals of the
     /// model.
     pub fn columns_of_fit(&self, headings: &[Heading]) -> Columns {
@@ -19,11 +25,7 @@ impl OwnModelFile {
             let name = Heading::of(column).name;
             headings.iter().any(|heading| heading.name == name)
         };
-        for column in self
-            .controllers
-            .iter()
-            .filter_map(|own| own.reference.as_ref())
-        {
+        for column in self.references() {
             let signals = columns.inputs.iter().chain(&columns.outputs);
             let mut known = signals.chain(&columns.references);
             if has(column) && !known.any(|own| own == column) {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use ct_model::ModelSpec;
 use ct_signals::quoted;
+use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use crate::model_file::{ControllerLaw, ControllerSettings, RawController, Source};
@@ -13,14 +14,14 @@ use crate::{Error, names};
 pub(super) type RawControllers = BTreeMap<Spanned<String>, Spanned<RawController>>;
 
 /// A controller of the model file.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct OwnController {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OwnController {
     /// The input that the controller drives, by its position.
-    pub input: usize,
+    pub(crate) input: usize,
     /// The output that the controller reads, by its position.
-    pub output: usize,
+    pub(crate) output: usize,
     /// The column of the reference.
-    pub reference: Option<String>,
+    pub(crate) reference: Option<String>,
     /// Control law; times are in the unit of the model's time.
     settings: ControllerSettings,
     /// Name of the controller's table: `controller.u`.
@@ -87,7 +88,7 @@ pub(super) fn read(
 
 impl OwnController {
     /// Control law with times in seconds; `time_unit`: seconds in one unit of the model's time.
-    pub fn in_seconds(&self, time_unit: f64) -> ControllerSettings {
+    pub(crate) fn in_seconds(&self, time_unit: f64) -> ControllerSettings {
         // For a polynomial in d/dt, highest power first.
         let scaled = |coefficients: &[f64]| -> Vec<f64> {
             let powers = coefficients.iter().rev().enumerate();

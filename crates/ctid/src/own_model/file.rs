@@ -75,6 +75,8 @@ pub struct OwnSettings {
     pub kept: BTreeMap<String, Kept>,
     /// Effects of the user's own.
     pub candidates: BTreeMap<String, OwnCandidate>,
+    /// Controllers of the model file that these settings are from.
+    pub controllers: Vec<OwnController>,
 }
 
 /// Records in the order and units of the model.
@@ -176,6 +178,7 @@ impl OwnModelFile {
             effects: self.effects.on.clone(),
             kept: self.effects.kept.clone(),
             candidates: self.candidates.clone(),
+            controllers: self.controllers.clone(),
         }
     }
 

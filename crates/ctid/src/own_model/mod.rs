@@ -42,6 +42,7 @@ mod unknown;
 pub(crate) mod words;
 
 pub use self::compare::{Comparison, Curves, compare};
+pub use self::controller::OwnController;
 pub use self::design::design;
 pub(crate) use self::design::{
     OwnProposal, experiments, limits as design_limits, said as design_said,

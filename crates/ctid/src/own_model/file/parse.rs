@@ -143,6 +143,7 @@ impl OwnModelFile {
             effects,
             kept,
             candidates,
+            controllers,
         } = settings;
         let effects = effects::of_ids(&spec, &candidates, (&effects, &kept))?;
         for parameter in known.keys().chain(priors.keys()) {
@@ -182,7 +183,7 @@ impl OwnModelFile {
             hold,
             candidates,
             effects,
-            controllers: Vec::new(),
+            controllers,
             unused: Vec::new(),
         })
     }

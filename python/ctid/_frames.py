@@ -169,7 +169,7 @@ def to_frame(data: Data, name: str, wanted: Sequence[str], others: Sequence[str]
     for column, cells in columns.items():
         if column == header:
             continue
-        if any(name in columns for columns in (wanted, others) for name in (column, column.split(" [")[0])):
+        if any(name in (*wanted, *others) for name in (column, column.split(" [")[0])):
             headers.append(column)
             values.append(_numbers(name, column, cells))
     for column in wanted:

@@ -131,27 +131,25 @@ fn needed_loop(
     Some(Arc::new(found))
 }
 
-/// Whether the error of a simulation is above the standard deviation of the readings at an output.
+/// Whether a simulation cannot go on, or misses the readings ([`is_missed`]).
 fn misses(setup: &ModelSetup, x: &[f64]) -> bool {
-    let Some(simulated) = setup.simulate(x) else {
-        return true;
-    };
-    let outputs = setup.outputs();
-    (0..outputs).any(|o| {
-        let readings = setup
-            .records()
-            .iter()
-            .map(|record| &record.outputs[o].values);
-        let series = simulated.iter().skip(o).step_by(outputs);
-        let pairs = readings.zip(series).flat_map(|(y, m)| y.iter().zip(m));
-        let pairs: Vec<(f64, f64)> = pairs
-            .filter(|(y, _)| !y.is_nan())
-            .map(|(y, m)| (*y, y - m))
-            .collect();
-        let error = pairs.iter().map(|(_, e)| e * e).mean().sqrt();
-        let varies = pairs.iter().map(|(y, _)| y).population_std_dev();
-        !pairs.is_empty() && (error.is_nan() || error > varies)
-    })
+    let missed =
+        |errors: Vec<f64>| (errors.iter().enumerate()).any(|(o, e)| is_missed(setup, o, *e));
+    setup.rmse(x).is_none_or(missed)
+}
+
+/// Standard deviation of the readings of an output \[its unit\].
+pub(crate) fn varies(setup: &ModelSetup, output: usize) -> f64 {
+    let readings = setup
+        .records()
+        .iter()
+        .flat_map(|r| &r.outputs[output].values);
+    readings.filter(|y| !y.is_nan()).population_std_dev()
+}
+
+/// Whether an error, root mean square, is above the standard deviation of the readings of an output.
+pub(crate) fn is_missed(setup: &ModelSetup, output: usize, error: f64) -> bool {
+    error.is_nan() || error > varies(setup, output)
 }
 
 /// Closes the loop around a fitted model if possible, and tests for feedback if no controller is known. A model that was fitted in its loop

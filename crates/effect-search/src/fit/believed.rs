@@ -15,10 +15,8 @@ use ct_signals::Record;
 use estimation::{Fit, Noise, Residuals, within};
 use greybox::{FitOptions, ModelSetup, possible_reading_steps};
 
-use statrs::statistics::Statistics;
-
 use crate::Error;
-use crate::base::control_loop::{enclose, first_fit};
+use crate::base::control_loop::{enclose, first_fit, is_missed, varies};
 use crate::base::problem::{Kept, Limit, Options, Problem};
 use crate::fit::node::{Context, FINE, Node};
 
@@ -239,14 +237,12 @@ fn require_stable(setup: &ModelSetup, fit: &Fit) -> Result<(), Error> {
     }
     let outputs = &setup.records()[0].outputs;
     for (o, (output, error)) in outputs.iter().zip(&fit.rmse).enumerate() {
-        let readings = setup.records().iter().flat_map(|r| &r.outputs[o].values);
-        let varies = readings.filter(|y| !y.is_nan()).population_std_dev();
-        if error.is_nan() || *error > varies {
+        if is_missed(setup, o, *error) {
             return Err(Error::Unstable {
                 output: output.name.clone(),
                 unit: output.unit.clone(),
                 error: *error,
-                varies,
+                varies: varies(setup, o),
                 growth_time,
                 longest: ModelSetup::longest_followed(growth_time),
             });

@@ -87,8 +87,10 @@ pub fn output_steps(
     });
     let signals: Vec<Signal> = inputs.chain(of_states).collect();
     // In a loop that the model needs, the controllers answer the difference from the readings: the disturbance is what noise would be.
-    let disturbances = setup.is_run_in_loop().then_some(());
-    let disturbances = disturbances.and_then(|()| estimation::residuals(setup, &fit.x));
+    let disturbances = match setup.is_run_in_loop() {
+        true => estimation::residuals(setup, &fit.x),
+        false => None,
+    };
     let residuals: Vec<Vec<f64>> = disturbances.unwrap_or_else(|| {
         records
             .iter()

@@ -282,7 +282,8 @@ impl<'a> ModelSetup<'a> {
 
     /// Root mean square of the difference from the measurements in a simulation ([`ModelSetup::simulate`]), for each output \[its unit\], without
     /// missing samples; `None` where the simulation cannot go on.
-    fn rmse(&self, x: &[f64]) -> Option<Vec<f64>> {
+    #[must_use]
+    pub fn rmse(&self, x: &[f64]) -> Option<Vec<f64>> {
         let simulated = self.simulate(x)?;
         let of_output = |o: usize| {
             let measured = self.records.iter().map(move |record| &record.outputs[o]);
